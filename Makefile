@@ -3,7 +3,6 @@
 # make bench-solver, make bench-scaling, make charts, make stability    what the methods cost and where they end
 # make coverage    the lines of the five packages that the tests run, and those that they do not
 # make docs, make lint, make pictures    documentation, style and types, the README's picture
-# make figures     every figure of the paper that holds data, and the gallery in docs
 # The environment is made on first use; make clean-env removes it.
 CASE ?= cases/paper.toml
 WORKERS ?= 2
@@ -13,7 +12,7 @@ IN = ./enter
 help:
 	@sed -n 's/^# //p' Makefile
 
-.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability docs figures pictures clean clean-env
+.PHONY: help run test test-slow coverage lint charts bench-solver bench-scaling stability docs pictures clean clean-env
 
 run:
 	$(IN) python -m alphacut run $(CASE) --out $(OUT) --workers $(WORKERS) $(if $(FRESH),--fresh)
@@ -52,9 +51,6 @@ stability:
 
 docs:
 	$(IN) sphinx-build -q docs build/docs
-
-figures:
-	$(IN) python -m alphacut.docs.gallery
 
 pictures: run
 	mkdir -p docs/pictures

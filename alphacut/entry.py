@@ -13,8 +13,9 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from alphacut.commands.parser import Parser, refuse_petsc, split_petsc
+from alphacut.commands.parser import Parser, split_petsc
 from alphacut.fuzzy import CampaignError
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import leave as leave
 from alphacut.io.files import open_streams, rank, ranks, say, standard_output
 from alphacut.io.netcdf import finished
@@ -24,10 +25,7 @@ from alphacut.io.provenance import door, own_version
 from alphacut.rve.interruption import stoppable
 from alphacut.rve.solver.options import OptionError
 
-NAMES = (
-    "run", "check", "microstructure", "cell", "image", "mesh", "modulus", "envelope", "tolerances",
-    "update", "measure-next", "spectrum", "report", "repair",
-)  # fmt: skip
+NAMES = "run", "check", "microstructure", "cell", "modulus", "envelope", "identify", "report"
 
 
 class Commands(Mapping[str, ModuleType]):
@@ -41,7 +39,7 @@ class Commands(Mapping[str, ModuleType]):
         self._names = dict(names)
 
     def __getitem__(self, name: str) -> ModuleType:
-        return import_module(f"alphacut.commands.{self._names[name].replace('-', '_')}")
+        return import_module(f"alphacut.commands.{self._names[name]}")
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -127,11 +125,10 @@ def main(
             options, left = top.parse_known_args(ours)
             if left:
                 made[options.command].refuse([one for one in left if one.startswith("-")] or left)
-            refuse_petsc(commands[options.command].__name__.rpartition(".")[2], petsc)
             check_destinations(made[options.command], options)
             with standard_output(getattr(options, "json", None) == "-") as out, plain_warnings():
                 return int(commands[options.command].run(options, petsc, out))
-        except (BadInput, OptionError) as error:
+        except (BadInput, OptionError, RefusedError) as error:
             for problem in getattr(error, "problems", [error]):
                 say(str(problem))
             return 2
@@ -168,7 +165,7 @@ def plain_warnings() -> Iterator[None]:
 
 def interrupted(options: argparse.Namespace) -> str:
     """What is left of the work of a command that was interrupted."""
-    keeping = {"envelope": ("out",), "image": ("out",), "modulus": ("store", "resume")}
+    keeping = {"envelope": ("out",), "modulus": ("store",)}
     names = keeping.get(options.command, ())
     if options.command != "run" and not any(getattr(options, name, None) for name in names):
         how = " or ".join(f"--{name}" for name in names)
@@ -187,9 +184,6 @@ def unfinished(options: argparse.Namespace) -> Path | None:
         return folder if finished(folder) else None
     store = options.store if options.command == "modulus" else None
     path = Path(store or f"results/{Path(options.case).stem}/samples.db")
-    if options.command == "image":
-        folder = Path(options.out).with_suffix(".partial")
-        return folder if any(folder.glob("*.npz")) else None
     if options.command == "envelope":
         path = Path(options.out).with_suffix(".partial.npz")
     return path if path.is_file() and path.stat().st_size else None

@@ -13,8 +13,8 @@ from alphacut.case.schema import Top
 from alphacut.case.sections.material import Cell, Mesh, Modulus, Radius, Response
 from alphacut.case.sections.particles import Microstructure
 from alphacut.case.sections.picture import Picture
-from alphacut.case.sections.questions import Decision, Field, Joint, Update
-from alphacut.case.sections.structures import Frame, Pendulum, Tower
+from alphacut.case.sections.questions import Decision, Update
+from alphacut.case.sections.structures import Frame, Pendulum
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.provenance import digest, door
@@ -40,14 +40,11 @@ class Sections:
     response: Response | None = None
     frame: Frame | None = None
     pendulum: Pendulum | None = None
-    tower: Tower | None = None
     study: tuple[Study, ...] = ()
     envelope: Envelope | None = None
     exceedance: Exceedance | None = None
     update: Update | None = None
-    field: Field | None = None
     decision: Decision | None = None
-    joint: Joint | None = None
 
     @property
     def files(self) -> tuple[Section, ...]:
@@ -104,13 +101,10 @@ class Case:
     response = Needed[Response]()
     frame = Needed[Frame]()
     pendulum = Needed[Pendulum]()
-    tower = Needed[Tower]()
     envelope = Needed[Envelope]()
     exceedance = Needed[Exceedance]()
     update = Needed[Update]()
-    field = Needed[Field]()
     decision = Needed[Decision]()
-    joint = Needed[Joint]()
 
     @property
     def name(self) -> str:
@@ -128,10 +122,9 @@ class Case:
         return self.sections.top.stages
 
     @property
-    def quoted(self) -> Path | None:
-        """File of the numbers that a paper quotes for this case; None for a case of one's own."""
-        path = self.path.with_suffix(".quoted.toml")
-        return path if path.is_file() else None
+    def is_paper(self) -> bool:
+        """Whether studies name figures of the paper."""
+        return any(study.figures for study in self.sections.study)
 
     @property
     def text_of_file(self) -> str:

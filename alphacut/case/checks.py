@@ -12,7 +12,6 @@ from alphacut.case.case import Case, files_of
 from alphacut.case.checks_image import image
 from alphacut.case.checks_material import particles, radius, sphere_model
 from alphacut.case.checks_structure import incomplete
-from alphacut.case.idle import idle_envelope
 from alphacut.case.names import floors, others, structures
 from alphacut.case.schema import NEEDED, STAGES
 from alphacut.case.sections.vibration import ENVELOPE_METHODS, INTEGRATORS, NONLINEAR
@@ -47,13 +46,10 @@ def checks(*, modal: bool = False) -> Iterator[Check]:
     yield where("envelope", methods)
     yield where("envelope", certificate)
     yield where("envelope", integrators)
-    yield where("envelope", idle_envelope)
     yield where("exceedance", questions.exceedance)
     yield where("update", lambda case: levels("update.alpha", case.update.alpha))
     yield where("update", questions.update)
-    yield where("field", questions.field)
     yield where("decision", questions.decision)
-    yield where("joint", questions.joint)
 
 
 def where(section: str, check: Check) -> Check:
@@ -86,7 +82,7 @@ def one_structure(case: Case) -> Iterator[Problem]:
             "frame",
             f"stage envelope needs one structure, got {len(found)}",
             ", ".join(found),
-            "[frame], [pendulum] or [tower]",
+            "[frame] or [pendulum]",
         )
 
 
@@ -194,7 +190,7 @@ def missing_sections(case: Case) -> Iterator[Problem]:
 
 def files(case: Case) -> Iterator[Problem]:
     """Files that the case names must be there."""
-    for section in ("microstructure", "picture", "modulus", "frame", "tower", "update"):
+    for section in ("microstructure", "picture", "modulus", "frame", "update"):
         found = getattr(case.sections, section)
         section = "cell" if section == "picture" else section
         for key, name in files_of(found) if found else ():

@@ -12,7 +12,6 @@ from alphacut.io.problem import Problem
 SOURCES = tuple(f"cell.{name}" for name in PICTURES)
 OF_PARTICLE = ("cell.particles", "cell.matrix_", "cell.inclusion_", "radius.", "mesh.", "response.")
 OF_SAMPLES = tuple(f"modulus.{key}" for key in ("method", "plan", "tolerance", "average"))
-OF_FILE = ("pixel", "threshold", "threshold_deviation", "quantiles", "labels")
 
 
 def phase_count(given: Picture) -> int:
@@ -27,13 +26,8 @@ def image(case: Case) -> Iterator[Problem]:
     if case.sections.picture is None:
         yield from unpictured(case)
         return
-    sources = [f"cell.{name}" for name in case.picture.sources]
-    if len(sources) > 1:
-        allowed = f"one of {', '.join(SOURCES)}"
-        yield Problem("cell", f"got {len(sources)} pictures", ", ".join(sources), allowed)
-        return
-    yield from strangers(case, sources[0])
-    yield from of_file(case) if case.picture.image else of_outline(case, sources[0])
+    yield from strangers(case, "cell.image")
+    yield from of_file(case)
     yield from phases(case.picture)
 
 
@@ -80,37 +74,6 @@ def of_file(case: Case) -> Iterator[Problem]:
     labels = given.labels or ()
     if len(set(labels)) != len(labels):
         yield Problem("cell.labels", "a label stands twice", str(list(labels)))
-    if given.size is not None and len(given.size) != 2:
-        yield Problem("cell.size", "this takes a width and a height")
-    if case.asked("cell.pixels"):
-        yield Problem(
-            "cell.pixels", "an image has its own pixels", allowed="cell.pixels of outlines"
-        )
-    yield from random_threshold(case)
-
-
-def random_threshold(case: Case) -> Iterator[Problem]:
-    """A random threshold parts two phases of a periodic image."""
-    key, given = "cell.threshold_deviation", case.picture
-    if given.threshold_deviation is None:
-        if case.asked("cell.quantiles"):
-            what = "quantiles are of a random threshold"
-            yield Problem("cell.quantiles", what, allowed=f"this key beside {key}")
-        return
-    if len(given.threshold or ()) != 1:
-        yield Problem(key, "a random threshold parts two phases", allowed="one cell.threshold")
-    if given.boundary == "window":
-        what = "a random threshold is for a periodic image"
-        yield Problem(key, what, allowed='boundary = "periodic"')
-
-
-def of_outline(case: Case, source: str) -> Iterator[Problem]:
-    """An outline's cell; keys of a file have no meaning beside it."""
-    if len(case.picture.size or ()) != 2:
-        yield Problem("cell.size", f"missing: {source} needs the width and height of its cell")
-    for key in OF_FILE:
-        if case.asked(f"cell.{key}"):
-            yield Problem(f"cell.{key}", f"this is for cell.image, and {source} is given")
 
 
 def phases(given: Picture) -> Iterator[Problem]:

@@ -17,8 +17,6 @@ def incomplete(case: Case) -> Iterator[Problem]:
         yield from frame_stiffness(case)
         yield from frame_damping(case)
         yield from frame_motion(case)
-    if case.sections.tower:
-        yield from tower_damping(case)
 
 
 def given(case: Case, section: str, *names: str) -> bool:
@@ -73,18 +71,6 @@ def frame_damping(case: Case) -> Iterator[Problem]:
             "missing: the frame has no damping",
             allowed=f'dampers, {DAMPING}; "0 %" for none',
         )
-
-
-def tower_damping(case: Case) -> Iterator[Problem]:
-    """Both of Rayleigh's factors, or a ratio."""
-    if not given(case, "tower", "damping_ratio"):
-        for name in RAYLEIGH:
-            if not given(case, "tower", name):
-                yield Problem(
-                    f"tower.{name}",
-                    "missing: the tower needs damping",
-                    allowed=f'{DAMPING}; "0 %" for none',
-                )
 
 
 def frame_motion(case: Case) -> Iterator[Problem]:

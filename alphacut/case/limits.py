@@ -10,7 +10,6 @@ from typing import NamedTuple
 from alphacut.case.case import Case
 from alphacut.case.names import OUTPUTS, frame_outputs, structures
 from alphacut.case.values import nearest
-from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.io import quantity
 from alphacut.io.problem import BadInput, Problem
 
@@ -126,8 +125,6 @@ def storey_height(case: Case, output: str) -> float | None:
     kind, floor = output.rstrip("0123456789"), output.lstrip("abcdefghijklmnopqrstuvwxyz_")
     if kind != "drift":
         return None
-    if case.sections.tower:
-        return case.tower.height
     lengths = (case.sections.frame.lengths or ()) if case.sections.frame else ()
     index = 0 if len(lengths) == 1 else int(floor or 1) - 1
     return lengths[index].modal if 0 <= index < len(lengths) else None
@@ -170,32 +167,6 @@ def unknown(key: str, names: Iterable[str], known: Sequence[str]) -> Iterator[Pr
             yield Problem(key, what, name, ", ".join(known), nearest(name, known))
 
 
-def field(case: Case) -> Iterator[Problem]:
-    """A field is of one symmetric fuzzy value of all storeys of a frame."""
-    if case.sections.frame is None:
-        yield Problem("field", "storeys are those of a storey frame", "", "[frame]")
-        return
-    key = {"c": "columns", "k": "stiffness", "m": "masses"}[case.field.of]
-    values = getattr(case.frame, key) or (Crisp(0.0),)
-    allowed = "one value for all storeys, with as much below its middle as above"
-    if len(set(values)) > 1 or values[0].support.width == 0:
-        what = "a field needs one fuzzy value, the same for all"
-        yield case.problem(f"frame.{key}", what, allowed)
-    elif not symmetric(values[0]):
-        what = "a field needs a symmetric fuzzy value"
-        yield case.problem(f"frame.{key}", what, allowed)
-    if case.sections.update is not None and case.field.of in (x[0] for x in case.update.learn):
-        yield Problem("update.learn", "these inputs are a field", case.field.of, "other inputs")
-
-
-def symmetric(number: FuzzyNumber) -> bool:
-    """Whether all cuts of a fuzzy number have the same middle."""
-    (low, high), (left, right) = number.support, number.cut(1.0)
-    half = [number.cut(0.5).lower, number.cut(0.5).upper]
-    middles = [(low + high) / 2, (left + right) / 2, sum(half) / 2]
-    return max(middles) - min(middles) <= 1e-12 * max(abs(low), abs(high))
-
-
 def decision(case: Case) -> Iterator[Problem]:
     """Limits are on outputs of a storey frame that vibrates."""
     if case.sections.envelope is None or "envelope" not in case.stages:
@@ -216,28 +187,6 @@ def decision(case: Case) -> Iterator[Problem]:
                 yield Problem("decision.limits", what, name, f"a{name[2:]}, or [exceedance]")
     except BadInput as error:
         yield from error.problems
-
-
-def joint(case: Case) -> Iterator[Problem]:
-    """Two outputs at a time, or one at two, within the duration."""
-    outputs, times = case.joint.outputs, case.joint.times
-    yield from unknown("joint.outputs", outputs, observed(case))
-    if sorted((len(outputs), len(times))) != [1, 2]:
-        got = f"{len(outputs)} outputs and {len(times)} times"
-        allowed = "two outputs and one time, or one output and two times"
-        yield Problem("joint", f"got {got}", "", allowed)
-    if case.sections.envelope is None or "envelope" not in case.stages:
-        yield Problem("joint", "outputs are followed over stage envelope", "", "that stage")
-        return
-    step, duration = case.envelope.step, case.envelope.duration
-    for time in times:
-        whole = abs(round(time / step) * step - time) <= 1e-9 * max(time, step)
-        if not whole or time > duration * (1 + 1e-9):
-            what = f"{time:g} s is no node of the simulation"
-            allowed = f"multiples of envelope.step, {step:g} s, up to {duration:g} s"
-            yield Problem("joint.times", what, f"{time:g} s", allowed)
-    if len(times) == 2 and times[0] == times[1]:
-        yield Problem("joint.times", "both times are the same", f"{times[0]:g} s")
 
 
 def exceedance(case: Case) -> Iterator[Problem]:
@@ -282,17 +231,11 @@ def possible_outputs(case: Case) -> tuple[str, ...]:
 def update(case: Case) -> Iterator[Problem]:
     """Modes are those of a storey frame, and levels begin above 0."""
     alpha, given = case.update.alpha, case.update
-    if (given.measured is None) == (given.recorded is None):
-        allowed = "measured (modes) or recorded (a motion)"
-        yield Problem("update.measured", "inputs are learned from one file", "", allowed)
-    for key in ("held_out", "frequency_deviation", "shape_deviation", "independent"):
-        if given.recorded is not None and case.asked(f"update.{key}"):
-            yield Problem(f"update.{key}", "this is of measured modes", allowed="beside measured")
     if case.sections.frame is None:
         yield Problem("update", "natural modes are learned from for a storey frame", "", "[frame]")
-    elif case.frame.p_delta and given.measured is not None:
+    elif case.frame.p_delta:
         what = "measured modes are learned from without p_delta"
-        yield Problem("update.measured", what, given.measured, "a recorded motion, or no p_delta")
+        yield Problem("update.measured", what, given.measured, "a frame without p_delta")
     if alpha[0] <= 0:
         yield Problem(
             "update.alpha",

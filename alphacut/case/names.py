@@ -17,10 +17,9 @@ LISTS = (
 """Keys of a frame with one value for each floor, or one for all."""
 OTHERS = {  # structures beside the storey frame, and their inputs
     "pendulum": ("m", "l", "d", "g", "phi_0", "omega_0"),
-    "tower": ("E_columns", "E_columns_top", "E_beams", "mass", "zeta", *RAYLEIGH),
 }
 # of structures beside the storey frame
-OUTPUTS = {"pendulum": ("force",), "tower": ("roof", "drift")}
+OUTPUTS = {"pendulum": ("force",)}
 
 
 def floors(case: Case) -> Iterator[Problem]:
@@ -68,14 +67,7 @@ def other_inputs(case: Case, section: str, known: tuple[str, ...]) -> Iterator[P
     """Names of inputs that a pendulum or a tower does not have."""
     for key, names in named_inputs(case):
         for name in names:
-            if name == "zeta" and section == "tower" and case.tower.damping_ratio is None:
-                yield Problem(
-                    key,
-                    "the tower has no damping ratio",
-                    name,
-                    "zeta where tower.damping_ratio is given",
-                )
-            elif name not in known:
+            if name not in known:
                 yield Problem(
                     key,
                     f"the {section} has no input {name}",

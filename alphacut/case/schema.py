@@ -9,8 +9,8 @@ from typing import Annotated, Literal, get_args
 from alphacut.case.key import Key, Range, Section, keys_of
 from alphacut.case.sections import particles
 from alphacut.case.sections.material import CellTable, Mesh, Modulus, Radius, Response
-from alphacut.case.sections.questions import Decision, Field, Joint, Update
-from alphacut.case.sections.structures import Frame, Pendulum, Tower
+from alphacut.case.sections.questions import Decision, Update
+from alphacut.case.sections.structures import Frame, Pendulum
 from alphacut.case.sections.vibration import Envelope, Exceedance, Study
 
 VERSION = 1
@@ -44,14 +44,11 @@ SECTIONS: dict[str, type[Section]] = {
     "response": Response,
     "frame": Frame,
     "pendulum": Pendulum,
-    "tower": Tower,
     "study": Study,
     "envelope": Envelope,
     "exceedance": Exceedance,
     "update": Update,
-    "field": Field,
     "decision": Decision,
-    "joint": Joint,
 }
 # sections that a stage cannot do without
 NEEDED = {

@@ -1,72 +1,93 @@
-"""``alphacut check``: everything that is wrong with a case, at once."""
+"""Command ``alphacut check``: the case as it is read, and everything that is wrong with it."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
+from math import pi
 from typing import TextIO
 
 from alphacut.case.case import Case
+from alphacut.case.key import Section, keys_of
 from alphacut.case.load import load
-from alphacut.case.readings import readings
 from alphacut.commands.options import add_common, answer
-from alphacut.io.files import say
+from alphacut.frame.structures.linear import frequencies
+from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
-from alphacut.stages.image.phases import BEYOND, phase_lines
-from alphacut.stages.image.reading import study_of
-from alphacut.stages.material.microstructure import plan
-from alphacut.stages.material.modulus import measured_line
-from alphacut.stages.readiness import motion, ready
+from alphacut.io.text_table import text_table
+from alphacut.io.units import engineering
+from alphacut.stages.material.modulus import stand_in
+from alphacut.stages.vibration.structure import structure
 
-ABOUT = (
-    "check a case without computing anything: a line for each problem, with its key and what is"
-    " allowed"
-)
+ABOUT = "check a case without computing anything, and print what it was read as"
+SHAPES = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
+Row = tuple[str, str, str]
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
+    """Adds the options of the command."""
     add_common(parser)
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
-    """Check and report; with ``--json`` the problems as data."""
+    """Checks and reports; with ``--json`` the problems as data."""
     try:
         case = load(options.case, options.set)
-        found = ready(case)
+        period = first_period(case)
     except BadInput as error:
         problems = [asdict(problem) for problem in error.problems]
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
-    inputs, plans = list(readings(case)), [*measured_line(case), *plan(case)]
-    if "image" in case.stages:
-        plans += [*phase_lines(study_of(case)), BEYOND[case.picture.boundary]]
-    plans += [] if found.structure is None else motion(case, found.structure)
-    warnings = [f"warning: {remark}" for remark in (*found.warnings, *found.rough)]
+    rows = list(values(case))
     document = {
         "case": options.case,
         "ok": True,
         "problems": [],
-        "warnings": warnings,
         "stages": list(case.stages),
-        "period_s": found.period,
-        "inputs": [asdict(reading) for reading in inputs],
-        "plan": plans,
+        "period_s": period,
+        "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
-    answer(options, document, out)
-    for warning in warnings:
-        say(warning)
-    if options.json != "-" and not options.quiet:
-        lines = (*inputs, *plans, verdict(options.case, case, found.period))
-        out.writelines(f"{line}\n" for line in lines)
+    text = text_table(("key", "value", "kind"), rows)
+    text += f"first natural period {period:.4g} s\n" if period else ""
+    answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 
 
-def verdict(name: str, case: Case, period: float | None) -> str:
-    """The last line: that nothing is wrong, what would run, and the first natural period."""
-    computed = {"modulus", "image"} & set(case.stages)  # the modulus is yet to be had
-    first = f"; first natural period {'about ' * bool(computed)}{period:.3g} s" if period else ""
-    passed = computed and case.sections.frame and case.frame.modulus is not None
-    over = "; frame.modulus is passed over, stage modulus hands its own on" if passed else ""
-    return f"{name}: no problems; stages {', '.join(case.stages)}; {case.top.title}{first}{over}"
+def first_period(case: Case) -> float | None:
+    """First natural period in s at the modal values; None of a nonlinear structure, or of none."""
+    if "envelope" not in case.stages:
+        return None
+    if case.sections.frame and case.frame.modulus is None and case.frame.stiffness is None:
+        if (number := stand_in(case)) is None:
+            return None
+    else:
+        number = stand_in(case)
+    linear = structure(case, number).linear
+    return None if linear is None else 2 * pi / float(frequencies(linear)[0])
+
+
+def values(case: Case) -> Iterator[Row]:
+    """Key, value and kind of every quantity of the case."""
+    for section in ("radius", "cell", "picture", "frame", "pendulum", "envelope"):
+        content = getattr(case.sections, section)
+        if content is not None:
+            yield from rows_of("cell" if section == "picture" else section, content)
+
+
+def rows_of(name: str, section: Section) -> Iterator[Row]:
+    """Key, value and kind of every quantity of a section."""
+    for key, about in keys_of(type(section)).items():
+        content = getattr(section, key, None)
+        several = content if isinstance(content, tuple) else (content,)
+        for number, one in enumerate(several, start=1):
+            place = f"{name}.{key}" + (f"[{number}]" if len(several) > 1 else "")
+            if isinstance(one, FuzzyNumber):
+                yield place, _numbers(one, about.unit), SHAPES.get(type(one), "fuzzy")
+            elif isinstance(one, float) and about.unit:
+                yield place, engineering(one, about.unit), "number"
+
+
+def _numbers(number: FuzzyNumber, unit: str) -> str:
+    ends = dict.fromkeys((number.support.lower, *number.cut(1.0), number.support.upper))
+    return " … ".join(engineering(x, unit) for x in ends)

@@ -1,4 +1,4 @@
-"""``alphacut report``: the results of a run as one self-contained HTML page."""
+"""Command ``alphacut report``: the results of a run as one self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -13,31 +13,27 @@ from alphacut.io.files import write_text
 from alphacut.io.netcdf import own_files, read_summary
 from alphacut.report.page import report
 
-ABOUT = "one self-contained HTML page of a run's results, with interactive envelopes"
+ABOUT = "one self-contained HTML page of a run's results"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of the command."""
-    parser.add_argument(
-        "folder", metavar="FOLDER", help="results of a run, for example results/paper"
-    )
+    """Adds the options of the command."""
+    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/paper")
     parser.add_argument(
         "--out", metavar="FILE.html", help="where the page goes (default: FOLDER/report.html)"
     )
-    parser.add_argument(
-        "--csv", metavar="FOLDER", help="write every result as a CSV file there as well"
-    )
+    parser.add_argument("--csv", metavar="FOLDER", help="write every result as a CSV file there")
     add_quiet(parser)
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
-    """Write the page."""
+    """Writes the page, and the tables where they are requested."""
     folder = Path(options.folder)
     path = Path(options.out) if options.out else folder / "report.html"
     page = report(folder)
     write_text(path, page)
     files = own_files(read_summary(folder), folder) if options.csv else []
     tables = write_tables(files, Path(options.csv)) if options.csv else []
-    found = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
-    answer(options, found, out, "".join(f"{file}\n" for file in (path, *tables)))
+    document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
+    answer(options, document, out, "".join(f"{file}\n" for file in (path, *tables)))
     return 0

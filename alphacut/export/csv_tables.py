@@ -107,7 +107,7 @@ def with_worth(dataset: xarray.Dataset) -> xarray.Dataset:
     elif "nature" in facts:
         own = json.loads(facts["document"])["cuts"] if "document" in facts else {}
         told["nature"] = "alpha", own.get("nature", [facts["nature"]] * count)
-    if "exceedance" in dataset:
+    if "exceedance" in dataset and "output" in facts:
         rows = outcomes.each_event(outcomes.exceedances_document(dataset))
         over, rows = ("event", rows) if "event" in dataset.dims else ("alpha", rows * count)
         told |= {x: (over, [row[key] for row in rows]) for x, key in OF_EVENT.items()}

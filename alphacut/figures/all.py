@@ -22,7 +22,6 @@ from alphacut.figures import shares as figure_shares
 from alphacut.figures.captions import is_figure
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
-from alphacut.frame.structures.field_frame import FieldFrame
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.files import as_json, write_text
 from alphacut.io.progress import Tick, progress
@@ -58,7 +57,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
 def radius_drawings(results: Results) -> Iterator[Drawing]:
     """The map of radii; the stage microstructure draws the first two from its particles."""
     if "microstructure" not in results.case.stages:
-        if results.case.quoted:
+        if results.case.is_paper:
             yield "fig11-radii", lambda: figure_radius.radii(results.case)
         yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
     yield "fig14-cone", lambda: figure_radius.cone(results.case)
@@ -70,7 +69,7 @@ def material_drawings(results: Results) -> Iterator[Drawing]:
         yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
         yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
         yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
-        if results.case.quoted:
+        if results.case.is_paper:
             yield "fig19-membership", lambda: figure_modulus.membership(modulus)
     if (picture := results.image) is not None:
         yield "image", lambda: figure_image.image(picture)
@@ -84,10 +83,6 @@ def structure_drawings(results: Results) -> Iterator[Drawing]:
     if results.envelopes and results.case.sections.frame:
         yield "fig26-frame", lambda: figure_frame.frame(results.case)
         yield "fig27-chain", lambda: figure_frame.chain(results.case)
-        if structure is not None and isinstance(structure.frame, FieldFrame):
-            yield "field", partial(figure_frame.field, structure.frame.field)
-    if results.envelopes and results.case.sections.tower:
-        yield "tower", lambda: figure_frame.tower(results.case)
     model = None if structure is None else structure.linear
     if model is not None and (shaken := model.ground) is not None:
         yield "record", lambda: figure_envelope.record(shaken)
@@ -109,8 +104,6 @@ def question_drawings(results: Results) -> Iterator[Drawing]:
             yield stem if several else "exceedance", partial(figure_envelope.exceedance, limited)
     if (decided := results.decision) is not None:
         yield "decision", lambda: figure_questions.decision(decided)
-    if (hull := results.joint) is not None:
-        yield "joint", lambda: figure_questions.joint(hull)
 
 
 def update_drawings(results: Results) -> Iterator[Drawing]:
@@ -133,7 +126,7 @@ def draw_shares(driving: xarray.Dataset, results: Results) -> list[str]:
 
 def file_stem(name: str, results: Results) -> str:
     """The figure's name; the paper's number leads it in the paper's case alone."""
-    return name if results.case.quoted else re.sub(r"^fig[\d-]+-", "", name)
+    return name if results.case.is_paper else re.sub(r"^fig[\d-]+-", "", name)
 
 
 def draw(

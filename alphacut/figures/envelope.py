@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -11,7 +11,6 @@ import numpy as np
 
 from alphacut.figures import style as look
 from alphacut.figures.captions import INPUTS
-from alphacut.frame.dynamics.response_spectrum import ResponseSpectrum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.units import MINUS, axis_prefix, engineering
@@ -98,28 +97,6 @@ SPECTRUM_LINES = [
     for dash in ("-", "--", ":")
     for colour in (look.INK, look.BLUE, look.ORANGE, look.PURPLE, look.GREY)
 ]
-
-
-def spectrum(found: Sequence[ResponseSpectrum]) -> Figure:
-    """Both quantities, one below the other, a line for each damping ratio."""
-    import matplotlib.pyplot as plt
-
-    drawn, (above, below) = plt.subplots(2, 1, figsize=(6.4, 5.6), sharex=True)
-    for one, (colour, dash) in zip(found, SPECTRUM_LINES * len(found), strict=False):
-        name = f"ζ = {100 * one.damping:.3g} %"
-        above.plot(one.periods, one.pseudo_acceleration, dash, color=colour, label=name)
-        below.plot(one.periods, one.displacement, dash, color=colour, label=name)
-    for axes, label, si in ((above, "pseudo-acceleration", "m/s^2"), (below, "displacement", "m")):
-        axes.set_xscale("log")
-        axes.set_ylim(bottom=0)
-        axes.grid(visible=True, which="both", alpha=0.3)
-        look.prefix_axis(axes, label, si)
-    ticks = [t for t in TICKS if found[0].periods[0] <= t <= found[0].periods[-1]]
-    below.set_xticks(ticks, [f"{t:g}" for t in ticks])
-    below.minorticks_off()
-    below.set_xlabel("natural period, s")
-    above.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
 
 
 TICKS = [digit * 10.0**power for power in range(-3, 4) for digit in (1, 2, 5)]

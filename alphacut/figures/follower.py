@@ -54,7 +54,7 @@ def follower(results: Results, study: Study) -> Figure:
         panels[4].plot(found.time, final, color=INK, lw=1.3)
     for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
         panel.set_title(
-            f"{f'Fig. {20 + number}' if results.case.quoted else number}: {title}",
+            f"{f'Fig. {20 + number}' if results.case.is_paper else number}: {title}",
             loc="left",
             fontsize=9,
         )

@@ -7,16 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, PURPLE, figure
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, figure
 from alphacut.fuzzy import Crisp
 from alphacut.stages.vibration.structure import per_floor
-from alphacut.stages.vibration.structure_words import spread_damping
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from alphacut.fuzzy.field import FuzzyField
 
 
 def frame(case: Case) -> Figure:
@@ -75,30 +72,6 @@ def beam(axes: Axes, floor: int, level: float, mass: float, span: float) -> None
     axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)
 
 
-def tower(case: Case) -> Figure:
-    """The beam frame to scale, its parts of one modulus in one colour."""
-    storeys, bays = case.tower.storeys, case.tower.bays
-    height, width = case.tower.height, case.tower.width
-    high = float(np.clip(storeys * height / (bays * width) * 2.6, 2.4, 6.5))
-    drawn, axes = figure(5.4, high)
-    levels, lines = height * np.arange(storeys + 1), width * np.arange(bays + 1)
-    half = storeys // 2
-    for label, ends, colour in (
-        ("columns, lower half", levels[[0, half]], BLUE),
-        ("columns, upper half", levels[[half, storeys]], PURPLE),
-    ):
-        if ends[1] > ends[0]:
-            axes.vlines(lines, *ends, color=colour, lw=1.2, label=label)
-    axes.hlines(levels[1:], lines[0], lines[-1], color=ORANGE, lw=0.7, label="beams")
-    ground(axes, 0.0, lines[-1])
-    axes.set_aspect("equal")
-    axes.set_xlabel(f"m; {bays} bays of {width:g} m")
-    axes.set_ylabel(f"m; {storeys} storeys of {height:g} m")
-    axes.grid(False)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
-    return drawn
-
-
 def ground(axes: Axes, left: float, right: float) -> None:
     """Hatched ground line at height 0."""
     across = (left - 0.1 * right, 1.1 * right)
@@ -138,9 +111,6 @@ def chain(case: Case) -> Figure:
         right = 1.6 * slots + 0.2
         axes.plot([-0.12, right], [foot, foot], color=INK, lw=1)
         hatched(axes, (-0.12, right), (foot - 0.12, foot))
-    if words := "; ".join(spread_damping(case.frame)):
-        besides = " besides" if damped else ""
-        axes.annotate(f"damping{besides}: {words}", (0.1, foot), va="top", fontsize=9)
     axes.set_xlim(-0.2, 1.6 * slots + 0.3)
     axes.set_ylim(-1.1 if placement == "ground" else -0.7, 1.05)
     axes.set_aspect("equal")
@@ -208,22 +178,6 @@ def damper(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> 
         [piston, b],
     ):
         axes.plot(*np.array(points).T, color=INK, lw=1)
-
-
-def field(given: FuzzyField) -> Figure:
-    """What each direction of a field adds to each storey's value, within the storeys' interval."""
-    drawn, axes = figure(5.6, 3.6)
-    places = np.asarray(given.places)
-    low, high = given.centre - given.half_width, given.centre + given.half_width
-    axes.axvspan(low, high, color=GREY, alpha=0.3, lw=0, label="each storey's interval")
-    for k, (name, style) in enumerate(zip(given.names, LINES * len(given.names), strict=False)):
-        values = given.centre + given.half_width * given.free_shapes[:, k]
-        axes.plot(values, places, style, color=INK, marker="o", ms=4, label=f"{name} = 1 alone")
-    words = {"c": "columns c of a storey", "k": "stiffness of a storey, N/m"}
-    axes.set_xlabel(words.get(given.name, "mass of a floor, kg"))
-    axes.set_ylabel("height, m")
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
 
 
 LINES = ("-", "--", ":", "-.")

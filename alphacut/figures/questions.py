@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.captions import in_words
 from alphacut.figures.style import (
     BLUE,
     GREY,
     INK,
     ORANGE,
-    alpha_legend,
     colours,
     figure,
     prefix_axis,
 )
 from alphacut.frame.structures.quantities import Output
-from alphacut.io.files import Document
-from alphacut.io.units import MINUS, axis_prefix
+from alphacut.io.units import MINUS
 from alphacut.stages.vibration.decision import PASSED, degree
 from alphacut.stages.vibration.update import Learned, prior_support
 
@@ -64,48 +60,8 @@ def degrees(found: xarray.Dataset) -> str:
     return f"exceeding is possible to {possible}, necessary to {necessary}"
 
 
-def joint(found: xarray.Dataset) -> Figure:
-    """Enclosing polygons shaded, hulls of pairs reached as lines, and the rectangle of ranges."""
-    drawn, axes = figure(6.4, 4.4)
-    alpha = found["alpha"].values
-    for level, shade in enumerate(colours(alpha)):
-        axes.fill(*found["outer"].values[level].T, color=shade, lw=0)
-        reached = found["inner"].values[level]
-        axes.plot(*np.vstack([reached, reached[:1]]).T, color=INK, lw=0.7)
-    (left, low), (right, high) = (end(found["outer"].values[0], axis=0) for end in (np.min, np.max))
-    axes.plot([left, right, right, left, left], [low, low, high, high, low], color=GREY, ls="--")
-    sides = ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim()))
-    words = zip(found["value"].values, found["unit"].values, strict=True)
-    for (axis, ends), (name, si) in zip(sides, words, strict=True):
-        factor, unit = axis_prefix(max(map(abs, ends)), str(si))
-        axis.set_label_text(f"{name}, {unit}")
-        axis.set_major_formatter(partial(_ticks, factor))
-    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
-
-
 def _ticks(factor: float, value: float, _: int) -> str:
     return f"{value * factor:.10g}".replace("-", MINUS)
-
-
-def gains(found: Document) -> Figure:
-    """Bars of both gains by input, with the least over where the better value may lie."""
-    names = [*found["gains"]]
-    drawn, axes = figure(7.2, 1.0 + 0.42 * max(len(names), 1))
-    places = np.arange(len(names))[::-1]
-    for kind, colour, shift, words in (
-        ("exact", GREY, 0.19, "known exactly"),
-        ("half", BLUE, -0.19, "known twice as well"),
-    ):
-        share = [100 * found["gains"][name][kind] for name in names]
-        least = [100 * found["gains"][name][f"{kind}_least"] for name in names]
-        axes.barh(places + shift, share, height=0.36, color=colour, lw=0, label=words)
-        label = "at least" if kind == "half" else None
-        axes.plot(least, places + shift, "|", color=INK, ms=9, label=label)
-    axes.set_yticks(places, [in_words(name) for name in names])
-    axes.set_xlabel(f"width lost at α = {found['alpha']:g}, %")
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
 
 
 def bands(dataset: xarray.Dataset, output: str) -> Figure:

@@ -111,11 +111,9 @@ def shares_key(results: Results) -> str:
 
 def figures_key(results: Results) -> str:
     """Fingerprint of all that the figures show, and of what draws them."""
-    quoted = results.case.quoted
     content = {
         "shares": shares_key(results),
         "results": [data.attrs.get("fingerprint") for data in results.datasets],
-        "quoted": quoted.read_text(encoding="utf-8") if quoted else "",
         "libraries": [version_of(name) for name in ("matplotlib", "pyvista")],
     }
     return fingerprint(content, SOURCE)

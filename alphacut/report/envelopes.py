@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator
-from pathlib import Path
 
-import numpy as np
 from markupsafe import Markup
 
-from alphacut.figures.captions import caption
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput
-from alphacut.io.provenance import door
 from alphacut.io.units import engineering, largest_by_unit
-from alphacut.report.figures import picture
 from alphacut.report.tables import fragment, items, paragraphs, section, sentence, table
 from alphacut.stages.vibration import exceedance as outcomes
 
@@ -130,44 +123,3 @@ def between(lower: float, upper: float, unit: str, largest: float) -> str:
 COLUMNS = ("damping", "period [s]", "displacement [m]", "pseudo-acceleration [m/s^2]")
 ROWS = 8
 """Periods in the table, at most."""
-
-
-def spectrum(folder: Path) -> Markup:
-    """Figure, and a table of some periods with the largest values of each damping ratio.
-
-    Raises:
-        BadInput: The file is no spectrum.
-    """
-    path = folder / "spectrum.csv"
-    try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            table_rows = list(csv.DictReader(stream))
-        rows = [[float(row[name]) for name in COLUMNS] for row in table_rows]
-        found = np.asarray_chkfinite(rows)
-        values = found.reshape(-1, len(np.unique(found[:, 1])), len(COLUMNS))
-    except (OSError, ValueError, KeyError, TypeError, IndexError):
-        cure = f"the file of `{door('spectrum', 'RECORD.csv', '--out', folder)}`, or none"
-        raise BadInput.of("FOLDER", "this is no response spectrum", str(path), cure) from None
-    ratios = [f"{100 * one[0, 0]:.3g} %" for one in values]
-    periods = values[0, :, 1]
-    places = np.unique(np.linspace(0, len(periods) - 1, ROWS).round().astype(int))
-    cells = [
-        (
-            f"{periods[k]:.3g} s",
-            *(engineering(one[k, 2], "m") for one in values),
-            *(engineering(one[k, 3], "m/s^2") for one in values),
-        )
-        for k in places
-    ]
-    head = ["period", *(f"displacement, {x}" for x in ratios)]
-    head += [f"pseudo-acceleration, {x}" for x in ratios]
-    words = [
-        f"With damping {ratio}: largest displacement {engineering(one[:, 2].max(), 'm')}, largest"
-        f" pseudo-acceleration {engineering(one[:, 3].max(), 'm/s^2')} at"
-        f" {one[one[:, 3].argmax(), 1]:.3g} s."
-        for ratio, one in zip(ratios, values, strict=True)
-    ]
-    drawn = picture(folder / "spectrum.svg", caption("spectrum", paper=False))
-    record = table_rows[0].get("record")
-    title = f"Response spectrum of {record}" if record else "Response spectrum"
-    return section(title, paragraphs(*words), drawn, table(tuple(head), cells))

@@ -17,7 +17,6 @@ from alphacut.report.material import meaning
 from alphacut.report.tables import paragraphs, section, sentence, table
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import degree, verdict_of, worth
-from alphacut.stages.vibration.studies import fixed_line
 
 Line = tuple[str, str, str, str, float]
 """Quantity, its most plausible values, its range, the nature of that, and the level it is of."""
@@ -28,8 +27,7 @@ def key_results(summary: Document) -> Markup:
     """Most plausible value, widest range and its worth of each result; empty without any."""
     found, judged = [*moduli(summary), *peaks(summary), *exceeded(summary)], [*decisions(summary)]
     rows = [(of, likely, ends + at(level), nature) for of, likely, ends, nature, level in found]
-    words = summary.get("structure", {}).get("words", {})
-    held = [*fixed_line(words.get("fixed", ())), *words.get("cut", ())]
+    held: list[str] = []
     if not rows + judged:
         return Markup("")
     if not rows or any(likely != ends for _, likely, ends, *_ in found):
@@ -58,18 +56,13 @@ def moduli(summary: Document) -> Iterator[Line]:
 def of_cell(found: Document) -> Iterator[Line]:
     """E and ν of a computed cell with what they are of, and the bounds of E in space."""
     mean = MEANS[meaning(found)]
-    flag = ": outside the bounds of spheres, see below" if found.get("outside") else ""
-    ends, nature = between(found["lower_GPa"], found["upper_GPa"]), f"{found['nature']}{flag}"
+    ends, nature = between(found["lower_GPa"], found["upper_GPa"]), found["nature"]
     level = found["alpha"][0]
     yield f"Young's modulus E {mean}", core(found), ends, nature, level
     poisson = found.get("nu_cuts", {"lower": ()})
     if len(poisson["lower"]):
         inner, outer = both(poisson, partial(between, form=".4f", unit=""))
         yield f"Poisson's ratio ν {mean}", inner, outer, nature, level
-    if cuts := found.get("beside", {}).get("cuts"):
-        kind = "spheres" if found.get("outside") or found["particles"] == "spheres" else "fibres"
-        of = f"Hashin–Shtrikman bounds of E, {'long ' * (kind == 'fibres')}{kind}"
-        yield of, *both(cuts[kind]), "bounds at the inputs' corners", level
 
 
 MEANS = {

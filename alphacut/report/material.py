@@ -9,10 +9,9 @@ from alphacut.io.files import Document
 from alphacut.io.units import fixed
 from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.rve.anisotropy import shear_ratio_in_words
-from alphacut.stages.image.document import interval, own_of_window
+from alphacut.stages.image.document import interval
 from alphacut.stages.material import response
 from alphacut.stages.material.micrograph import compared
-from alphacut.stages.material.references import lines
 
 
 def microstructure(found: Document, seen: Markup) -> Markup:
@@ -87,12 +86,11 @@ def modulus(found: Document, drawn: Markup) -> Markup:
         for level, alpha in enumerate(found["alpha"])
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")[: 1 + len(ends)]
-    beside = found.get("beside")
-    told = [f"{one}." for one in lines(beside, found["particles"])] if beside else []
-    told += [found[name] for name in ("outside", "crisp", "publish") if found.get(name)]
+    low, high = found["references"]["hashin_shtrikman_E_GPa"]
+    told = [f"Hashin–Shtrikman bounds of E at the modal values: {low:.4f} … {high:.4f} GPa."]
     words = Markup(
         "<p>{} <strong>{}</strong>, {} [{}, {}] GPa; Poisson's ratio {:.4f}. {} {}"
-        " samples, {} linear systems, {:.1f} s. {} {} {}</p>"
+        " samples, {} linear systems, {:.1f} s. {} {}</p>"
     ).format(
         "Core" if "[" in core(found) else "Modal value",
         core(found),
@@ -103,7 +101,6 @@ def modulus(found: Document, drawn: Markup) -> Markup:
         *(found[name] for name in ("samples", "solves", "seconds")),
         sentence(found.get("reason", "")),
         isotropy(found),
-        sentence(found.get("shape", "")),
     )
     each = (
         ("Error budget", "source", "estimated relative error of E", "error"),
@@ -135,14 +132,13 @@ def image(found: Document, drawn: Markup) -> Markup:
     rows = [(f"{a:g}", fixed(low, 4), fixed(high, 4), nature) for a, low, high, nature in ends]
     turned = (found["directions_E_GPa"][end] for end in ("least", "greatest"))
     grains, least, greatest = map(interval, (found["grains_E_GPa"], *turned))
-    own, level = own_of_window(found), f"over the inputs at α = {cuts['alpha'][-1]:g}"
+    level = f"over the inputs at α = {cuts['alpha'][-1]:g}"
     words = paragraphs(
         "Plane strain: every section of the material is the image, as with fibres; E is that of an"
         " isotropic solid with its plane bulk and shear moduli, not E_T across the fibres. If the"
         f" particles are grains, the Hashin–Shtrikman interval of E is {grains} {level}."
         f" The plane-strain Young's modulus of the softest direction lies in {least}, of the"
         f" stiffest in {greatest} {level}.",
-        *filter(None, [sentence(own)]),
     )
     widths = [
         (row["source"], f"{row['width_GPa']:.3g}", f"{row['share']:.1%}", row["cure"])
@@ -153,25 +149,9 @@ def image(found: Document, drawn: Markup) -> Markup:
         paragraphs(*found.get("phases", ()), *filter(None, [found.get("boundary")])) + words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
-        random_threshold(found),
         Markup("<h3>What widens E, the source to improve first on top</h3>")
         + table(("source", "width of E, GPa", "share", "to narrow it"), widths),
     )
-
-
-def random_threshold(found: Document) -> Markup:
-    """Quantiles of E over a random threshold at the lowest and the highest level, or nothing."""
-    random = found.get("random_threshold")
-    if not random:
-        return Markup("")
-    levels = found["cuts"]["alpha"]
-    rows = [
-        (f"{row['share']:g}", *(f"[{e['lower']:.4f}, {e['upper']:.4f}]" for e in ends))
-        for row in random["quantiles"]
-        for ends in [(row["E_GPa"][-1], row["E_GPa"][0])]
-    ]
-    head = ("probability", f"E, GPa, at α = {levels[-1]:g}", f"E, GPa, at α = {levels[0]:g}")
-    return Markup("<h3>Quantiles of E over the random threshold, proved</h3>") + table(head, rows)
 
 
 def isotropy(found: Document) -> str:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup, escape
 
-from alphacut.case.quick import banner
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, own_files, read_dataset, read_summary
@@ -55,7 +54,7 @@ def page(summary: Document, folder: Path) -> str:
             title=summary["title"],
             name=summary["case"],
             about=Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", about)),
-            banner=banner(summary["quick"]) if "quick" in summary else "",
+            banner="",
             css=Markup(text["css"]),
             js=Markup(text["js"]),
             sections=explained(Markup("\n").join(sections(summary, folder))),

@@ -16,8 +16,8 @@ from alphacut.io.files import Document
 from alphacut.io.provenance import sources
 from alphacut.io.units import engineering
 from alphacut.report import glossary
-from alphacut.report.decisions import decided, learned, next_measured, together
-from alphacut.report.envelopes import envelopes, natural, spectrum
+from alphacut.report.decisions import decided, learned
+from alphacut.report.envelopes import envelopes
 from alphacut.report.figures import gallery, listed, missing
 from alphacut.report.key_results import key_results
 from alphacut.report.material import given, image, microstructure, modulus, stress
@@ -49,36 +49,20 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
         yield given(summary["given_modulus"])
     if "response" in summary:
         yield stress(summary["response"], listed(summary, folder, "response"))
-    if words := summary.get("structure", {}).get("words"):
-        yield built(words, natural(summary))
-    if (folder / "spectrum.csv").is_file():
-        yield spectrum(folder)
     if "update" in summary:
         yield learned(summary, folder)
     if summary.get("envelopes"):
         yield envelopes(summary, listed(summary, folder, "exceedance"))
     if "decision" in summary:
         yield decided(summary, folder)
-    if "joint" in summary:
-        yield together(summary, folder)
-    if (folder / "measure-next.json").is_file():
-        yield next_measured(summary, folder)
     if summary.get("shares"):
         yield shares(summary)
-    if summary.get("paper"):
-        yield comparison(summary["paper"])
     yield methods(summary)
     yield section("Terms", glossary.box())
     yield gallery(summary, folder)
     yield case_text(summary)
     yield differing(summary)
     yield versions(summary)
-
-
-def built(words: Document, periods: Markup) -> Markup:
-    """The structure: what it is, its floors or inputs, its first periods."""
-    sentences = paragraphs(*words["sentences"])
-    return section("Structure", sentences, table(words["head"], words["rows"]), periods)
 
 
 def shares(summary: Document) -> Markup:
@@ -100,20 +84,6 @@ def shares(summary: Document) -> Markup:
         level = (summary["modulus"] if of[0] in ("E", "ν") else studies[0])["alpha"][0]
         drawn.append(table((f"input, at α = {level:g}", *of), rows))
     return section("What drives the width", words, *drawn)
-
-
-def comparison(rows: Sequence[Document]) -> Markup:
-    """Paper, here, difference."""
-    from alphacut.stages.summary import cells
-
-    return section(
-        "Paper and here",
-        table(
-            ("quantity", "place", "paper", "here", "difference", "share"),
-            [cells(dict(row)) for row in rows],
-            numbers=2,
-        ),
-    )
 
 
 def case_text(summary: Document) -> Markup:

@@ -17,13 +17,13 @@ from alphacut.io.kept_arrays import KeptArrays
 from alphacut.io.netcdf import fingerprint_of, read_dataset, write_dataset
 from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
-from alphacut.stages.contract import keep_modulus
 from alphacut.stages.image import bounds, document
 from alphacut.stages.image.reading import study_of
-from alphacut.stages.material import microstructure, modulus, references, response
+from alphacut.stages.material import microstructure, modulus, response
 from alphacut.stages.material.campaign import campaign
 from alphacut.stages.material.microstructure import write as write_microstructure
-from alphacut.stages.vibration import decision, envelope, joint, update
+from alphacut.stages.tolerance import require_modulus
+from alphacut.stages.vibration import decision, envelope, update
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure, structure
@@ -44,8 +44,6 @@ class Chain:
         fresh: Compute everything anew.
         quiet: No progress.
         petsc: PETSc options that override the solver's.
-        strict: Refuse a time step that cannot resolve the fastest mode.
-        best_effort: Take results whose error is above the tolerance.
         built: The structure, if it is built; its modulus may be another.
         executor: Processes that compute envelopes side by side.
         meanwhile: Told the findings before the envelopes, while those are under way there.
@@ -57,8 +55,6 @@ class Chain:
     fresh: bool = False
     quiet: bool = False
     petsc: Mapping[str, str] = field(default_factory=dict)
-    strict: bool = False
-    best_effort: bool = False
     built: Structure | None = None
     executor: Executor | None = None
     meanwhile: Callable[[Results], None] | None = None
@@ -81,7 +77,7 @@ class Chain:
         picture = self.image() if "image" in self.case.stages else None
         if "envelope" in self.case.stages and (cell is not None or picture is not None):
             name, key = ("modulus.nc", "modulus.alpha") if picture is None else ("image.nc", "cell")
-            handed = modulus.read_number(self.file(name), key, warn=picture is not None)
+            handed = modulus.read_number(self.file(name), key)
         found = Results(self.case, self.folder, cell, {}, handed, image=picture)
         if cell is not None and self.case.sections.response:
             found = replace(found, response=self.response(cell))
@@ -107,9 +103,6 @@ class Chain:
             make = partial(decision.decision, case, wanted, peaks, workers=self.workers)
             told = self.asked("decision", found, lambda t: make(progress=t))
             found = replace(found, decision=told)
-        if asked.joint:
-            told = self.asked("joint", found, lambda _: joint.joint(case, wanted))
-            found = replace(found, joint=told)
         return found
 
     def with_particles(self) -> Case:
@@ -144,18 +137,17 @@ class Chain:
             with progress("Fuzzy modulus", quiet=self.quiet) as tick:
                 wanted = campaign(self.case, petsc=self.petsc, store=store)
                 found = modulus.compute(wanted, workers=self.workers, progress=tick)
-            warned = references.of_modulus(case, found)["outside"]
-            modulus.write(found, path, case_text=case.text_of_file, key=key, outside=warned)
+            modulus.write(found, path, case_text=case.text_of_file, key=key)
 
         found = self.stored("modulus.nc", key, compute)
         error = modulus.listed(found, "error")
-        keep_modulus(self.case, str(found.attrs["method"]), error, best_effort=self.best_effort)
+        require_modulus(self.case, sum(error.values()))
         return found
 
     def image(self) -> xarray.Dataset:
         """The proved bounds of the image's modulus, in image.nc."""
         picture = self.case.picture
-        inputs = {"case": picture, "alpha": self.case.modulus.alpha, "petsc": dict(self.petsc)}
+        inputs = {"case": picture, "alpha": self.case.modulus.alpha}
         files = self.case.digests(picture)
         key = fingerprint({**inputs, "files": files}, ("stochastic", "rve", "fuzzy"))
 
@@ -164,7 +156,7 @@ class Chain:
             if self.fresh:
                 rmtree(kept, ignore_errors=True)
             with progress("Image", quiet=self.quiet) as tick:
-                study = study_of(self.case, petsc=self.petsc)
+                study = study_of(self.case)
                 found = bounds.compute(study, progress=tick, kept=kept)
             document.write(found, path, attributes(self.case.text_of_file, key), kept)
 
@@ -187,7 +179,7 @@ class Chain:
         stale = [s for s, key in keys.items() if not self.current(s.file, key)]
         if self.executor is not None and len(stale) > 1:
             begun = {study: self.begun(study, keys[study]) for study in stale}
-            under_way = side_by_side(wanted, begun, self.executor, strict=self.strict)
+            under_way = side_by_side(wanted, begun, self.executor)
             if self.meanwhile is not None:
                 self.meanwhile(found)
             with progress("Envelopes", quiet=self.quiet) as tick:
@@ -216,10 +208,10 @@ class Chain:
         if stale:
             with progress(f"Envelope {study.name}", quiet=self.quiet) as tick:
                 make = partial(envelope_of, wanted, study.task, self.begun(study, key))
-                made = make(strict=self.strict, workers=self.workers, progress=tick)
+                made = make(workers=self.workers, progress=tick)
             self.write_envelope(study, key, made)
         found = read_dataset(self.file(study.file))
-        envelope.keep_tolerance(self.case, found, best_effort=self.best_effort)
+        envelope.keep_tolerance(self.case, found)
         return found
 
     def write_envelope(self, study: Study, key: str, made: xarray.Dataset) -> None:
@@ -244,7 +236,7 @@ class Chain:
     def vibration(self, wanted: Document, handed: FuzzyNumber | None) -> str:
         """Fingerprint of a result for the structure, its record and the modulus."""
         given = self.case.sections
-        inputs = [given.frame, given.field, given.pendulum, given.tower, given.update]
+        inputs = [given.frame, given.pendulum, given.update]
         record = self.case.digests(*inputs)
         return fingerprint(
             {"case": inputs, "record": record, "modulus": handed, **wanted}, ("fuzzy", "frame")
@@ -284,7 +276,6 @@ class Results:
         learned: What measured modes leave of the inputs; None where the case has none.
         update: Dataset of update.nc, likewise.
         decision: Dataset of decision.nc; None where the case has no such section.
-        joint: Dataset of joint.nc, likewise.
     """
 
     case: Case
@@ -299,13 +290,12 @@ class Results:
     learned: update.Learned | None = None
     update: xarray.Dataset | None = None
     decision: xarray.Dataset | None = None
-    joint: xarray.Dataset | None = None
 
     @property
     def datasets(self) -> list[xarray.Dataset]:
         """Every dataset among them."""
         one = (self.modulus, self.image, self.response, self.exceedance)
-        more = (self.update, self.decision, self.joint, *self.envelopes.values())
+        more = (self.update, self.decision, *self.envelopes.values())
         return [data for data in (*one, *more) if data is not None]
 
     @property

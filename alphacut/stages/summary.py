@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
-from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,14 +13,12 @@ from alphacut.frame.structures.linear import LinearSystem, frequencies
 from alphacut.io.files import Document
 from alphacut.io.provenance import FORMAT, command, versions
 from alphacut.rve.spheres.result import volume_fraction
-from alphacut.stages.material import modulus, response, spheres
+from alphacut.stages.material import modulus, response
 from alphacut.stages.material.cell import GPA, modal_parts
-from alphacut.stages.material.references import beside, mean_share
+from alphacut.stages.material.references import references
 from alphacut.stages.pipeline import Results
 from alphacut.stages.vibration import exceedance as outcomes
 from alphacut.stages.vibration.decision import decision_document
-from alphacut.stages.vibration.joint import joint_document
-from alphacut.stages.vibration.structure_words import structure_words
 from alphacut.stages.vibration.update import narrower
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -34,13 +29,11 @@ Row = dict[str, Any]
 # attributes of an envelope
 COST = ("trajectories", "seconds", "method", "nature")
 GAP = ("gap", "gap_output", "between_nodes", "proof")
-LEFT_OUT = 0.25  # share of the spheres' volume without a cell, above which E is not to be published
 CLAIM = ("claim", "unproved")
 
 
 def summary(results: Results) -> Document:
     """Everything in numbers: inputs, fuzzy modulus, extremes, comparison."""
-    quoted = results.case.quoted
     found = {
         **origin(results.case),
         **inputs_numbers(results),
@@ -48,21 +41,7 @@ def summary(results: Results) -> Document:
         **motion_numbers(results),
         **question_numbers(results),
     }
-    beyond = found.get("microstructure", {}).get("share_beyond_limit", 0.0)
-    if "modulus" in found and beyond > LEFT_OUT:
-        told = f"E leaves out {beyond:.0%} of the volume, in cells too tight for a cubic one."
-        found["modulus"] |= {"publish": f"Not to be published: {told}"}
-    if "modulus" in found:
-        found["modulus"] |= {"crisp": crisp_particles(found.get("microstructure", {}))}
-    return {**found, "paper": comparison(quoted, found) if quoted else []}
-
-
-def crisp_particles(found: Document) -> str:
-    """That a support holds no scatter of the particles, where slopes of their map are crisp."""
-    crisp = [x for x in ("a2", "a4") if x in found and found[x][0] == found[x][-1]]
-    held = "the phases only" if len(crisp) == 2 else "the other slope and the phases only"
-    told = f"The support of E holds {held}: {' and '.join(crisp)} of the particles are crisp."
-    return told if crisp else ""
+    return found
 
 
 def origin(case: Case) -> Document:
@@ -105,14 +84,7 @@ def material_numbers(results: Results) -> Document:
 
 def cell_numbers(results: Results, dataset: xarray.Dataset) -> Document:
     """The fuzzy modulus beside its references."""
-    case = results.case
-    radius, *phases = modal_parts(case)
-    of_shape = spheres.remark(case, mean_share(radius, "cylinders"), *phases) or ""
-    numbers = {**modulus_numbers(dataset), "shape": of_shape}
-    modal = float(numbers["modal_GPa"]) * GPA, float(numbers["nu"])
-    low, high = (GPA * np.asarray(numbers["E_GPa"][side]) for side in ("lower", "upper"))
-    cuts = np.asarray(numbers["alpha"]), low, high
-    return numbers | beside(case, *modal, numbers.get("shear_ratio"), cuts)
+    return {**modulus_numbers(dataset), "references": references(results.case)}
 
 
 def motion_numbers(results: Results) -> Document:
@@ -137,8 +109,6 @@ def question_numbers(results: Results) -> Document:
         found["exceedance"] = outcomes.exceedances_document(results.exceedance)
     if results.decision is not None:
         found["decision"] = decision_document(results.decision)
-    if results.joint is not None:
-        found["joint"] = joint_document(results.joint)
     return found
 
 
@@ -203,9 +173,8 @@ def structure_numbers(results: Results) -> Document:
     """The structure in words, and natural frequencies at the modal values where it has any."""
     wanted = results.structure
     assert wanted is not None
-    words = {"words": structure_words(results.case, wanted)}
     if wanted.linear is None:
-        return words
+        return {}
     omega = frequencies(wanted.linear)
     period = 2 * np.pi / omega[0]
     return {
@@ -213,7 +182,6 @@ def structure_numbers(results: Results) -> Document:
         "period_s": period,
         "two_periods_s": 2 * period,
         "parameters": counted(wanted.linear),
-        **words,
     }
 
 
@@ -267,63 +235,3 @@ def proved_numbers(dataset: xarray.Dataset) -> Document:
     least, most = lowest["proved_lower"].min("time"), lowest["proved_upper"].max("time")
     ends = {"min": by_output(dataset, least.values), "max": by_output(dataset, most.values)}
     return {"proved": {**ends, "gap": float(dataset.attrs["proved_gap"])}}
-
-
-def comparison(path: Path, found: Document) -> list[Row]:
-    """One row for each number that the paper quotes.
-
-    Args:
-        path: TOML file of the quoted numbers; `of` says where in the summary the same number of
-            this run stands.
-        found: The summary.
-    """
-    rows: list[Row] = []
-    for entry in tomllib.loads(path.read_text(encoding="utf-8"))["quoted"]:
-        paper, here = float(entry["value"]), reached(found, str(entry["of"]))
-        difference = None if here is None else here - paper
-        percent = None if difference is None or not paper else 100 * difference / abs(paper)
-        rows.append(
-            {**entry, "paper": paper, "here": here, "difference": difference, "percent": percent}
-        )
-    return rows
-
-
-def reached(found: Document, path: str) -> float | None:
-    """A number in the summary by its path; None where the run has none; "a / b" is a quotient."""
-    if " / " in path:
-        above, below = (reached(found, part) for part in path.split(" / "))
-        return None if above is None or not below else above / below
-    here: Any = found
-    for name in path.split(":"):
-        if not isinstance(here, Mapping) or name not in here:
-            return None
-        here = here[name]
-    return float(here)
-
-
-def table(rows: list[Row]) -> str:
-    """The comparison as aligned text."""
-    head = ("quantity", "place", "paper", "here", "difference", "")
-    lines = [head] + [cells(row) for row in rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(head))]
-    lines.insert(1, tuple("-" * width for width in widths))
-    return "".join("  ".join(aligned(line, widths)).rstrip() + "\n" for line in lines)
-
-
-def aligned(line: tuple[str, ...], widths: list[int]) -> list[str]:
-    """Words to the left, numbers to the right."""
-    return [
-        cell.ljust(width) if column < 2 else cell.rjust(width)
-        for column, (cell, width) in enumerate(zip(line, widths, strict=True))
-    ]
-
-
-def cells(row: Row) -> tuple[str, ...]:
-    """One row in words; digits as many as the paper prints, and two more for this run."""
-    digits = len(str(row["value"]).partition(".")[2])
-    unit = f" {row['unit']}" if row.get("unit") else ""
-    more = digits if row.get("counted", False) else digits + 1
-    here = "not computed" if row["here"] is None else f"{row['here']:.{more}f}{unit}"
-    difference = "" if row["difference"] is None else f"{row['difference']:+.{more}f}"
-    percent = "" if row["percent"] is None else f"{row['percent']:+.2f} %"
-    return str(row["what"]), str(row["place"]), f"{row['value']}{unit}", here, difference, percent

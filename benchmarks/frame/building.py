@@ -14,13 +14,12 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
+from alphacut.frame import Accelerogram, Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.fuzzy import Triangular
 from benchmarks.frame.envelopes import RESULTS
-from benchmarks.frame.tower import recorded
 from benchmarks.rows import write
 
 STEP = 0.01
@@ -31,6 +30,15 @@ INPUTS = {
     "rayleigh_mass": Triangular(0.4, 0.5, 0.6),
     "rayleigh_stiffness": Triangular(2e-3, 2.5e-3, 3e-3),
 }
+
+
+RECORD = Path(__file__).parents[2] / "cases/building.record.csv"
+
+
+def recorded() -> Accelerogram:
+    """The synthetic record of the building's case."""
+    time_, acceleration = np.loadtxt(RECORD, delimiter=",", comments=("#", "t")).T
+    return Accelerogram(float(time_[1] - time_[0]), acceleration)
 
 
 def building() -> StoreyFrame:

@@ -24,11 +24,11 @@ from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
 from alphacut.stochastic.radius_map import Kind, MapFamily
 from alphacut.stochastic.theta.law import LARGEST_EXPONENT
 
-CellMethod = Literal["prism", "slices", "table", "series", "image", "auto"]
+CellMethod = Literal["prism", "slices", "series", "auto"]
 PlanName = Literal["general", "reduced", "extended", "signed"]
 Particles = Literal["cylinders", "spheres"]
 LawName = Literal["normal", "uniform", "beta"]
-SPHERE_METHODS = ("series", "table", "auto")
+SPHERE_METHODS = ("series", "auto")
 CELL_METHODS: tuple[str, ...] = get_args(CellMethod)
 PLANS: tuple[str, ...] = get_args(PlanName)
 
@@ -125,8 +125,7 @@ class Cell(Section):
 class CellTable(Section):
     """The periodic cell: two elastic phases and a round particle, or a picture.
 
-    Of a picture of its phases (one of image, polygons, inequality), in plane strain, stage image
-    gives proved bounds.
+    Of an image of its phases, in plane strain, stage image gives proved bounds.
     """
 
     parts: ClassVar[tuple[type[Section], ...]] = (Cell, Picture)

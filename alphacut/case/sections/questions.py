@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
-from alphacut.case.key import MEMBERSHIP, NOT_NEGATIVE, UNIT, Key, Range, Section, positive
+from alphacut.case.key import MEMBERSHIP, UNIT, Key, Section, positive
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -26,62 +26,18 @@ class Decision(Section):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Joint(Section):
-    """Hull of what two outputs may be together at one time, or one output at two times."""
-
-    outputs: Annotated[tuple[str, ...], Key("two outputs of the structure, or one at two times")]
-    times: Annotated[
-        tuple[float, ...],
-        Key("one time, or two: multiples of [envelope] step", "s", allowed=NOT_NEGATIVE),
-    ]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Field(Section):
-    """Storeys of a frame that are alike but not equal: a fuzzy field, correlated by distance.
-
-    The one fuzzy value of all storeys is the support of each; few directions of a Karhunen–Loève
-    expansion, c_1, c_2 …, stand for the storeys' own values c1, c2 …
-    """
-
-    of: Annotated[
-        Literal["c", "k", "m"],
-        Key(
-            "what varies: c, the columns of a storey, k, its stiffness where that is given, or m,"
-            " masses of the floors"
-        ),
-    ]
-    length: Annotated[float, positive("height over which the correlation falls to 1/e", "m")]
-    share: Annotated[
-        float,
-        Key(
-            "part of the variance that the directions hold",
-            allowed=Range("above 0 and up to 1", 1e-6, 1.0, closed=True),
-        ),
-    ] = 0.95
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
 class Update(Section):
-    """Measured natural modes or a recorded motion, from which `run` and `update` learn inputs."""
+    """Measured natural modes, from which `run` and `update` learn inputs."""
 
     measured: Annotated[
-        str | None,
+        str,
         Key(
             "CSV file mode,frequency,q1,q2 …: number of the mode, natural frequency in Hz, and"
             " amplitudes of the floors that were measured, to any scale; a row for each time that"
             " the mode was measured",
             file=True,
         ),
-    ] = None
-    recorded: Annotated[
-        str | None,
-        Key(
-            "CSV file time [s],q1 [mm],q2 [mm] … in place of measured modes: outputs of the frame,"
-            " of one unit, recorded from t = 0 on at even steps, with errors alike and independent",
-            file=True,
-        ),
-    ] = None
+    ]
     learn: Annotated[
         tuple[str, ...],
         Key(

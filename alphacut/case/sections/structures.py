@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from alphacut.case.key import COUNT, NOT_NEGATIVE, RATIO, Key, Section, positive
+from alphacut.case.key import NOT_NEGATIVE, RATIO, Key, Section, positive
 from alphacut.fuzzy import Crisp, FuzzyNumber
 
 ZERO, TWO = Crisp(0.0), Crisp(2.0)
@@ -121,58 +121,6 @@ class Frame(Section):
     def damped(self) -> bool:
         """Whether any damper is there."""
         return any(number.support.upper > 0 for number in self.dampers)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Tower(Section):
-    """Plane beam frame of many storeys and bays, clamped at its foot.
-
-    It is reduced to a few shapes that hold for all its fuzzy inputs.
-    """
-
-    storeys: Annotated[int, Key("number of storeys", allowed=COUNT)]
-    bays: Annotated[int, Key("number of bays", allowed=COUNT)]
-    height: Annotated[float, positive("height of a storey", "m")]
-    width: Annotated[float, positive("width of a bay", "m")]
-    column_area: Annotated[float, positive("area of a column", "m^2")]
-    column_moment: Annotated[float, positive("second moment of area of a column", "m^4")]
-    beam_area: Annotated[float, positive("area of a beam", "m^2")]
-    beam_moment: Annotated[float, positive("second moment of area of a beam", "m^4")]
-    E_columns: Annotated[FuzzyNumber, positive("Young's modulus of the lower half's columns", "Pa")]
-    E_columns_top: Annotated[
-        FuzzyNumber,
-        positive(
-            "the same of the upper half, the middle one of an odd number of storeys in it", "Pa"
-        ),
-    ]
-    E_beams: Annotated[FuzzyNumber, positive("Young's modulus of the beams", "Pa")]
-    mass: Annotated[
-        FuzzyNumber, positive("mass of the floors over the length of the beams", "kg/m")
-    ]
-    density: Annotated[float, Key("density of the columns", "kg/m^3", allowed=NOT_NEGATIVE)]
-    damping_ratio: Annotated[
-        FuzzyNumber | None,
-        Key(
-            "viscous damping over the critical one, of all modes; beside Rayleigh's", allowed=RATIO
-        ),
-    ] = None
-    rayleigh_mass: Annotated[
-        FuzzyNumber,
-        Key(
-            "factor a of Rayleigh damping a M + b K; needed without damping_ratio",
-            "1/s",
-            allowed=NOT_NEGATIVE,
-        ),
-    ] = ZERO
-    rayleigh_stiffness: Annotated[
-        FuzzyNumber,
-        Key(
-            "factor b of Rayleigh damping a M + b K; needed without damping_ratio",
-            "s",
-            allowed=NOT_NEGATIVE,
-        ),
-    ] = ZERO
-    accelerogram: Annotated[str, Key("CSV or AT2 file of the ground's acceleration", file=True)]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -16,17 +16,12 @@ from alphacut.io.progress import Tick
 from alphacut.rve.image.gap import constitutive_gap
 from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
 from alphacut.rve.image.moduli import grain_modulus
-from alphacut.rve.image.random_threshold import NODES
-from alphacut.stages.image.random_response import RandomResponse, responses
 from alphacut.stages.image.study import ImageStudy, Level
 from alphacut.stages.material.cell import GPA, POSITIVE
 from alphacut.stochastic.theta.truncated_normal import Array
 
 CURES = {
     "discretisation": "divide the pixels: cell.division or cell.width",
-    "outline": "take more pixels across: cell.pixels",
-    "finite window": "take a larger window, or another number of tiles",
-    "threshold steps": f"up to {NODES} grey values within four deviations: all are solved",
     "threshold": "state cell.threshold more closely",
     "phases": "state the moduli of the phases more closely",
 }
@@ -51,11 +46,7 @@ def contributions(
 ) -> tuple[Contribution, ...]:
     """The sources there are, the widest first, by widths of E in Pa: of pixels, and at levels."""
     base, lowest = width(None, None), study.alpha[0]
-    widths = {"outline" if study.outlined else "discretisation": discretisation}
-    if study.model.boundary == "window":
-        widths["finite window"] = base - discretisation
-    if study.random is not None:
-        widths["threshold steps"] = base - discretisation
+    widths = {"discretisation": discretisation}
     if study.fuzzy_threshold:
         widths["threshold"] = width(lowest, None) - base
     if study.fuzzy_phases:
@@ -77,9 +68,6 @@ class FuzzyImage:
         crisp: Periodic bounds at the modal values.
         cuts: One for each level of the study, rising.
         contributions: Widths of E by source, the widest first.
-        apparent: Proved bounds of E of a window as it is over the inputs at the lowest and at the
-            highest level, in Pa; none for a periodic image.
-        random: Responses over a random threshold; None for a certain or fuzzy one.
         seconds: Wall time.
     """
 
@@ -88,8 +76,6 @@ class FuzzyImage:
     crisp: ImageCut
     cuts: tuple[ImageCut, ...]
     contributions: tuple[Contribution, ...]
-    apparent: tuple[tuple[float, float], ...]
-    random: RandomResponse | None
     seconds: float
 
     @property
@@ -99,10 +85,7 @@ class FuzzyImage:
 
     @property
     def phase(self) -> Array:
-        """Number of each pixel's phase at the modal values, shape (rows, columns).
-
-        A pixel that an outline cuts has the mean of its ends.
-        """
+        """Number of each pixel's phase at the modal values, shape (rows, columns)."""
         return np.asarray(np.add(*self.study.ranges(None)) / 2)
 
     @property
@@ -125,9 +108,6 @@ class FuzzyImage:
         return reduced_to_pixels(pixels, self.model.parts)
 
 
-TILED, WHOLE = 1.4, 2.2  # times of pairs of tiles and of a window over that of a periodic image
-
-
 def solutions(study: ImageStudy) -> tuple[int, float]:
     """Pairs of solutions for bounds, and their time over that of the first, which is periodic.
 
@@ -135,18 +115,7 @@ def solutions(study: ImageStudy) -> tuple[int, float]:
     """
     sources = study.fuzzy_threshold + study.fuzzy_phases
     cuts = len(study.alpha) + sources if sources else 0
-    if study.model.boundary == "periodic":
-        return 1 + cuts, 1.0 + cuts
-    tiled, whole = max(cuts, 1) + 1, 1 + bool(sources)
-    return 1 + tiled + whole, 1 + TILED * tiled + WHOLE * whole
-
-
-def apparent(study: ImageStudy, model: ImageModel) -> tuple[tuple[float, float], ...]:
-    """Bounds of E of a window as it is, at the lowest and the highest level; equal ones once."""
-    least, most = (study.images(level, level) for level in (study.alpha[0], study.alpha[-1]))
-    found = [model.tiling(least, 1)[0].bracket.modulus]
-    found.append(found[0] if least.same(most) else model.tiling(most, 1)[0].bracket.modulus)
-    return tuple(found)
+    return 1 + cuts, 1.0 + cuts
 
 
 class Told:
@@ -191,35 +160,27 @@ def _computed(study: ImageStudy, progress: Tick | None, kept: Path | None) -> Fu
     modal, (count, work) = study.images(None, None), solutions(study)
     told = Told(progress or (lambda share: None), work)
     pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
-    several = progress is not None and count > 1 and study.random is None
+    several = progress is not None and count > 1
     if several and modal.bulk[0].size * work > MANY:
         say(f"{pixels}, or more where pixels are divided: this may take minutes")
     watched = replace(study.model.solver, watch=told.still, kept=kept)
     start = replace(study.model, solver=watched)
-    if study.random is not None:  # many images: pixels are divided only where that is asked for
-        start = replace(start, division=start.parts)
     model, crisp = start.refined(modal)
-    told.done(0.3 if study.random is not None else 1 / work)
+    told.done(1 / work)
     told.first = first = told.seconds
     if several:
         say(f"{pixels}, the first took {first:.0f} s, all about {work * first:.0f} s or more")
-    random = None if study.random is None else responses(study, model, study.random)
-    if random is not None:
-        cuts, width = random.cuts, random.width
-    else:
-        levels = [study.images(level, level) for level in study.alpha]
-        cuts = tuple(model.cuts(levels, (modal, crisp)))
-        told.done(max(0.7, told.share))
+    levels = [study.images(level, level) for level in study.alpha]
+    cuts = tuple(model.cuts(levels, (modal, crisp)))
+    told.done(max(0.7, told.share))
 
-        def alone(threshold: Level, phases: Level) -> float:
-            (cut,) = model.cuts([study.images(threshold, phases)], (modal, crisp))
-            return cut.modulus[1] - cut.modulus[0]
+    def width(threshold: Level, phases: Level) -> float:
+        (cut,) = model.cuts([study.images(threshold, phases)], (modal, crisp))
+        return cut.modulus[1] - cut.modulus[0]
 
-        width = alone
     rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
-    own = apparent(study, model) if model.boundary == "window" else ()
     if not (low := cuts[0].modulus[0] / GPA) > 0:
         what = f"E has no bound above {low:.3g} GPa, and no structure takes that"
         say(f"warning: cell: {what}: {POSITIVE}")
     told.done(1.0)
-    return FuzzyImage(study, model, crisp, cuts, rows, own, random, told.seconds)
+    return FuzzyImage(study, model, crisp, cuts, rows, told.seconds)

@@ -17,7 +17,6 @@ from alphacut.rve.image.directions import directions
 from alphacut.rve.image.model import ImageCut
 from alphacut.stages.image.bounds import CURES, FuzzyImage
 from alphacut.stages.image.phases import BEYOND, IF, phase_lines
-from alphacut.stages.image.random_response import RandomResponse
 from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def document(found: FuzzyImage) -> Document:
         "upper_GPa": bounds.upper / GPA,
         "width": bounds.width,
         "E_GPa": pair(cut.modulus),
-        "nature": cut.nature + IF[found.model.boundary],
+        "nature": cut.nature + IF,
         "iterations": max(c.iterations for c in (found.crisp, *found.cuts)),
         "seconds": found.seconds,
         "nu": poisson(cut),
@@ -46,16 +45,13 @@ def document(found: FuzzyImage) -> Document:
                 "lower": [c.modulus[0] / GPA for c in found.cuts],
                 "upper": [c.modulus[1] / GPA for c in found.cuts],
             },
-            "nature": [c.nature + IF[found.model.boundary] for c in found.cuts],
+            "nature": [c.nature + IF for c in found.cuts],
         },
         "error_table": error_table(found),
-        "random_threshold": None if found.random is None else random_threshold(found.random),
         "fractions": found.study.fractions,
         "phases": phase_lines(found.study),
-        "boundary": BEYOND[found.model.boundary],
+        "boundary": BEYOND,
         "grains_E_GPa": pair(found.grains),
-        "apparent_E_GPa": pair(found.apparent[-1]) if found.apparent else None,
-        "apparent_E_support_GPa": pair(found.apparent[0]) if found.apparent else None,
         "directions_E_GPa": {"least": pair(turned.least), "greatest": pair(turned.greatest)},
         "isotropic": {
             "plane_strain_bulk_GPa": turned.isotropic[0] / GPA,
@@ -65,16 +61,6 @@ def document(found: FuzzyImage) -> Document:
         "division": found.model.parts,
         "versions": versions(),
     }
-
-
-def own_of_window(found: Document) -> str:
-    """What is proved of a window as it is, over the inputs of two levels; empty if periodic."""
-    if not found.get("apparent_E_support_GPa"):  # results of an older program hold modal values
-        return ""
-    ends = (found["apparent_E_GPa"], -1), (found["apparent_E_support_GPa"], 0)
-    told = [f"{interval(x)} at α = {found['cuts']['alpha'][k]:g}" for x, k in ends]
-    start = "the window's own apparent E, proved over the inputs"
-    return f"{start}: {', '.join(told)}; not that of the material"
 
 
 def interval(ends: Mapping[str, float]) -> str:
@@ -94,22 +80,6 @@ def error_table(found: FuzzyImage) -> list[Document]:
         }
         for row in found.contributions
     ]
-
-
-def random_threshold(found: RandomResponse) -> Document:
-    """Bounds of E over the threshold, of its mean and of its quantiles; moduli in GPa."""
-    lower, upper = found.modal.modulus
-    order = np.argsort(found.modal.threshold)
-    means = [found.by_level[a].mean(found.random.law(a)) for a in found.alpha]
-    return {
-        "threshold": found.modal.threshold[order],
-        "E_GPa": {"lower": lower[order] / GPA, "upper": upper[order] / GPA},
-        "mean_of_E_GPa": [pair(ends) for ends in means],
-        "quantiles": [
-            {"share": share, "E_GPa": [pair((low, high)) for low, high in ends]}
-            for share, ends in zip(found.random.shares, found.quantiles.swapaxes(0, 1), strict=True)
-        ],
-    }
 
 
 def poisson(cut: ImageCut) -> dict[str, float]:
@@ -146,8 +116,6 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
             {"units": "Pa", "long_name": "constitutive error of the two fields, modal inputs"},
         ),
     }
-    if found.random is not None:
-        variables |= random_variables(found.random)
     coordinates = {
         "alpha": list(found.study.alpha),
         "bound": ["lower", "upper"],
@@ -157,21 +125,6 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
     return xarray.Dataset(
         variables, coordinates, {"nature": document(found)["nature"], "seconds": found.seconds}
     )
-
-
-def random_variables(found: RandomResponse) -> Document:
-    """E over the random threshold, and its quantiles at each level."""
-    about = {"units": "Pa", "long_name": "E of eq. 16 over the threshold, modal phases"}
-    return {
-        "E_of_threshold": (("node", "bound"), np.stack(found.modal.modulus, axis=-1), about),
-        "threshold": (("node",), found.modal.threshold, {"long_name": "grey value"}),
-        "quantile": (
-            ("alpha", "share", "bound"),
-            found.quantiles,
-            {"units": "Pa", "long_name": "quantiles of E"},
-        ),
-        "share": (("share",), list(found.random.shares), {"long_name": "probability"}),
-    }
 
 
 def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int], kept: Path) -> None:

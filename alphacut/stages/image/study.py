@@ -12,10 +12,8 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images
-from alphacut.rve.image.random_threshold import NormalThreshold
 from alphacut.stochastic.theta.truncated_normal import Array
 
-RANDOM = "guaranteed, of the mean over the random threshold"
 Level = float | None  # None: the modal values alone
 Ranges = Callable[[Level], tuple[Array, Array]]  # → least and greatest phase of each pixel
 
@@ -23,27 +21,6 @@ Ranges = Callable[[Level], tuple[Array, Array]]  # → least and greatest phase 
 def cut_at(number: FuzzyNumber, level: Level) -> tuple[float, float]:
     """The cut of a number at a level, or its modal value twice."""
     return (number.modal, number.modal) if level is None else number.cut(level)
-
-
-@dataclass(frozen=True)
-class RandomThreshold:
-    """A normal threshold whose parameters may be fuzzy.
-
-    Args:
-        grey: Grey values, shape (rows, columns).
-        mean: Mean, in grey levels.
-        deviation: Standard deviation, in grey levels, positive.
-        shares: Probabilities whose quantiles of E are wanted.
-    """
-
-    grey: Array
-    mean: FuzzyNumber
-    deviation: FuzzyNumber
-    shares: tuple[float, ...]
-
-    def law(self, level: Level) -> NormalThreshold:
-        """The laws at a level."""
-        return NormalThreshold(cut_at(self.mean, level), cut_at(self.deviation, level))
 
 
 @dataclass(frozen=True)
@@ -56,9 +33,7 @@ class ImageStudy:
         young: Whether the pairs are E and ν.
         alpha: Levels, rising.
         model: How it is solved.
-        fuzzy_threshold: Whether the phases of the pixels, or the law of a random threshold,
-            depend on the level.
-        random: Threshold that is random; its mean parts the phases of `ranges`.
+        fuzzy_threshold: Whether the phases of the pixels depend on the level.
         names: Name of each phase for people.
     """
 
@@ -68,7 +43,6 @@ class ImageStudy:
     alpha: tuple[float, ...]
     model: ImageModel
     fuzzy_threshold: bool
-    random: RandomThreshold | None = None
     names: tuple[str, ...] = ()
 
     def phases(self, level: Level) -> list[ModuliInterval]:
@@ -103,11 +77,6 @@ class ImageStudy:
         ends = self.ranges(None)
         sums = [np.bincount(which.ravel(), minlength=len(self.pairs)) for which in ends]
         return np.asarray((sums[0] + sums[1]) / 2 / ends[0].size)
-
-    @property
-    def outlined(self) -> bool:
-        """Whether an outline cuts pixels, whose phase stays open then."""
-        return not np.array_equal(*self.ranges(None))
 
     @property
     def fuzzy_phases(self) -> bool:

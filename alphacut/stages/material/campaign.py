@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 SOURCES = ("space", "theta", "table")  # of error, see rve.result.Homogenised
 JUDGED = ("prism", "auto")
-SPANNED = ("table", "auto", "prism")  # methods whose samples share work over the particle's moduli
+SPANNED = ("prism",)  # methods whose samples share work over the particle's moduli
 OF_CURVES = (
     1e-9  # relative tolerance on E with which the curve between the nodes is good to 1e-4 or so
 )
@@ -144,7 +144,6 @@ def campaign(
     case: Case,
     *,
     petsc: Mapping[str, str] | None = None,
-    exclude: tuple[str, ...] = (),
     store: Path | None = None,
 ) -> Campaign:
     """The campaign that a case asks for.
@@ -152,7 +151,6 @@ def campaign(
     Args:
         case: With the sections radius, cell, mesh and modulus.
         petsc: PETSc options that override the solver's.
-        exclude: Models that method auto must not take.
         store: File that keeps every sample.
     """
     inputs = fuzzy_inputs(case)
@@ -160,16 +158,16 @@ def campaign(
         name: value for name, value in of_cell.modal_values(case).items() if name not in inputs
     }
     support = case.cell.inclusion_modulus.cut(0.0)
-    choice = of_cell.cell_choice(case, exclude=exclude, petsc=petsc)
+    choice = of_cell.cell_choice(case, petsc=petsc)
     # no other method's samples depend on the range, and a wider one may take them as they are
     if choice.method in SPANNED and (support.width > 0 or choice.method != "prism"):
         choice = replace(choice, moduli=(support.lower, support.upper))
     if choice.tolerance is not None and choice.named:
         choice = replace(choice, estimate=True)  # so that every sample can be held to it
-    if case.sections.response and choice.method == "auto" and "series" not in choice.exclude:
+    if case.sections.response and choice.method == "auto":
         # a curve needs more nodes than its mean, and they cost little
         choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
-    if (choice.particles, choice.method, choice.tolerance) == ("spheres", "series", None):
+    if (choice.particles, choice.tolerance) == ("spheres", None):
         choice = replace(choice, tolerance=OF_SPHERES)
     task = CellTask(choice, crisp, case.radius.family)
     shared = tuple(name for name in inputs if name in of_cell.SHARED) or ("inclusion_modulus",)

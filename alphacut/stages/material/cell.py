@@ -77,7 +77,6 @@ class CellChoice:
         tolerance: Relative error of E asked for; None for each model's own accuracy, and 1e-4 of
             method auto.
         named: Whether the resolution is named, so that no tolerance refines it.
-        exclude: Models that method auto must not take.
         petsc: PETSc options that override the solver's, without their prefix.
         parallel: Whether all MPI ranks work on one cell together.
         moduli: Moduli of the particle that all samples together span, in Pa, for a table or a few
@@ -94,7 +93,6 @@ class CellChoice:
     interface: str = "conforming"
     tolerance: float | None = None
     named: bool = True
-    exclude: tuple[str, ...] = ()
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
     moduli: tuple[float, float] | None = None
@@ -121,26 +119,14 @@ class CellChoice:
         mesh += f", interface {self.interface}" if self.method == "prism" else ""
         asked = "" if self.tolerance is None else f", relative error of E up to {self.tolerance:g}"
         refined = self.tolerance is not None and not self.named
-        without = f", without {', '.join(self.exclude)}" if self.exclude else ""
         shape = ", spheres" if self.particles == "spheres" else ""
         shape = ", isotropic average" if self.averages else shape
-        return (
-            f"each sample by method {self.method}{shape}{'' if refined else mesh}{asked}{without}"
-        )
+        return f"each sample by method {self.method}{shape}{'' if refined else mesh}{asked}"
 
 
-def cell_choice(
-    case: Case, *, exclude: tuple[str, ...] = (), petsc: Mapping[str, str] | None = None
-) -> CellChoice:
-    """The model that a case asks for.
-
-    Raises:
-        BadInput: The case names its model, so that none can be excluded.
-    """
+def cell_choice(case: Case, *, petsc: Mapping[str, str] | None = None) -> CellChoice:
+    """The model that a case asks for."""
     method, mesh = case.modulus.method, case.mesh
-    if exclude and method != "auto":
-        what = f"the method is {method}, and only method auto leaves a choice"
-        raise BadInput.of("--exclude", what, ", ".join(exclude), "beside --method auto")
     return CellChoice(
         method,
         mesh.layers,
@@ -148,7 +134,6 @@ def cell_choice(
         mesh.interface,
         case.modulus_tolerance,
         case.names_mesh or bool(petsc),
-        exclude,
         petsc or {},
         particles=case.cell.particles,
         average=case.modulus.average,

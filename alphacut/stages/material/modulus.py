@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,19 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.case import WHOLE, Case
-from alphacut.fuzzy import Crisp, FuzzyNumber, General, from_data, propagate
-from alphacut.fuzzy import explain as fuzzy_explain
-from alphacut.fuzzy.dry_run import Explanation
+from alphacut.fuzzy import Crisp, FuzzyNumber, from_data, propagate
 from alphacut.fuzzy.samples.nature import Nature
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.csv_rows import CsvFile
-from alphacut.io.files import Document, say
+from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset, write_dataset
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.provenance import attributes, versions
-from alphacut.io.units import span
 from alphacut.stages.material.campaign import Campaign, theta_shown
 from alphacut.stages.material.cell import GPA, POSITIVE, CellChoice, anisotropy, parts
 from alphacut.stages.material.cell_models import cell_model
@@ -37,7 +33,6 @@ if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
 
-MANY = 2000  # samples of the general plan, from which on a cheaper one is named
 QUANTITIES = {"E": ("Pa", "effective Young's modulus"), "nu": ("1", "effective Poisson's ratio")}
 STRESSES = {
     "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
@@ -249,12 +244,6 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
     """
     # a model that cannot be had is one problem, not one for each sample
     cell_model(wanted.task.choice)
-    preview = explain(wanted) if progress and wanted.plan == General() else None
-    if preview and (count := preview.samples - preview.stored) > MANY:
-        say(
-            f"{count:,} samples of the cell, every combination of the inputs' points; modulus.plan"
-            ' = "signed" takes few where E and nu rise or fall with each input, which it checks'
-        )
     result = propagate(
         wanted.task,
         wanted.inputs,
@@ -274,22 +263,7 @@ def compute(wanted: Campaign, *, workers: int = 1, progress: Tick | None = None)
     return FuzzyModulus(result, choice, law, wanted.task.judged(modal), ratio)
 
 
-def explain(wanted: Campaign) -> Explanation:
-    """Preview of `compute`: samples and reasons."""
-    return fuzzy_explain(
-        wanted.inputs,
-        wanted.plan,
-        alpha=wanted.alpha,
-        shared=wanted.shared,
-        known=wanted.known,
-        store=wanted.store,
-        identity=wanted.identity,
-    )
-
-
-def write(
-    modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str, outside: str = ""
-) -> None:
+def write(modulus: FuzzyModulus, path: Path | str, *, case_text: str, key: str) -> None:
     """Write ``modulus.nc``, whole or not at all.
 
     Args:
@@ -297,10 +271,8 @@ def write(
         path: The file.
         case_text: The case it is of.
         key: Fingerprint of what it depends on.
-        outside: Warning to whoever reads E that it leaves bounds, or ''.
     """
-    facts = attributes(case_text, key) | ({"outside": outside} if outside else {})
-    write_dataset(modulus.dataset(), path, facts)
+    write_dataset(modulus.dataset(), path, attributes(case_text, key))
 
 
 def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
@@ -313,8 +285,8 @@ def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
     }
 
 
-def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = True) -> FuzzyNumber:
-    """The fuzzy modulus in Pa from a file that `write` made, and its warning unless not to `warn`.
+def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
+    """The fuzzy modulus in Pa from a file that `write` made.
 
     Between two levels the wider cut holds, since nothing is known of E there.
 
@@ -335,8 +307,6 @@ def read_number(path: Path | str, option: str = "--modulus", *, warn: bool = Tru
     if not (low := float(ends.min())) > 0:
         what = f"{Path(path).name} holds an E down to {low / GPA:.3g} GPa"
         raise BadInput.of(option, what, allowed=f"an E that is positive throughout: {POSITIVE}")
-    if warn and (warned := dataset.attrs.get("outside")):
-        say(f"warning: {option}: {warned}")
     if tuple(alpha) == (1.0,):
         return Crisp(float(ends.mean()))
     if (alpha[0], alpha[-1]) != (0, 1):
@@ -354,14 +324,6 @@ def stand_in(case: Case) -> FuzzyNumber | None:
     if given.file is not None:
         return read_number(case.beside(given.file), "modulus.file")
     return None if given.measured is None else measured_modulus(case, given.measured)
-
-
-def measured_line(case: Case) -> Iterator[str]:
-    """A line on the measured moduli as they were read."""
-    given = case.sections.modulus
-    if given is not None and given.measured is not None:
-        values = measured_values(case.beside(given.measured))
-        yield f"modulus.measured: {len(values)} values {span(values, 'Pa')}"
 
 
 HEADER = "E [GPa]"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from alphacut.case.case import Case
 from alphacut.case.checks import forces_only
-from alphacut.case.idle import FOLLOWERS
 from alphacut.frame.methods.modal import FINE
 
+FOLLOWERS = ("graph-follower", "improved-graph-follower")
 SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
 

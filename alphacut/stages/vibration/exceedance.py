@@ -12,15 +12,15 @@ from alphacut.case.case import Case
 from alphacut.case.limits import exceeded_limits
 from alphacut.frame import Envelope
 from alphacut.frame import exceedance as probabilities
-from alphacut.frame.boxes import boxes
+from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.exceedance import ANY, FuzzyProbability, peaks, tried_peaks
+from alphacut.frame.propagation import absolute
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
-from alphacut.stages.vibration.resolution_checks import shares_of_tolerance
 from alphacut.stages.vibration.structure import Structure
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -81,6 +81,16 @@ def reached(found: Envelope, wanted: Structure, task: EnvelopeTask) -> float | N
     return float((found.error.max((0, 1)) / shares_of_tolerance(wanted, task)).max())
 
 
+def shares_of_tolerance(wanted: Structure, task: EnvelopeTask) -> Array:
+    """Factor on the tolerance for each output, shape (m,)."""
+    if wanted.frame is not None:  # bounds of accelerations are of absolute ones
+        wanted = replace(wanted, model=absolute(wanted.frame))
+    cuts = boxes(wanted.inputs(task.fuzzy), task.alpha)
+    scheme = task.scheme if wanted.linear is not None else task.integrator
+    flow = wanted.flow(cuts.names, task.duration, task.step, scheme)
+    return UnitFlow(flow, cuts, task.relative and task.certify is None).scale
+
+
 def peak_document(dataset: xarray.Dataset) -> dict[str, dict[str, Array]]:
     """Fuzzy peak of each output by level, in SI: ends, error, and the least one tried."""
     found = {}
@@ -131,23 +141,6 @@ def require_random(case: Case, wanted: Structure) -> None:
             raise BadInput.of(
                 "exceedance.random", what, name, problem.allowed, file=str(case.path)
             ) from None
-
-
-def assumed(case: Case, wanted: Structure) -> Iterator[str]:
-    """Remarks on a probability of which the case says less than it takes."""
-    if not case.sections.exceedance:
-        return
-    if not case.exceedance.random:
-        yield (
-            "exceedance.random: nothing is random, so a probability is 0, 1 or undecided on each"
-            ' level; name inputs that vary by nature, as random = ["E"]'
-        )
-    for name, number in wanted.inputs(case.exceedance.random).items():
-        if number.support == number.cut(1.0):
-            yield (
-                f"exceedance.random: {name} is an interval, drawn uniformly between its ends: an"
-                " assumption that the probability rests on"
-            )
 
 
 def split_inputs(
@@ -310,17 +303,6 @@ def each_event(found: Document) -> list[Document]:
     return several
 
 
-def sentences(found: Document) -> str:
-    """A line for each event, and one on what all of them are worth where there are several."""
-    each = each_event(found)
-    if len(each) == 1:
-        return sentence(each[0], f"inner bounds{nodes(each[0])}{scatter(each[0])}")
-    lines = "".join(sentence(one, own_errors(one)) for one in each)
-    at = f" at nodes every {each[0]['step']:g} s" if "step" in each[0] else ""
-    drawn = f", from {draws(each[0])}" if each[0]["random"] else ""
-    return f"{lines}these are inner bounds{at}{drawn}; what is added between nodes is estimated\n"
-
-
 def exceedance_document(found: xarray.Dataset) -> Document:
     """One probability as it is printed with ``--json``; the limit in SI."""
     sides = {str(side): found["exceedance"].sel(bound=side).values for side in ("lower", "upper")}
@@ -332,32 +314,13 @@ def exceedance_document(found: xarray.Dataset) -> Document:
     }
 
 
-def sentence(found: Document, worth: str) -> str:
-    """The probability in words, at the lowest and the highest level, and what it is worth."""
+def sentence(found: Document) -> str:
+    """The probability in words, at the lowest and the highest level."""
     levels = dict.fromkeys((0, len(found["alpha"]) - 1))
     cuts = ", ".join(f"{cut(found, k)} at α = {found['alpha'][k]:g}" for k in levels)
-    random = f" with {found['random']} drawn by membership" if found["random"] else ""
     limit = f" > {engineering(found['limit'], found['unit'])}"
-    return f"probability of {event_words(found['output'], limit)}{random}: {cuts} ({worth})\n"
-
-
-def draws(found: Document) -> str:
-    """Words on the random draws."""
-    many = "samples" in found
-    return f"{found['samples']} random draws at each fuzzy point tried" if many else "random draws"
-
-
-def scatter(found: Document) -> str:
-    """Words on how far the probability scatters; empty where nothing is random."""
-    if not found["random"]:
-        return ""
-    return f": {draws(found)}; standard deviation up to {found['deviation']:.2g}"
-
-
-def own_errors(found: Document) -> str:
-    """What is added between nodes, and the scatter, of one of several events."""
-    more = [f"between nodes up to {found['between_nodes']:.2g} more"]
-    return ", ".join(more + [f"scatter {found['deviation']:.2g}"] * bool(found["random"]))
+    scatter = f", scatter {found['deviation']:.2g}" if found["random"] else ""
+    return f"probability of {event_words(found['output'], limit)}: {cuts}{scatter}"
 
 
 def nodes(found: Document) -> str:

@@ -3,64 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.structures.quantities import Output
 from alphacut.io.csv_rows import CsvFile
-from alphacut.stages.vibration.accelerogram import even_step
 from alphacut.stochastic.theta.truncated_normal import Array
 
 KEY = "update.measured"
 ALLOWED = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
 MOST = 1e9
 """Largest frequency in Hz, and amplitude."""
-RECORDED = "time [s],q1 [mm],q2 [mm] … with the outputs that were recorded, all of one unit"
-
-
-@dataclass(frozen=True, eq=False)
-class MotionRows:
-    """A recorded motion.
-
-    Args:
-        step: Distance of its times, which begin at 0, in s.
-        outputs: What was recorded, m of them.
-        values: In SI units, shape (T, m).
-    """
-
-    step: float
-    outputs: tuple[str, ...]
-    values: Array
-
-
-def motion_rows(path: Path, known: Sequence[str]) -> MotionRows:
-    """A recorded motion.
-
-    Args:
-        path: The file.
-        known: Outputs that may be recorded.
-
-    Raises:
-        BadInput: The file is missing, its header or a row is wrong, or its steps are not even.
-    """
-    file = CsvFile(path, "update.recorded", "recorded motion", RECORDED)
-    (line, head), *rows = file.rows(least=2)
-    names = [cell.partition("[")[0].strip() for cell in head]
-    wrong = [name for name in names[1:] if name not in known]
-    if names[0] != "time" or wrong or len(set(names)) < max(len(names), 2):
-        raise file.refuse(line, "the header is wrong", ",".join(head), RECORDED)
-    units = ["s", *(Output(name).unit for name in names[1:])]
-    if len(set(units[1:])) > 1:
-        what = "the outputs have different units, and their errors are to be alike"
-        raise file.refuse(line, what, ",".join(head), "outputs of one unit: the others left out")
-    cells = zip(head, names, units, strict=True)
-    scales = [file.scale(line, cell, name, unit) for cell, name, unit in cells]
-    allowed = f"{len(head)} finite numbers, with points in them"
-    found = file.finite(rows, len(head), "no instant", allowed) * scales
-    return MotionRows(even_step(file, rows, scales[0]), tuple(names[1:]), found[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,39 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from alphacut.case.case import Case
-from alphacut.case.sections.structures import Frame, Pendulum, Tower
+from alphacut.case.sections.structures import Frame, Pendulum
 from alphacut.frame import INTEGRATORS, LinearFlow, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
-from alphacut.frame.reduced.beam import BeamFrame
-from alphacut.frame.reduced.reduction import ReducedStructure
-from alphacut.frame.structures.field_frame import FieldFrame
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.lagrangian import pendulum as make
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.field import FuzzyField
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import door
 from alphacut.io.units import STANDARD_GRAVITY
 from alphacut.stages.vibration.accelerogram import accelerogram
 
-LARGEST = 10_000  # unknowns of a tower, whose modes are found in dense matrices
-
 
 @dataclass(frozen=True)
 class Structure:
-    """A storey frame, a tower of beams, or a pendulum.
+    """A storey frame or a pendulum.
 
     Args:
         model: The model at modal values.
         numbers: Every parameter, crisp or fuzzy, in SI.
     """
 
-    model: StoreyFrame | ReducedStructure | LagrangianSystem
+    model: StoreyFrame | LagrangianSystem
     numbers: Mapping[str, FuzzyNumber]
 
     @property
@@ -111,7 +103,7 @@ def structure(case: Case, handed: FuzzyNumber | None) -> Structure:
     try:
         if case.sections.pendulum:
             return pendulum(case.pendulum)
-        return tower(case) if case.sections.tower else storey_frame(case, modulus_of(case, handed))
+        return storey_frame(case, modulus_of(case, handed))
     except ValueError as error:
         raise BadInput.of("frame", str(error), file=str(case.path)) from None
 
@@ -135,47 +127,6 @@ def pendulum(given: Pendulum) -> Structure:
         "omega_0": given.angular_velocity,
     }
     return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)
-
-
-def tower(case: Case) -> Structure:
-    """Plane beam frame, reduced for the whole supports of its fuzzy inputs."""
-    given, numbers = case.tower, tower_parameters(case.tower)
-    if (unknowns := 3 * (given.bays + 1) * given.storeys) > LARGEST:
-        what, most = f"{unknowns:,} unknowns are too many to reduce", f"at most {LARGEST:,}"
-        raise case.refuse("tower.storeys", what, f"{most}: fewer storeys or bays")
-    frame = BeamFrame(
-        given.storeys,
-        given.bays,
-        column=(given.column_area, given.column_moment),
-        beam=(given.beam_area, given.beam_moment),
-        ground=accelerogram(case.beside(given.accelerogram), "tower.accelerogram"),
-        damping_ratio=None if given.damping_ratio is None else given.damping_ratio.modal,
-        height=given.height,
-        width=given.width,
-        density=given.density,
-    )
-    full = replace(
-        frame.structure(), parameters={name: number.modal for name, number in numbers.items()}
-    )
-    bounds = {
-        name: (number.support.lower, number.support.upper)
-        for name, number in numbers.items()
-        if number.support.width > 0
-    }
-    return Structure(full.reduced(bounds), numbers)
-
-
-def tower_parameters(given: Tower) -> dict[str, FuzzyNumber]:
-    """Every parameter of the tower, in SI."""
-    found = {
-        "E_columns": given.E_columns,
-        **({"E_columns_top": given.E_columns_top} if given.storeys > 1 else {}),
-        "E_beams": given.E_beams,
-        "mass": given.mass,
-        "rayleigh_mass": given.rayleigh_mass,
-        "rayleigh_stiffness": given.rayleigh_stiffness,
-    }
-    return found if given.damping_ratio is None else found | {"zeta": given.damping_ratio}
 
 
 def storey_frame(case: Case, modulus: FuzzyNumber | None) -> Structure:
@@ -210,30 +161,7 @@ def storey_frame(case: Case, modulus: FuzzyNumber | None) -> Structure:
     computed = {"modulus", "image"} & set(case.stages)  # no E is known yet, or its support only
     ends = {x: (n.support.lower, n.support.upper) for x, n in numbers.items()}
     model.require_standing({x: both for x, both in ends.items() if x != "E" or not computed})
-    return (
-        Structure(model, numbers)
-        if case.sections.field is None
-        else with_field(case, model, numbers)
-    )
-
-
-def with_field(case: Case, model: StoreyFrame, numbers: Mapping[str, FuzzyNumber]) -> Structure:
-    """The frame with directions of [field] in place of the values of its storeys."""
-    from dataclasses import fields
-
-    if not model.lengths:
-        raise ValueError("a field needs the height of each storey: frame.lengths")
-    given, heights = case.field, np.cumsum(model.lengths)
-    places = heights if given.of == "m" else heights - np.array(model.lengths) / 2
-    value = numbers[f"{given.of}1"]
-    (low, high), middle = value.support, sum(value.support) / 2
-    half = (high - low) / 2
-    field = FuzzyField(given.of, tuple(places), middle, half, given.length, given.share)
-    own = {entry.name: getattr(model, entry.name) for entry in fields(model)}
-    framed = FieldFrame(**own, field=field)
-    kept = {name: number for name, number in numbers.items() if name in framed.parameters}
-    unit = (value - middle) * (1 / half)
-    return Structure(framed, {**kept, **dict.fromkeys(field.names, unit)})
+    return Structure(model, numbers)
 
 
 def parameters(given: Frame, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:

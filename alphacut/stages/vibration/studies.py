@@ -84,23 +84,19 @@ def envelope_of(
     task: EnvelopeTask,
     kept: KeptArrays,
     *,
-    strict: bool,
     workers: int = 1,
     progress: Tick | None = None,
 ) -> xarray.Dataset:
     """The envelope of a task with its peaks; goes on from what is kept."""
-    found = envelope.compute(
-        wanted, task, strict=strict, workers=workers, progress=progress, kept=kept
-    )
+    found = envelope.compute(wanted, task, workers=workers, progress=progress, kept=kept)
     return outcomes.with_peaks(found, wanted, task)
 
 
 def side_by_side(
-    wanted: Structure, begun: Mapping[Study, KeptArrays], executor: Executor, *, strict: bool
+    wanted: Structure, begun: Mapping[Study, KeptArrays], executor: Executor
 ) -> dict[Future[xarray.Dataset], Study]:
     """Envelopes of studies under way, each in one of the executor's processes; longest first."""
     first = sorted(begun, key=lambda study: -len(study.task.fuzzy) * study.task.duration)
     return {
-        executor.submit(envelope_of, wanted, study.task, begun[study], strict=strict): study
-        for study in first
+        executor.submit(envelope_of, wanted, study.task, begun[study]): study for study in first
     }

@@ -26,6 +26,7 @@ from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.vibration.envelope_task import task_of
 from alphacut.stages.vibration.structure import Structure, structure
 from alphacut.stages.vibration.studies import left_out
+from alphacut.stages.vibration.update import input_unit
 from alphacut.stochastic.theta.truncated_normal import Array
 
 Range = Callable[[float], tuple[float, float]]
@@ -38,12 +39,6 @@ HALVINGS, BEYOND = 60, 1 + 1e-9
 """Steps towards the scale at which the weight buckles a storey, looked for up to just beyond."""
 MEANINGFUL = 0.9
 """Share of the scale at which a support reaches what its input must not be."""
-
-
-def input_unit(name: str) -> str:
-    """SI unit of an input of the cell or of a storey frame; none of directions of a field."""
-    of_cell = {"matrix_modulus": "Pa", "inclusion_modulus": "Pa"}
-    return of_cell.get(name) or of_storey_frame(name).unit
 
 
 def _all_scaled(numbers: Mapping[str, FuzzyNumber], scale: float) -> dict[str, tuple[float, float]]:

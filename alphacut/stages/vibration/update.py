@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.case import Case
-from alphacut.case.names import frame_outputs
-from alphacut.frame import Exact, LinearFlow, StoreyFrame
+from alphacut.frame import StoreyFrame
+from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
@@ -18,20 +18,14 @@ from alphacut.io.progress import Tick
 from alphacut.io.units import engineering
 from alphacut.stages.vibration import envelope
 from alphacut.stages.vibration.envelope_task import task_of
-from alphacut.stages.vibration.modes_csv import ModeRows, MotionRows, mode_rows, motion_rows
+from alphacut.stages.vibration.modes_csv import ModeRows, mode_rows
 from alphacut.stages.vibration.structure import Structure
-from alphacut.stages.vibration.tolerances import input_unit
 
 if TYPE_CHECKING:
     import xarray
 
     from alphacut.frame.update.measured import MeasuredMode
-    from alphacut.frame.update.motion import MotionPosterior
     from alphacut.frame.update.posterior import Posterior
-
-
-WIDE = 0.9
-"""Share of its prior's width that an input keeps where a recorded motion teaches nothing of it."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +60,7 @@ class Learned:
         structure: The structure with the inputs learned.
     """
 
-    posterior: Posterior | MotionPosterior | None
+    posterior: Posterior | None
     refuted: str
     prior: Mapping[str, FuzzyNumber]
     held_out: tuple[HeldOut, ...]
@@ -96,14 +90,9 @@ class Learned:
     @property
     def _identified(self) -> Document:
         """How well prior and measurement agree, and combinations that are not learned."""
-        from alphacut.frame.update.posterior import Posterior
-
         found = self.posterior
-        if isinstance(found, Posterior):
-            lost = [x.words for x in found.directions if not x.learned]
-            return {"agreement": found.height, "not_learned": lost}
-        shares = {} if found is None else found.narrowed
-        return {"not_learned": [name for name, share in shares.items() if share > WIDE]}
+        lost = [x.words for x in found.directions if not x.learned] if found else []
+        return {"agreement": found and found.height, "not_learned": lost}
 
 
 def prior_support(number: FuzzyNumber) -> tuple[float, float]:
@@ -113,33 +102,29 @@ def prior_support(number: FuzzyNumber) -> tuple[float, float]:
     return widest(number)
 
 
+def input_unit(name: str) -> str:
+    """SI unit of an input of the cell or of a storey frame."""
+    of_cell = {"matrix_modulus": "Pa", "inclusion_modulus": "Pa"}
+    return of_cell.get(name) or of_storey_frame(name).unit
+
+
 def sentences(found: Document) -> list[str]:
-    """Inputs, predictions and what was not learned, from `Learned.document`, in SI."""
+    """A line for each input and each mode that was predicted, from `Learned.document`, in SI."""
     if "refuted" in found:
         return [str(found["refuted"])]
-    proved = "agreement" in found  # of modes; the sets of a motion are searched
-    worth = "proved to hold all that agree" if proved else "searched, not proved"
-    lines = [f"inputs at α = {found['alpha'][0]:g}, {worth}:"]
+    lines = []
     for name, ends in found["inputs"].items():
         both, share = (ends["lower"][0], ends["upper"][0]), found["narrowed"][name]
-        told = " … ".join(engineering(end, input_unit(name), digits=6) for end in both)
-        lines.append(f"  {name}: {told}, {100 * share:.3g} % of its prior's width")
+        told = " … ".join(engineering(end, input_unit(name)) for end in both)
+        lines.append(f"{name}: {told}, {100 * share:.3g} % of its width before")
     for held in found["held_out"]:
         low, high = held["predicted"]
-        where = "inside" if held["inside"] else "OUTSIDE"
+        where = "inside" if held["inside"] else "outside"
         lines.append(
-            f"mode {held['mode']} was held out: {low:.4g} … {high:.4g} Hz predicted,"
+            f"mode {held['mode']}: {low:.4g} … {high:.4g} Hz predicted,"
             f" {held['measured']:.4g} Hz measured: {where}"
         )
-    for output, share in found.get("envelope_width", {}).items():
-        some = share is not None and not np.isnan(share)
-        told = f"{100 * share:.3g} % of its width before" if some else "no width, as before"
-        lines.append(f"envelope of {output}: {told}")
-    if "agreement" in found:
-        least, most = found["agreement"]
-        lines.append(f"prior and measurement agree to {least:.3g} (to {most:.3g} at most)")
-    lost = [f"not learned: {one}" for one in found["not_learned"]]
-    return [*lines, *(lost or ["every combination of the inputs is learned"]), str(found["claim"])]
+    return lines
 
 
 def learned(case: Case, wanted: Structure) -> Learned:
@@ -158,8 +143,6 @@ def learned(case: Case, wanted: Structure) -> Learned:
     if wanted.frame is None:
         raise BadInput.of("update", "natural modes are learned from for a storey frame")
     given = case.update
-    if given.recorded is not None:
-        return _from_motion(case, wanted, wanted.frame)
     rows, held = measured_modes(case), {round(number) for number in given.held_out}
     used = [row for row in rows if row.mode not in held]
     prior = inputs(case, wanted)
@@ -204,15 +187,6 @@ def measured_modes(case: Case) -> tuple[ModeRows, ...]:
     return rows
 
 
-def recorded_motion(case: Case, frame: StoreyFrame) -> MotionRows:
-    """The recorded motion.
-
-    Raises:
-        BadInput: The file is wrong.
-    """
-    return motion_rows(case.beside(str(case.update.recorded)), frame_outputs(frame.floors))
-
-
 def require_readable(case: Case, frame: StoreyFrame | None) -> None:
     """Refuse a case whose measurement cannot be read, before anything is computed.
 
@@ -221,29 +195,7 @@ def require_readable(case: Case, frame: StoreyFrame | None) -> None:
     """
     if case.sections.update is None or frame is None:
         return
-    if case.update.recorded is None:
-        measured_modes(case)
-    else:
-        recorded_motion(case, frame)
-
-
-def _from_motion(case: Case, wanted: Structure, frame: StoreyFrame) -> Learned:
-    """The inputs after a recorded motion."""
-    from alphacut.frame.update.motion import RecordedMotion, learn_from_motion
-    from alphacut.frame.update.posterior import RefutedError
-
-    rows, prior = recorded_motion(case, frame), inputs(case, wanted)
-    duration, recorded = (len(rows.values) - 1) * rows.step, replace(frame, outputs=rows.outputs)
-    flow = LinearFlow(recorded, tuple(prior), duration, rows.step, Exact())
-    try:
-        record = RecordedMotion(flow, rows.values)
-        found = learn_from_motion(record, prior, alpha=case.update.alpha)
-    except RefutedError as error:
-        return Learned(None, str(error), prior, (), wanted)
-    except ValueError as error:
-        raise BadInput.of("update", str(error), file=str(case.path)) from None
-    after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
-    return Learned(found, "", prior, (), after)
+    measured_modes(case)
 
 
 def inputs(case: Case, wanted: Structure) -> dict[str, FuzzyNumber]:

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from alphacut.frame.reduced.beam import BeamFrame
 from benchmarks.frame import certificate as frame_certificate
 from benchmarks.frame import envelopes as frame_envelopes
 from benchmarks.frame import failures as frame_failures
 from benchmarks.frame import integrators as frame_integrators
-from benchmarks.frame import tower as frame_tower
 
 
 @pytest.mark.slow
@@ -46,12 +44,6 @@ def test_integrator_benchmark_measures_every_integrator(tmp_path: Path) -> None:
 def test_integrator_benchmark_measures_the_declared_stability_limits() -> None:
     for name, limit in frame_integrators.stability_limits().items():
         assert limit == pytest.approx(frame_integrators.COMPARED[name].stability_limit, abs=0.01)
-
-
-def test_tower_benchmark_compares_with_the_full_structure() -> None:
-    row = frame_tower.measured(BeamFrame(5, 2, ground=frame_tower.recorded()), 4.0, (0.0,), 2, 2)
-    assert row["outside"] < 5e-4
-    assert row["at_bounds"] < 5e-4
 
 
 def test_certificate_benchmark_finds_no_trajectory_outside() -> None:

@@ -14,7 +14,6 @@ import pytest
 import xarray
 
 from alphacut.case.load import load
-from alphacut.case.quick import quick
 from alphacut.entry import main
 from alphacut.figures import questions
 from alphacut.io.units import engineering
@@ -351,13 +350,6 @@ def test_what_is_not_proved_is_judged_by_the_envelope_with_a_reason() -> None:
         told = why({"verdict": verdict, "witness": witness, "necessity": necessity})
         assert told.startswith(words)
         assert bool(told) is bool(words)
-
-
-def test_quick_keeps_one_level_alone(tmp_path: Path) -> None:
-    path = written(tmp_path, ["q1 <= 1 m"])
-    case = load(str(path), ["envelope.alpha=[0]"])
-    assert quick(case).envelope.alpha == (0.0,)
-    assert quick(load(str(path), ["envelope.alpha=[0, 0.5, 1]"])).envelope.alpha == (0.0, 1.0)
 
 
 def test_an_undecided_limit_is_told_with_its_reason_before_its_degrees(

@@ -1,0 +1,121 @@
+"""Tables for people of a run's summary: the modulus, the peaks of the motion, the questions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from alphacut.frame.structures.quantities import Output
+from alphacut.io.files import Document
+from alphacut.io.text_table import text_table
+from alphacut.io.units import axis_prefix, fixed
+from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.stages.vibration import update
+from alphacut.stages.vibration.decision import degree, verdict_of
+
+SHORT = {"guaranteed": "guaranteed", "estimated": "estimated", "inner": "attained"}
+"""First words of natures, for a column."""
+
+
+def run_tables(summary: Document) -> str:
+    """Every table of a run."""
+    text = text_table(MODULUS, rows) if (rows := [*modulus_rows(summary)]) else ""
+    studies = summary.get("envelopes", {})
+    if studies:
+        text += "\n" * bool(text) + peaks_table(studies)
+    return text + "".join(f"{line}\n" for line in answers(summary))
+
+
+MODULUS = ("material", "most plausible", "range at α = 0", "nature", "± error")
+
+
+def modulus_rows(summary: Document) -> Iterator[Sequence[str]]:
+    """E and ν: computed, of an image, or given."""
+    if cell := summary.get("modulus"):
+        error = sum(cell["error"].values()) * float(cell["upper_GPa"])
+        yield ("E, GPa", *both(cell["E_GPa"]), nature(cell["nature"]), f"{error:.1e}")
+        yield ("ν", *both(cell["nu_cuts"]), nature(cell["nature"]), "")
+        low, high = cell["references"]["hashin_shtrikman_E_GPa"]
+        yield ("Hashin–Shtrikman bounds of E, GPa", between(low, high), "", "", "")
+    if image := summary.get("image"):
+        cuts = image["cuts"]
+        yield ("E, GPa", *both(cuts["E_GPa"]), nature(cuts["nature"][0]), "")
+    if of_case := summary.get("given_modulus"):
+        yield ("E, GPa", *both(of_case["E_GPa"]), "of the case", "")
+
+
+def both(cuts: Document) -> tuple[str, str]:
+    """Cuts on the highest level and on the lowest."""
+    lower, upper = cuts["lower"], cuts["upper"]
+    return between(lower[-1], upper[-1]), between(lower[0], upper[0])
+
+
+def between(low: float, high: float) -> str:
+    """An interval, or one number."""
+    return " … ".join(dict.fromkeys((fixed(float(low), 4), fixed(float(high), 4))))
+
+
+def nature(text: str) -> str:
+    """The nature of bounds in one word."""
+    return SHORT.get(text.partition(",")[0].partition(":")[0].split()[0], text.split(",")[0])
+
+
+def motion_table(name: str, study: Document) -> str:
+    """Peaks of one envelope."""
+    return peaks_table({name: study})
+
+
+def peaks_table(studies: Document) -> str:
+    """Peaks of the magnitude of every output of every study.
+
+    Columns are the peak on the highest level, on the one next to 0.5, and on the lowest.
+    """
+    first = next(iter(studies.values()))
+    alpha = [float(x) for x in first["alpha"]]
+    levels = list(dict.fromkeys((len(alpha) - 1, middle(alpha), 0)))
+    head = ["largest magnitude", *(f"α = {alpha[k]:g}" for k in levels), "nature", "± error"]
+    rows = []
+    for name, study in studies.items():
+        for output, peak in study["peak"].items():
+            of = f" ({name})" if len(studies) > 1 else ""
+            rows.append([*peak_row(output, of, peak, levels), error_of(study, output, peak)])
+            rows[-1].insert(-1, nature(study["nature"]))
+    return text_table(head, rows)
+
+
+def middle(alpha: Sequence[float]) -> int:
+    """Place of the level next to 0.5."""
+    return min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5))
+
+
+def peak_row(output: str, of: str, peak: Document, levels: Sequence[int]) -> list[str]:
+    """An output with its unit, and its peaks on some levels."""
+    factor, unit = axis_prefix(float(peak["upper"][0]), Output(output).unit)
+    ends = [[factor * float(peak[end][k]) for end in ("lower", "upper")] for k in levels]
+    words = [" … ".join(dict.fromkeys(f"{x:.4g}" for x in pair)) for pair in ends]
+    return [f"{output}, {unit}{of}", *words]
+
+
+def error_of(study: Document, output: str, peak: Document) -> str:
+    """Declared error of an output in the unit of its row; empty where there is none."""
+    if "error" not in study:
+        return ""
+    factor, _ = axis_prefix(float(peak["upper"][0]), Output(output).unit)
+    return f"{factor * float(study['error'][output]):.2g}"
+
+
+def answers(summary: Document) -> Iterator[str]:
+    """A line for each question, what drives the width, and what measured modes leave."""
+    if "update" in summary:
+        yield from update.sentences(summary["update"])
+    for name, one in summary.get("decision", {}).get("limits", {}).items():
+        words = (degree(*one[kind]) for kind in ("possibility", "necessity"))
+        possible, necessary = words
+        verdict = verdict_of(summary["decision"], name)
+        yield f"{name}: exceeding possible to {possible}, necessary to {necessary}: {verdict}"
+    for event in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
+        yield outcomes.sentence(event)
+    for of, shares in summary.get("shares", {}).items():
+        ranked = sorted(shares.items(), key=lambda pair: -pair[1])[:3]
+        if of == "E" or of == next(reversed(summary["shares"])):
+            words = ", ".join(f"{name} {share:.0%}" for name, share in ranked)
+            yield f"width of {of} comes from {words}"
