@@ -186,23 +186,3 @@ def test_a_package_imports_fast_and_without_dolfinx(package):
     ]
     assert not HEAVY & set(runs[0])
     assert min(float(run[0]) for run in runs) < SECONDS
-
-
-@pytest.mark.parametrize(
-    ("method", "exclude", "loaded"),
-    [("auto", (), ""), ("auto", ("series",), "basix"), ("prism", (), "petsc4py.PETSc")],
-)
-def test_what_a_model_may_need_is_loaded_before_its_clock_starts(method, exclude, loaded):
-    choice = f"CellChoice({method!r}, exclude={exclude!r})"
-    program = (
-        "import sys; from alphacut.stages.material.cell import CellChoice; from alphacut.stages.material.cell_models import cell_model;"
-        f" cell_model({choice})"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", f"{program}; print(*sys.modules)"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    modules = set(told.stdout.split())
-    assert loaded in modules if loaded else not HEAVY & modules
