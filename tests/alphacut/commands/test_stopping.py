@@ -1,7 +1,6 @@
 """SIGTERM and SIGHUP end a command as Ctrl-C does: one line, what was finished kept, no orphans."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -95,13 +94,6 @@ def test_what_nohup_ignores_stays_ignored(monkeypatch, capfd):
         signal.signal(signal.SIGHUP, before)
 
 
-def test_a_reader_that_wants_no_more_is_no_error_of_petsc():
-    words = f"cell {PAPER} --method prism --mesh-size 0.3 --layers 2"
-    piped = f"({sys.executable} -m alphacut {words}; echo status $? >&2) | true"
-    done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True, cwd=ROOT)
-    assert done.stderr == "status 0\n"
-
-
 def test_a_signal_that_python_drops_is_heard_when_it_comes_again(monkeypatch):
     monkeypatch.setattr(interruption, "ONCE", 0.2)
 
@@ -117,27 +109,3 @@ def test_a_signal_that_python_drops_is_heard_when_it_comes_again(monkeypatch):
         time.sleep(0.3)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
-
-
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="no mpirun")
-def test_a_signal_to_one_rank_ends_all():
-    words = ["cell", PAPER, "--method", "prism", "--mesh-size", "0.04", "--layers", "12", "--quiet"]
-    command = ["mpirun", "-n", "2", sys.executable, "-m", "alphacut", *words]
-    with started(command, stdout=-1) as job:
-        ranks, before = [], time.monotonic()
-        while len(ranks) < 2 and time.monotonic() < before + 60:
-            listed = subprocess.run(
-                ["ps", "-eo", "pid=,pgid=,ppid="], capture_output=True, text=True
-            )
-            rows = [line.split() for line in listed.stdout.splitlines()]
-            ranks = [int(pid) for pid, _, parent in rows if parent == str(job.pid)]
-            time.sleep(0.05)
-        time.sleep(2.5)  # into the solution
-        os.kill(ranks[-1], signal.SIGTERM)
-        try:
-            job.communicate(timeout=60)
-        finally:
-            for rank in [*ranks, job.pid]:  # each rank has a group of its own
-                with suppress(ProcessLookupError):
-                    os.kill(rank, signal.SIGKILL)
-        assert job.returncode != 0

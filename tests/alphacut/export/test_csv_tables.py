@@ -53,36 +53,6 @@ def test_a_table_of_too_many_rows_is_left_out_and_that_is_said(results, monkeypa
     assert "envelope_all.nc holds them as NetCDF" in told
 
 
-def test_the_report_writes_them_on_demand(tmp_path, capfd):
-    case = str(Path(__file__).parents[3] / "cases" / "pendulum.toml")
-    out = tmp_path / "run"
-    assert main(["run", case, "--quick", "--no-figures", "--quiet", "--out", str(out)]) == 0
-    capfd.readouterr()
-    folder = tmp_path / "tables"
-    assert main(["report", str(out), "--csv", str(folder), "--json", "-"]) == 0
-    told = json.loads(capfd.readouterr().out)
-    assert sorted(told["tables"]) == sorted(map(str, folder.glob("*.csv")))
-    stored = xarray.load_dataset(out / "envelope_all.nc")
-    name = str(stored["output"].values[-1])
-    with (folder / f"envelope_all-{name}.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert {row["nature"] for row in rows} == {str(stored.attrs["nature"])}
-    assert list(rows[0])[:3] == ["time [s]", "lower at alpha 0 [N]", "upper at alpha 0 [N]"]
-    upper = stored["upper"].sel(output=name, alpha=0.0).values
-    assert [float(row["upper at alpha 0 [N]"]) for row in rows] == upper.tolist()
-    with (folder / "peaks.csv").open(encoding="utf-8") as file:
-        peaks = list(csv.DictReader(file))
-    assert len(peaks) == stored["output"].size * stored["alpha"].size
-    assert {row["unit"] for row in peaks} == {"N"}
-    assert {row["nature"] for row in peaks} == {str(stored.attrs["nature"])}
-    last = stored["peak"].sel(output=name, alpha=1.0, bound="upper")
-    assert float(peaks[-1]["greatest peak at nodes"]) == float(last)
-    error = "error and what lies between nodes"
-    assert float(peaks[-1][error]) == float(stored["peak_error"].sel(output=name, alpha=1.0))
-    (tmp_path / "file").touch()
-    assert main(["report", str(out), "--csv", str(tmp_path / "file")]) == 2
-
-
 @pytest.mark.parametrize(
     ("more", "what"),
     [((), "error to be added"), (("inner_lower", "inner_upper"), "error within the bounds")],
