@@ -1,4 +1,4 @@
-"""Scenes without a case: a function of one's own, fuzzy numbers from data, a matrix structure."""
+"""Scenes without a case: a function of one's own and fuzzy numbers from data."""
 
 import numpy as np
 import pytest

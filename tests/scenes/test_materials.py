@@ -1,0 +1,70 @@
+"""Scenes 2 and 5: three samples of the product-space cell, and a micrograph as the cell."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = {  # a2, a4, modulus of the particles in GPa: E in GPa and ν at size 0.15 with 12 layers
+    (0.1, 0.1692, 80): (24.773342084495, 0.302194748870),
+    (0.001, 0.9975, 75): (22.803977321420, 0.300610589460),
+    (0.3145, 0.001, 85): (25.838067087830, 0.303097877986),
+}
+MICROGRAPH = [24.40941710097642, 26.508645442920326], [28.958025908990347, 26.51700242188462]
+
+
+def alphacut(*words):
+    """A command of the program that must succeed."""
+    command = [sys.executable, "-m", "alphacut", *map(str, words), "--quiet"]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+def test_a_sample_of_the_cell_has_its_golden_modulus(sample):
+    a2, a4, modulus = sample
+    sets = f"radius.a2={a2}", f"radius.a4={a4}", f"cell.inclusion_modulus='{modulus} GPa'"
+    text = alphacut("cell", "cases/paper.toml", "--json", "-", *(f"--set={one}" for one in sets))
+    result = json.loads(text)
+    young, poisson = SAMPLES[sample]
+    assert result["E_GPa"] == pytest.approx(young, rel=1e-6)
+    assert result["nu"] == pytest.approx(poisson, rel=1e-6)
+
+
+def micrograph(path, *, pixels=48, discs=6):
+    """A picture of discs that repeats itself, its edges four pixels wide."""
+    rng = np.random.default_rng(7)
+    y, x = np.mgrid[:pixels, :pixels] + 0.5
+    centres, radii = rng.random((2, discs)) * pixels, rng.uniform(4, 7, discs)
+    outside = np.full((pixels, pixels), 9.0)  # distance to the nearest circle
+    for cx, cy, radius in zip(*centres, radii, strict=True):
+        dx, dy = abs(x - cx), abs(y - cy)
+        away = np.hypot(np.minimum(dx, pixels - dx), np.minimum(dy, pixels - dy))
+        outside = np.minimum(outside, away - radius)
+    Image.fromarray(np.clip(130 - 30 * outside, 70, 190).astype(np.uint8)).save(path)
+
+
+def test_a_micrograph_has_its_proved_bounds(tmp_path):
+    micrograph(tmp_path / "cell.png")
+    text = (ROOT / "cases/composite.toml").read_text(encoding="utf-8")
+    text = text.replace("composite.png", "cell.png")
+    text = re.sub(r'^(stages = .*), "envelope"\]', r"\1]", text, flags=re.MULTILINE)
+    case = tmp_path / "case.toml"
+    case.write_text(text, encoding="utf-8")
+    out = tmp_path / "out"
+    sets = "cell.threshold=['[120, 130, 140]']", "modulus.alpha=[0, 1]"
+    alphacut("run", case, "--no-figures", f"--out={out}", *(f"--set={one}" for one in sets))
+    cuts = json.loads((out / "summary.json").read_text(encoding="utf-8"))["image"]["cuts"]
+    lower, upper = (np.array(cuts["E_GPa"][side]) for side in ("lower", "upper"))
+    old_lower, old_upper = np.array(MICROGRAPH)
+    assert (lower <= old_upper).all()  # two proofs of one number overlap
+    assert (old_lower <= upper).all()
+    assert (upper - lower <= 1.5 * (old_upper - old_lower)).all()
+    assert all(str(nature).startswith("guaranteed") for nature in np.atleast_1d(cuts["nature"]))
