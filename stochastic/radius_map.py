@@ -15,17 +15,20 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.stochastic.theta.law import Array, ThetaLaw, require_support
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stochastic.theta.law import ThetaLaw, require_support
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 Kind = Literal["hermite", "linear", "exponential"]
 KINDS: tuple[str, ...] = get_args(Kind)
+RADII = "radii inside (0, 1), in halves of the cell's side"
 
 
 class RadiusMap(Protocol):
     """Random radius of the cell problem: the law of θ and the map from θ.
 
-    Any object with these two will do; `require_map` is what every model of the cell asks of it.
+    Any object with these two will do; every model of the cell calls `require_map`.
     """
 
     @property
@@ -40,23 +43,18 @@ def require_map(radius_map: RadiusMap) -> None:
     """Refuse a law without a support, and radii outside (0, 1) at any of 65 places over θ.
 
     Raises:
-        ValueError: The map or its law is refused.
+        RefusedError: The map or its law is refused.
     """
     law = radius_map.distribution
     require_support(law.lower, law.upper)
     theta = np.linspace(law.lower, law.upper, 65)
     radii = np.asarray(radius_map(theta), float)
     if radii.shape != theta.shape:
-        raise ValueError(
-            f"the radius map returns the shape {radii.shape} for θ of the shape {theta.shape}; it"
-            " must return a radius for each θ"
-        )
+        allowed = f"the shape of θ, {theta.shape}"
+        raise RefusedError("shape of the radii", radii.shape, allowed)
     if not ((radii > 0) & (radii < 1)).all():
         place = int(np.argmin((radii > 0) & (radii < 1)))
-        raise ValueError(
-            f"the radius map gives r = {radii[place]:.4g} at θ = {theta[place]:.4g}; radii must"
-            " stay inside (0, 1), in halves of the cell's side"
-        )
+        raise RefusedError(f"r at θ = {theta[place]:.4g}", f"{radii[place]:.4g}", RADII)
 
 
 def _xi(law: ThetaLaw, theta: ArrayLike) -> Array:
@@ -76,7 +74,7 @@ class HermiteMap:
         distribution: Law of θ.
 
     Raises:
-        ValueError: r(θ) leaves (0, 1) somewhere on the support.
+        RefusedError: r(θ) leaves (0, 1) somewhere on the support.
     """
 
     a1: float
@@ -86,20 +84,12 @@ class HermiteMap:
     distribution: ThetaLaw = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
-        given = (self.a1, self.a2, self.a3, self.a4)
-        if not all(isinstance(value, Real) for value in given):
-            raise ValueError(
-                f"the radius map has a1, a2, a3, a4 = {', '.join(map(repr, given))}; each must be a"
-                " plain number"
-            )
-        finite = bool(np.isfinite(given).all())
-        low, high = self.extremes() if finite else (np.nan, np.nan)
+        values = (self.a1, self.a2, self.a3, self.a4)
+        plain = all(isinstance(value, Real) and np.isfinite(value) for value in values)
+        low, high = self.extremes() if plain else (np.nan, np.nan)
         if not (low > 0 and high < 1):  # also catches nan
-            raise ValueError(
-                f"the radius map a1 = {self.a1:g}, a2 = {self.a2:g}, a3 = {self.a3:g}, a4 ="
-                f" {self.a4:g} gives radii from {low:.4g} to {high:.4g}; they must stay inside (0,"
-                " 1), in halves of the cell's side: lower a1 or a3, or the slopes a2, a4"
-            )
+            key, value = f"r of the map {values}", f"{low:.4g} … {high:.4g}"
+            raise RefusedError(key, value, RADII, "lower a1 or a3, or the slopes a2, a4")
 
     @property
     def monomials(self) -> Array:
@@ -143,7 +133,7 @@ class ExponentialMap:
         distribution: Law of θ.
 
     Raises:
-        ValueError: A radius lies outside (0, 1).
+        RefusedError: A radius lies outside (0, 1).
     """
 
     a1: float
@@ -153,10 +143,7 @@ class ExponentialMap:
     def __post_init__(self) -> None:
         for name, radius in (("a1", self.a1), ("a3", self.a3)):
             if not 0 < radius < 1:
-                raise ValueError(
-                    f"the radius {name} of the exponential map is {radius:g}; it must lie inside"
-                    " (0, 1), in halves of the cell's side"
-                )
+                raise RefusedError(name, radius, RADII)
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Reduced radius at `theta`, any shape."""
@@ -192,7 +179,7 @@ class MapFamily:
         """The map with the parameters `names` of some values, dimensionless.
 
         Raises:
-            ValueError: Its radii leave (0, 1).
+            RefusedError: Its radii leave (0, 1).
         """
         a1, a3 = values["a1"], values["a3"]
         if self.kind == "exponential":

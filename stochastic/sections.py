@@ -1,44 +1,62 @@
-"""Sources of discs: simulated packings, a list of circles, or an image."""
+"""Sources of particles, simulated or measured, and their cells."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.errors import UnfitDataError
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.particles.circles_csv import CircleFile, MeasuredCircles
-from alphacut.stochastic.particles.discs import Discs
+from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
-from alphacut.stochastic.particles.packing import Packing, packing_seeds
+from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
-from alphacut.stochastic.tessellation.edge_correction import WholeCells, whole_cells
+from alphacut.stochastic.tessellation.power_cells import cell_volumes
+from alphacut.stochastic.tessellation.whole_cells import whole_cells
 
 Progress = Callable[[float], None]
+FEWEST = 5  # packings
 PATCHES = 5  # a single section is cut into 5 × 5 patches, drawn as wholes in the bootstrap
 
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """Discs of one section with their cells.
+    """Particles of one section or packing with their cells.
 
     Args:
-        diagram: Apollonius cells.
-        whole: Cells that count, and their weights.
-        read: What was read of a file; nothing of a packing.
+        particles: All particles.
+        whole: Indices of those whose cells count, shape (k,).
+        cells: Area in m² or volume in m³ of these cells, shape (k,).
+        weight: Cells that each stands for, shape (k,); 1 in a periodic box.
+        diagram: Apollonius cells of discs; None of spheres.
     """
 
-    diagram: Apollonius
-    whole: WholeCells
-    read: MeasuredCircles
+    particles: Particles
+    whole: Rows
+    cells: Array
+    weight: Array
+    diagram: Apollonius | None = None
 
     @property
-    def discs(self) -> Discs:
-        """The discs."""
-        return self.diagram.discs
+    def reduced_radii(self) -> Array:
+        """r_n = r/a of the whole cells, 2a the side of a square or cube as large (section 4.1)."""
+        sides = self.cells ** (1 / self.particles.shape.dimensions)
+        return np.asarray(2 * self.particles.radii[self.whole] / sides)
+
+
+def section_of(particles: Particles) -> Section:
+    """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
+    if particles.shape is not DISCS:
+        count = len(particles)
+        return Section(particles, np.arange(count), cell_volumes(particles), np.ones(count))
+    diagram = apollonius(particles)
+    whole = whole_cells(diagram)
+    return Section(particles, whole.disc, diagram.areas[whole.disc], whole.weight, diagram)
 
 
 @dataclass(frozen=True)
@@ -46,29 +64,31 @@ class Simulated:
     """Independent packings of one kind.
 
     Args:
-        packing: What each one is to be.
-        packings: How many, at least 5 (the bootstrap draws them as wholes).
+        packing: Specification of each.
+        packings: Their number, at least 5 (the bootstrap draws them as wholes).
 
     Raises:
-        ValueError: Fewer than five packings.
+        RefusedError: Fewer than five packings.
     """
 
     packing: Packing
     packings: int = 20
 
     def __post_init__(self) -> None:
-        if self.packings < 5:
-            raise ValueError(
-                f"{self.packings} packings were asked for; the bootstrap draws whole packings and"
-                " needs 5 or more"
-            )
+        if self.packings < FEWEST:
+            raise RefusedError("packing.packings", self.packings, f"numbers from {FEWEST} on")
+
+    @property
+    def shape(self) -> Shape:
+        """Kind of the particles."""
+        return self.packing.shape
 
     def sections(
         self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
     ) -> list[Section]:
-        """Every packing with its cells."""
+        """Every packing with its cells; the k-th depends on `seed` and k only."""
+        seeds = np.random.SeedSequence(seed).spawn(self.packings)
         made: list[Section] = []
-        seeds = packing_seeds(seed, self.packings)
         for section in (executor.map if executor else map)(
             _packed, [self.packing] * self.packings, seeds
         ):
@@ -88,46 +108,51 @@ class Measured:
 
     file: CircleFile | SectionImage
 
+    @property
+    def shape(self) -> Shape:
+        """Kind of the particles."""
+        return DISCS
+
     def sections(
         self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
     ) -> list[Section]:
         """The section with its cells; `seed` and `executor` do nothing here."""
-        section = _section(self.file.read())
+        section = section_of(self.file.read())
         if progress:
             progress(1.0)
         return [section]
 
 
-def reduced_radii(sections: list[Section]) -> AreaWeighted:
-    """Area-weighted r_n of all whole cells, grouped by section or patch.
+def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
+    """r_n of all whole cells, weighted by area or volume, grouped by section or patch.
 
     Raises:
-        UnfitDataError: A cell is smaller than its disc, so that discs overlap.
+        RefusedError: A cell is smaller than its particle, so that particles overlap.
     """
     values, weights, groups = [], [], []
     for number, section in enumerate(sections):
-        disc, discs = section.whole.disc, section.discs
-        values.append(section.diagram.reduced_radii[disc])
-        weights.append(section.diagram.areas[disc] * section.whole.weight)
-        patch = np.minimum(
-            (PATCHES * discs.centres[disc] / discs.size).astype(int), PATCHES - 1
-        ) @ (PATCHES, 1)
-        groups.append(np.full(len(disc), number) if len(sections) > 1 else patch)
+        values.append(section.reduced_radii)
+        weights.append(section.cells * section.weight)
+        single = len(sections) == 1
+        groups.append(_patches(section) if single else np.full(len(section.whole), number))
     sample = AreaWeighted.of(
         np.concatenate(values), np.concatenate(weights), np.concatenate(groups)
     )
-    if sample.values[-1] > np.sqrt(4 / np.pi):
-        raise UnfitDataError(
-            f"a cell has r_n = {sample.values[-1]:.4g}, more area of disc than of cell: discs"
-            " overlap; mend the data"
-        )
+    largest = sections[0].particles.shape.largest
+    if sample.values[-1] > largest:
+        cure = "mend the overlaps in the data"
+        raise RefusedError("r_n of a cell", sample.values[-1], f"values up to {largest:.4g}", cure)
     return sample
 
 
 def _packed(packing: Packing, seed: np.random.SeedSequence) -> Section:
-    return _section(MeasuredCircles(packing.make(np.random.default_rng(seed))))
+    """One packing with its cells."""
+    return section_of(packing.make(np.random.default_rng(seed)))
 
 
-def _section(read: MeasuredCircles) -> Section:
-    diagram = apollonius(read.discs)
-    return Section(diagram, whole_cells(diagram), read)
+def _patches(section: Section) -> Rows:
+    """Numbers of the patches in which the whole cells lie, shape (k,)."""
+    particles = section.particles
+    patch = (PATCHES * particles.centres[section.whole] / particles.size).astype(int)
+    base = PATCHES ** np.arange(len(particles.size))[::-1]
+    return np.asarray(np.minimum(patch, PATCHES - 1) @ base)

@@ -1,4 +1,4 @@
-"""Pictures of discs, in their image too, of spheres, and their cells (Figs. 3, 4, 5, 8, 9, 10)."""
+"""Pictures of discs, in their image too, and their cells (Figs. 3, 4, 5, 8, 9, 10)."""
 
 from __future__ import annotations
 
@@ -6,24 +6,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PALE
-from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.spheres.spheres import Spheres
+from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours
-from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PIXELS = 500  # along an edge of the view
-NEAREST = 24  # spheres among which the cell of a point is sought
-SPHERES = 60  # circles in the view, about
 
-
-def plot_discs(axes: Axes, discs: Discs, colour: str = BLUE, view: Array | None = None) -> None:
-    """Discs in their rectangle, or in its corner `view` (m), with their images, in mm."""
+def plot_discs(axes: Axes, discs: Particles, colour: str = BLUE, view: Array | None = None) -> None:
+    """Particles in their rectangle, or in its corner `view` (m), with their images, in mm."""
     from matplotlib.collections import EllipseCollection
 
     view = discs.size if view is None else view
@@ -66,7 +61,7 @@ def plot_cells(
     )
 
 
-def _shifts(discs: Discs) -> list[Array]:
+def _shifts(discs: Particles) -> list[Array]:
     """Shifts of the images of a section, in m; none but zero where it does not repeat."""
     return (
         [discs.size * (i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
@@ -75,7 +70,7 @@ def _shifts(discs: Discs) -> list[Array]:
     )
 
 
-def corner(discs: Discs, number: int = 120) -> Array:
+def corner(discs: Particles, number: int = 120) -> Array:
     """Width and height, in m, of a corner of the section that holds about `number` discs."""
     return np.asarray(discs.size * min(1.0, float(np.sqrt(number / len(discs)))))
 
@@ -87,7 +82,7 @@ def draw_cells(diagram: Apollonius) -> Figure:
     discs = diagram.discs
     view = corner(discs)
     drawn, both = plt.subplots(1, 2, figsize=(9.6, 5.0))
-    bare = apollonius(Discs(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
+    bare = apollonius(Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
     for axes, shown, title in zip(
         both, (bare, diagram), ("Voronoi cells", "Apollonius cells"), strict=True
     ):
@@ -100,7 +95,7 @@ def draw_cells(diagram: Apollonius) -> Figure:
     return drawn
 
 
-def draw_neighbours(discs: Discs) -> Figure:
+def draw_neighbours(discs: Particles) -> Figure:
     """Delaunay triangulation of equal discs beside their Voronoi cells (Figs. 5, 8)."""
     import matplotlib.pyplot as plt
     from matplotlib.collections import LineCollection
@@ -126,7 +121,7 @@ def draw_neighbours(discs: Discs) -> Figure:
     return drawn
 
 
-def draw_two_point(discs: Discs, generator: np.random.Generator) -> Figure:
+def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     """Why distances in pairs do not describe a packing (Figs. 3, 4).
 
     Left: around one disc, others drawn independently with the packing's own pair distances: they
@@ -135,7 +130,7 @@ def draw_two_point(discs: Discs, generator: np.random.Generator) -> Figure:
     """
     import matplotlib.pyplot as plt
 
-    reach = 3.5 * float(np.sqrt(discs.area / len(discs)))
+    reach = 3.5 * discs.spacing
     centre = int(np.argmin(np.hypot(*(discs.centres - discs.size / 2).T)))
     apart = discs.separation(np.full(len(discs), centre), np.arange(len(discs)))
     near = np.flatnonzero((np.hypot(*apart.T) < reach) & (np.arange(len(discs)) != centre))
@@ -163,7 +158,7 @@ def draw_two_point(discs: Discs, generator: np.random.Generator) -> Figure:
 
 
 def _from_pair_distances(
-    discs: Discs, number: int, reach: float, generator: np.random.Generator
+    discs: Particles, number: int, reach: float, generator: np.random.Generator
 ) -> Array:
     """Places drawn from the distances between all discs, shape (number, 2), in m."""
     from scipy.spatial import KDTree
@@ -183,7 +178,7 @@ def _overlaps(places: Array, radius: float) -> int:
 
 
 def _around(axes: Axes, places: Array, radius: float, reach: float, colours: list[str]) -> None:
-    """Discs of one radius around a centre, in mm."""
+    """Particles of one radius around a centre, in mm."""
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((0, 0), 1e3 * radius, color=ORANGE))
@@ -198,7 +193,7 @@ def _around(axes: Axes, places: Array, radius: float, reach: float, colours: lis
     axes.grid(visible=False)
 
 
-def draw_overlay(picture: Array, discs: Discs) -> Figure:
+def draw_overlay(picture: Array, discs: Particles) -> Figure:
     """The grey image with the outline of every circle that was taken from it.
 
     Args:
@@ -221,62 +216,3 @@ def draw_overlay(picture: Array, discs: Discs) -> Figure:
     axes.set_title(f"{len(discs)} circles; what has no outline was left out", fontsize="medium")
     axes.grid(visible=False)
     return drawn
-
-
-def draw_section(spheres: Spheres) -> Figure:
-    """Circles and walls in the plane through the middle of the cube (Fig. 10, in space)."""
-    import matplotlib.pyplot as plt
-
-    height = spheres.side / 2
-    above = spheres.centres[:, 2] - height
-    above -= spheres.side * np.round(above / spheres.side)
-    cut = np.abs(above) < spheres.radii
-    radii = np.sqrt(spheres.radii[cut] ** 2 - above[cut] ** 2)
-    circles = Discs(spheres.centres[cut, :2], radii, np.full(2, spheres.side))
-    view = corner(circles, SPHERES)
-    drawn, axes = plt.subplots(figsize=(5.6, 5.6))
-    plot_discs(axes, circles, "#9ecae1", view)
-    wall = wall_distance(spheres, height, float(view[0]))
-    width = 1e3 * float(view[0])
-    ink = np.zeros((*wall.shape, 4))
-    ink[..., :3] = [int(INK[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    ink[..., 3] = np.clip(1.5 - wall * PIXELS / view[0], 0, 1)
-    axes.imshow(ink, extent=(0, width, 0, width), origin="lower", zorder=3)
-    side = 1e3 * spheres.side
-    what = "a corner of a" if view[0] < spheres.side else "a"
-    axes.set_title(
-        f"{what} section of {side:.4g} × {side:.4g} mm: {len(radii)} of {len(spheres.radii)}"
-        " spheres are cut",
-        fontsize=10,
-    )
-    return drawn
-
-
-def wall_distance(spheres: Spheres, height: float, width: float) -> Array:
-    """Distance in m, in the plane, to the nearest wall of a power cell, about, at points of it.
-
-    Args:
-        spheres: Spheres in a periodic cube.
-        height: Third coordinate of the plane, in m.
-        width: Edge of the square in the plane's corner, in m.
-
-    Returns:
-        Shape (PIXELS, PIXELS), the second coordinate along the first axis.
-    """
-    from scipy.spatial import cKDTree
-
-    along = (np.arange(PIXELS) + 0.5) * width / PIXELS
-    x, y = np.meshgrid(along, along)
-    points = np.stack([x, y, np.full_like(x, height)], axis=-1).reshape(-1, 3)
-    tree = cKDTree(np.mod(spheres.centres, spheres.side), boxsize=spheres.side)
-    # the power distance never exceeds the squared one: the nearest centres hold the cell's own
-    count = min(NEAREST, len(spheres.radii))
-    apart, near = tree.query(np.mod(points, spheres.side), k=count)
-    power = apart**2 - spheres.radii[near] ** 2
-    first, second = np.argsort(power, axis=1)[:, :2].T
-    row = np.arange(len(points))
-    step = spheres.centres[near[row, first]] - spheres.centres[near[row, second]]
-    step -= spheres.side * np.round(step / spheres.side)
-    gap = power[row, second] - power[row, first]
-    distance = gap / np.maximum(2 * np.linalg.norm(step[:, :2], axis=1), 1e-300)
-    return np.asarray(distance.reshape(PIXELS, PIXELS))

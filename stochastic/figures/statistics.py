@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE
+from alphacut.stochastic.microstructure import Microstructure
 from alphacut.stochastic.microstructure_summary import to_dataset
-from alphacut.stochastic.tessellation.delaunay import neighbouring_values
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.radius_laws import RadiusLaw
+from alphacut.stochastic.tessellation.apollonius import Apollonius
+from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neighbours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from alphacut.stochastic.microstructure import FittedMap, Microstructure
-    from alphacut.stochastic.particles.radius_laws import RadiusLaw
-    from alphacut.stochastic.spheres.microstructure import SphereMicrostructure
-    from alphacut.stochastic.tessellation.apollonius import Apollonius
-    from alphacut.stochastic.tessellation.delaunay import Neighbours
 
 REDUCED = "reduced radius $r_n$ = r/a"
 """Name of the axis."""
 
 
-def draw_radii(radii: Array, law: RadiusLaw | None, particles: str = "discs") -> Figure:
+def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
     """Distribution function of the radii, and their law if there is one (Fig. 11)."""
     import matplotlib.pyplot as plt
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
-    values = 1e3 * np.sort(radii)
+    particles = result.study.shape.particles
+    values = 1e3 * np.sort(np.concatenate([one.particles.radii for one in result.sections]))
     axes.step(
         values,
         np.arange(1, len(values) + 1) / len(values),
@@ -46,17 +43,16 @@ def draw_radii(radii: Array, law: RadiusLaw | None, particles: str = "discs") ->
     return drawn
 
 
-def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figure:
-    """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one diameter (m)."""
+def draw_neighbour_statistics(discs: Particles) -> Figure:
+    """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one size."""
     import matplotlib.pyplot as plt
 
     drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
-    discs = sum(len(one.number) for one in direct)
     drawn.suptitle(
-        f"{discs} equal discs of the same area fraction, not those of the section", fontsize=10
+        f"{len(discs)} equal discs of the same area fraction, not those of the section", fontsize=10
     )
-    distance = np.concatenate([one.distances for one in direct]) / diameter
-    number = np.concatenate([one.number for one in direct])
+    direct = neighbours(discs)
+    distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
     left.hist(distance, bins=80, density=True, color=BLUE)
     left.axvline(1, color=ORANGE, label="one diameter")
     left.set(
@@ -77,12 +73,12 @@ def draw_neighbour_statistics(direct: list[Neighbours], diameter: float) -> Figu
     return drawn
 
 
-def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
+def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
     """Values of r_n of cells that share a wall, beside those of equal discs (Fig. 9)."""
     import matplotlib.pyplot as plt
 
     drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.4))
-    diagrams = [section.diagram for section in found.sections]
+    diagrams = [section.diagram for section in result.sections if section.diagram]
     for axes, shown, title in zip(
         both, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
     ):
@@ -96,31 +92,20 @@ def draw_correlation(found: Microstructure, equal: Apollonius) -> Figure:
     return drawn
 
 
-def draw_areas(found: FittedMap, cells: Iterable[tuple[Array, Array]]) -> Figure:
-    """Measure of the cells over r_n, with the limits and what no particle can reach (Fig. 12).
-
-    Args:
-        found: Limits and kind of the particles.
-        cells: Reduced radii and areas in m², or volumes in m³, of each section or packing.
-    """
+def draw_areas(result: Microstructure) -> Figure:
+    """Measure of the cells over r_n, with the limits and what no particle can reach (Fig. 12)."""
     import matplotlib.pyplot as plt
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
-    shape = found.study.shape
-    for radius, measure in cells:
-        inside = (radius >= found.limits[0]) & (radius <= found.limits[1])
+    shape, (low, high) = result.study.shape, result.limits
+    for section in result.sections:
+        radius, measure = section.reduced_radii, 1e3**shape.dimensions * section.cells
+        inside = (radius >= low) & (radius <= high)
         for part, size, colour in ((inside, 1.5, GREY), (~inside, 4, BLUE)):
-            axes.plot(
-                radius[part],
-                1e3**shape.power * measure[part],
-                ".",
-                ms=size,
-                color=colour,
-                rasterized=True,
-            )
-    for limit in found.limits:
+            axes.plot(radius[part], measure[part], ".", ms=size, color=colour, rasterized=True)
+    for limit in result.limits:
         axes.axvline(limit, color=BLUE, lw=1)
-    bound = shape.largest
+    bound, unit = shape.largest, {2: "mm²", 3: "mm³"}[shape.dimensions]
     axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
     axes.text(
         bound,
@@ -130,53 +115,50 @@ def draw_areas(found: FittedMap, cells: Iterable[tuple[Array, Array]]) -> Figure
         va="top",
         color=GREY,
     )
-    axes.set(
-        xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{shape.unit}]", xlim=(0, bound + 0.07)
-    )
-    low, high = found.limits
-    kept = f"{100 * found.share_kept:.2f} % of the {shape.cells}"
+    axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
+    kept = f"{100 * result.share_kept:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} keep {kept}")
     return drawn
 
 
-def draw_pbox(found: FittedMap) -> Figure:
+def draw_pbox(result: Microstructure) -> Figure:
     """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
     import matplotlib.pyplot as plt
 
     drawn, (axes, apart) = plt.subplots(
         2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
     )
-    table = to_dataset(found)
+    table = to_dataset(result)
     radius, share = table["r_n"].values, table["cdf"].values
     for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
         scale = 1 if panel is axes else 100
-        low, high = np.maximum(share - found.allowed, 0), np.minimum(share + found.allowed, 1)
+        low, high = np.maximum(share - result.allowed, 0), np.minimum(share + result.allowed, 1)
         panel.fill_between(
             radius,
             scale * (low - base),
             scale * (high - base),
             color=PALE,
-            label=f"band of ± {found.allowed:.2g}",
+            label=f"band of ± {result.allowed:.2g}",
         )
         panel.plot(
-            radius, scale * (share - base), color=BLUE, label=f"{len(found.kept.values)} cells"
+            radius, scale * (share - base), color=BLUE, label=f"{len(result.kept.values)} cells"
         )
         panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
         panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
-    axes.set(ylabel=f"{found.study.shape.cells}-weighted share", ylim=(0, 1.02))
+    axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
     apart.set(xlabel=REDUCED, ylabel="less the fit [%]")
     axes.legend(loc="upper left")
     return drawn
 
 
-def draw_map(found: FittedMap) -> Figure:
+def draw_map(result: Microstructure) -> Figure:
     """The map θ ↦ r_n: the sample's own, the fitted cubic and its fuzzy bounds (eq. 12)."""
     import matplotlib.pyplot as plt
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
-    fit, box = found.pbox.fit, found.pbox
+    fit, box = result.pbox.fit, result.pbox
     theta = np.linspace(fit.distribution.lower, fit.distribution.upper, 601)
-    axes.step(theta, found.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
+    axes.step(theta, result.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
     axes.plot(
         theta,
         fit.map((box.a2[1], box.a4[1]))(theta),
@@ -187,34 +169,4 @@ def draw_map(found: FittedMap) -> Figure:
     axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy a2, a4")
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
-    return drawn
-
-
-def draw_radii_bounds(found: SphereMicrostructure) -> Figure:
-    """Bounds of the spheres' radii by volume that the section leaves, and the packings' own."""
-    import matplotlib.pyplot as plt
-
-    box = found.source.section
-    assert box is not None
-    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
-    axes.fill_between(
-        1e3 * box.edges,
-        box.lower,
-        box.upper,
-        color=GREY,
-        alpha=0.4,
-        lw=0,
-        label=f"bounds at {100 * box.level:g} %",
-    )
-    for number, packed in enumerate(found.packed):
-        radii = np.sort(np.concatenate([one.radii for one in packed.packings]))
-        share = np.cumsum(radii**3) / (radii**3).sum()
-        colour, wide = (BLUE, 1.6) if number == 0 else (ORANGE, 0.8)
-        label = ("packed", "possible laws")[number] if number < 2 else None
-        axes.step(1e3 * radii, share, color=colour, lw=wide, where="post", label=label)
-    axes.set(xlabel="radius of the spheres [mm]", ylabel="share of their volume", ylim=(0, 1.02))
-    axes.set_title(
-        f"spheres below {1e3 * box.edges[0]:.3g} mm: the section does not tell", fontsize=10
-    )
-    axes.legend(loc="upper left")
     return drawn

@@ -9,44 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.stochastic.errors import UnfitDataError
-from alphacut.stochastic.theta.truncated_normal import Array
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Particles of one kind in their cells, of two or three dimensions.
-
-    Args:
-        particles: discs or spheres.
-        cells: Measure of a cell: area or volume.
-        unit: Unit of that measure, for lengths in mm.
-        power: Dimensions.
-        factor: Share of a cell of side 2 that a particle of radius 1 takes.
-        reach: Greatest r_n that the limits may keep where none are given; None where more is
-            refused.
-    """
-
-    particles: str
-    cells: str
-    unit: str
-    power: int
-    factor: float
-    reach: float | None = None
-
-    @property
-    def largest(self) -> float:
-        """r_n of a particle that fills its cell."""
-        return float(self.factor ** (-1 / self.power))
-
-    def shares(self, radii: ArrayLike) -> Array:
-        """Share of a cell that particles take, of reduced radii of any shape."""
-        return np.asarray(self.factor * np.asarray(radii, float) ** self.power)
-
-
-DISCS = Shape("discs", "area", "mm²", 2, np.pi / 4)
-# a sphere of r_n near 1 stands nearly against its images; beyond, no cubic cell holds it
-SPHERES = Shape("spheres", "volume", "mm³", 3, np.pi / 6, 0.97)
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +37,7 @@ class AreaWeighted:
         """Sort the values and scale the weights (equal by default) to the sum 1.
 
         Raises:
-            ValueError: There are no values, one is not finite, or a weight is negative.
+            RefusedError: There are no values, one is not finite, or a weight is negative.
         """
         values = np.asarray(values, float).ravel()
         weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
@@ -85,10 +49,8 @@ class AreaWeighted:
         if not len(values) or not (
             np.isfinite(values).all() and (weights >= 0).all() and weights.sum() > 0
         ):
-            raise ValueError(
-                f"got {len(values)} reduced radii; they need to be finite, at least one, with"
-                " weights that are not negative"
-            )
+            allowed = "one or more, finite, with weights from 0 on"
+            raise RefusedError("reduced radii", f"{len(values)} values", allowed)
         order = np.argsort(values, kind="stable")
         return cls(values[order], weights[order] / weights.sum(), labels[order])
 
@@ -120,11 +82,6 @@ class AreaWeighted:
         """Mean of r_n."""
         return float(self.weights @ self.values)
 
-    @property
-    def area_fraction(self) -> float:
-        """Σ w π/4 r_n² (eq. 10)."""
-        return float(np.pi / 4 * self.weights @ self.values**2)
-
     def share_within(self, lower: float, upper: float) -> float:
         """Share of area with lower ≤ r_n ≤ upper."""
         return float(self.weights[(self.values >= lower) & (self.values <= upper)].sum())
@@ -137,14 +94,13 @@ class AreaWeighted:
         """Part of the sample within the limits, its weights scaled to the sum 1.
 
         Raises:
-            UnfitDataError: Fewer than ten values lie within them.
+            RefusedError: Fewer than ten values lie within them.
         """
         inside = (self.values >= lower) & (self.values <= upper)
         if inside.sum() < 10:
-            raise UnfitDataError(
-                f"only {int(inside.sum())} of {len(self.values)} reduced radii lie between"
-                f" {lower:g} and {upper:g}; 10 needed: take wider limits, or more particles"
-            )
+            value = f"[{lower:g}, {upper:g}] with {int(inside.sum())} reduced radii"
+            allowed = "limits that hold ten or more"
+            raise RefusedError("limits", value, allowed, "take more particles")
         return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
 
     def capped(self, most: float) -> AreaWeighted:
@@ -163,15 +119,13 @@ class AreaWeighted:
         """Half width c of the bootstrap band: sup |F* − F| ≤ c in a share `level` of the resamples.
 
         Raises:
-            UnfitDataError: There are fewer than five groups to draw from.
+            RefusedError: There are fewer than five groups to draw from.
         """
         groups = int(self.groups.max()) + 1
         if groups < 5:
-            raise UnfitDataError(
-                "a bootstrap needs five packings, or cells in five patches of a section; these lie"
-                f" in {groups} of the 25 patches: is the size of the section that of its particles,"
-                " in their unit? If so, take more particles"
-            )
+            allowed = "five packings, or cells in five of the 25 patches of a section, or more"
+            cure = "take more particles, and check the size of the section"
+            raise RefusedError("groups of the bootstrap", groups, allowed, cure)
         step = np.append(np.diff(self.values) > 0, True)
         farthest = [
             np.abs((np.cumsum(w) - self.cumulated)[step]).max()

@@ -8,21 +8,24 @@ the nearest monotone one in the same norm is taken.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.polynomial import polynomial
+from numpy.typing import ArrayLike
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.theta.quadrature import gauss_rule
-from alphacut.stochastic.theta.truncated_normal import Array, TruncatedNormal
+from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 # h1 … h4 of eq. 12 in powers of ξ
 SHAPES = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])
 XI = np.linspace(0, 1, 401)
-# least slope asked for at the points XI, in units of a3 − a1: keeps it positive between them
+# least slope at the points XI, in units of a3 − a1: keeps it positive between them
 MARGIN = 2e-5
 STEEPEST = 3.0  # times the chord's slope, up to which both slopes make a monotone cubic
 # their slopes, shape (4, 201)
@@ -31,7 +34,7 @@ SLOPES = np.array([polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES
 
 @dataclass(frozen=True)
 class HermiteFit:
-    """Least-squares fit of the slopes a2, a4 of a Hermite map with given ends.
+    """Least-squares fit of the slopes a2, a4 of a Hermite map between two ends.
 
     Args:
         a1: Lower limit of r_n.
@@ -56,13 +59,7 @@ class HermiteFit:
         # ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
         right = np.diff(self._integrals(share), axis=1) @ sample.values - self._ends
         best = np.linalg.solve(self._gram, right)
-        steep = SLOPES[[1, 3]]
-        floor = -self.rising  # monotone: steep.T @ (a2, a4) ≥ floor
-        a2, a4 = (
-            best
-            if (steep.T @ best >= floor - 1e-12).all()
-            else self._nearest_monotone(best, steep, floor)
-        )
+        a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
         return float(max(a2, 0)), float(max(a4, 0))
 
     def map(self, slopes: tuple[float, float]) -> HermiteMap:
@@ -131,29 +128,9 @@ class HermiteFit:
         """Slopes at the points XI while a2 = a4 = 0, less the margin for monotony, shape (401,)."""
         return np.asarray(self.a1 * SLOPES[0] + self.a3 * SLOPES[2] - MARGIN * (self.a3 - self.a1))
 
-    @property
-    def monotone_square(self) -> tuple[float, float]:
-        """Ends between which a2 and a4, each by itself, may lie anywhere in a monotone cubic.
-
-        Fritsch and Carlson 1980: slopes up to three times that of the chord. A cubic whose a2 is
-        steeper takes a4 from a shorter interval only (`slopes_beside`).
-        """
-        rise = self.a3 - self.a1
-        return MARGIN * rise, (STEEPEST - 4 * MARGIN) * rise
-
-    def slopes_beside(self, steep: float) -> tuple[float, float]:
-        """Ends of the slope with which a steeper one makes a monotone cubic.
-
-        Their ellipse α² + αβ + β² − 6α − 6β + 9 = 0 in slopes over the chord's, solved for β.
-
-        Args:
-            steep: The other slope, from three to four times that of the chord.
-        """
-        rise = self.a3 - self.a1
-        steepest, room = steep / rise, MARGIN**0.5
-        middle = (6 - steepest) / 2
-        half = max(0.0, np.sqrt(max(0.0, 3 * steepest * (4 - steepest))) / 2 - room)
-        return (middle - half) * rise, (middle + half) * rise
+    def is_monotone(self, slopes: ArrayLike) -> bool:
+        """True if the map with slopes (a2, a4) rises."""
+        return bool((self.rising + np.asarray(slopes) @ SLOPES[[1, 3]] >= -1e-12).all())
 
     @property
     def mean_shapes(self) -> tuple[float, float]:
@@ -161,35 +138,21 @@ class HermiteFit:
         weights, shape = self._shapes_at_nodes
         return float(weights @ shape[1]), float(-weights @ shape[3])
 
-    def _nearest_monotone(self, best: Array, steep: Array, floor: Array) -> Array:
-        """Minimiser of the quadratic form over the half planes steep.T @ a ≥ floor."""
-        inverse = np.linalg.inv(self._gram)
-        lift = (floor - steep.T @ best) / np.einsum("ik,ij,jk->k", steep, inverse, steep)
-        on_edges = (best[:, None] + inverse @ steep * lift)[:, lift > 0]
-        # feasible with a positive multiplier
-        optimal = (steep.T @ on_edges >= floor[:, None] - 1e-9).all(axis=0)
-        if optimal.any():
-            return np.asarray(on_edges[:, np.argmax(optimal)])
-        corners = _corners(steep, floor)
-        corners = corners[:, (steep.T @ corners >= floor[:, None] - 1e-9).all(axis=0)]
-        apart = corners - best[:, None]
-        return np.asarray(corners[:, np.argmin(np.einsum("ik,ij,jk->k", apart, self._gram, apart))])
+    def _nearest_monotone(self, best: Array) -> Array:
+        """Slopes of the monotone map nearest to the one with the slopes `best`.
 
+        Lawson & Hanson 1974, chapter 23: least distance programming by non-negative least squares.
+        """
+        from scipy.optimize import nnls
 
-def _corners(steep: Array, floor: Array) -> Array:
-    """Points where two of the lines steep.T @ a = floor meet, shape (2, m)."""
-    i, j = np.triu_indices(steep.shape[1], 1)
-    determinant = steep[0, i] * steep[1, j] - steep[1, i] * steep[0, j]
-    i, j, determinant = (array[np.abs(determinant) > 1e-12] for array in (i, j, determinant))
-    return np.asarray(
-        np.array(
-            [
-                floor[i] * steep[1, j] - floor[j] * steep[1, i],
-                floor[j] * steep[0, i] - floor[i] * steep[0, j],
-            ]
-        )
-        / determinant
-    )
+        root = np.linalg.cholesky(self._gram)  # |root.T (a - best)| is the distance
+        sides = np.linalg.solve(root, SLOPES[[1, 3]])
+        short = -self.rising - SLOPES[[1, 3]].T @ best  # what each slope lacks
+        scale = np.linalg.norm(sides, axis=0)
+        system = np.vstack([sides / scale, short / scale])
+        weights, _ = nnls(system, np.array([0.0, 0.0, 1.0]))
+        residual = system @ weights - (0, 0, 1)
+        return np.asarray(best + np.linalg.solve(root.T, -residual[:2] / residual[2]))
 
 
 @dataclass(frozen=True)
@@ -206,36 +169,29 @@ class SlopeBand:
     a4: tuple[float, float, float]
     level: float
 
-    def holds(self, a2: float, a4: float) -> bool:
-        """True if both slopes lie in the band."""
-        return self.a2[0] <= a2 <= self.a2[2] and self.a4[0] <= a4 <= self.a4[2]
-
     def monotone(self, fit: HermiteFit) -> SlopeBand:
         """The part of the band whose four corners are monotone maps.
 
-        The quantile function of a sample rises, so slopes beyond are those of no radius map. All
-        monotone maps of the band are kept, but for those in which one slope is steeper than three
-        times the chord's and the fitted one is not: such pairs fill no rectangle.
+        The quantile function of a sample rises, so slopes beyond are those of no radius map. The
+        ends are cut at slopes from zero to three times the chord's (Fritsch and Carlson 1980), then
+        moved towards the fitted slopes until all corners rise.
 
         Args:
             fit: Ends of the map and law of θ.
         """
-        (_, first, _), (_, second, _) = self.a2, self.a4
-        low, high = fit.monotone_square
-        a2, a4 = _within(self.a2, low, high), _within(self.a4, low, high)
-        if first > high:
-            a4 = _within(a4, *fit.slopes_beside(first))
-        if second > high:
-            a2 = _within(a2, *fit.slopes_beside(second))
+        rise, fitted = fit.a3 - fit.a1, np.array([self.a2[1], self.a4[1]])
+        ends = np.array([self.a2, self.a4])[:, [0, 2]]
+        square = (MARGIN * rise, (STEEPEST - 4 * MARGIN) * rise)
+        low = np.minimum(np.clip(ends[:, 0], *square), fitted)
+        high = np.maximum(np.clip(ends[:, 1], *square), fitted)
+        for share in np.linspace(1, 0, 201):
+            a, b = fitted + share * (low - fitted), fitted + share * (high - fitted)
+            if all(
+                fit.is_monotone(corner) for corner in itertools.product(*zip(a, b, strict=True))
+            ):
+                break
+        a2, a4 = ((float(x), float(y), float(z)) for x, y, z in zip(a, fitted, b, strict=True))
         return SlopeBand(a2, a4, self.level)
-
-
-def _within(
-    ends: tuple[float, float, float], low: float, high: float
-) -> tuple[float, float, float]:
-    """Ends of a band moved between two values, or as near to them as the fitted value lies."""
-    lower, fitted, upper = ends
-    return min(max(lower, low), fitted), fitted, max(min(upper, high), fitted)
 
 
 def slope_band(

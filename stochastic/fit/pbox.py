@@ -4,21 +4,20 @@ Since h2 ≥ 0 ≥ h4, the maps with a2, a4 anywhere in their supports lie betwe
 least radius at each θ belongs to (lower end of a2, upper end of a4), the greatest to (upper end of
 a2, lower end of a4). Containing the sample's distribution function save for a band of half width c,
 staying monotone, and the area between the two bounds are all linear in the four ends: a linear
-programme. Rows are added for the values that a solution leaves outside until none is.
+programme.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import polynomial
 
-from alphacut.stochastic.errors import RefusedError, UnfitDataError
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import SHAPES, SLOPES, HermiteFit, SlopeBand
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,6 @@ def least_pbox(
     band: float,
     *,
     hold: SlopeBand | None = None,
-    others: Sequence[AreaWeighted] = (),
 ) -> PBox:
     """Least p-box around the fitted map that contains `sample`, within a band of `band`.
 
@@ -83,22 +81,14 @@ def least_pbox(
         band: In probability, in [0, 1).
         hold: Slopes that the supports must hold as well, such as their own bootstrap band, as far
             as its maps are monotone.
-        others: Further samples within the ends, each to be contained as well.
 
     Raises:
-        UnfitDataError: No p-box of monotone cubics with these ends contains the sample.
+        FailedError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
     core = _core(modal, None if hold is None else hold.monotone(fit))
-    wish = _Containment(fit, (sample, *others), band)
-    chosen = np.unique(np.linspace(0, len(wish) - 1, min(len(wish), 400)).astype(int))
-    for _ in range(50):
-        ends = _solve(fit, core, wish, chosen)
-        worst = wish.breach(np.array(ends))
-        if worst.max(initial=0.0) <= 1e-9:
-            return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
-        chosen = np.unique(np.concatenate([chosen, np.argsort(worst)[-100:]]))
-    raise RefusedError("the p-box did not settle after 50 rounds of added values")
+    ends = _solve(fit, core, *_containment(fit, sample, band))
+    return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
 
 
 def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[float, float | None]]:
@@ -110,35 +100,20 @@ def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[floa
     return [(0, low[0]), (high[0], None), (0, low[1]), (high[1], None)]
 
 
-class _Containment:
-    """Rows of greatest radius ≥ x where the band ends below, and least ≤ x where it ends above."""
+def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
+    """Rows @ (a2L, a2U, a4L, a4U) ≤ right of containing a sample's band.
 
-    def __init__(self, fit: HermiteFit, samples: Sequence[AreaWeighted], band: float) -> None:
-        rows = [_steps(sample, band) for sample in samples]
-        self.share, self.values, self.up = (
-            np.concatenate(part) for part in zip(*rows, strict=True)
-        )
-        law = fit.distribution
-        xi = (law.quantile(self.share) - law.lower) / (law.upper - law.lower)
-        shape = np.array([polynomial.polyval(xi, h) for h in SHAPES])
-        self.excess = self.values - fit.a1 * shape[0] - fit.a3 * shape[2]
-        self.h2, self.h4 = shape[1], -shape[3]
-
-    def __len__(self) -> int:
-        return len(self.share)
-
-    def rows(self, chosen: Array) -> tuple[Array, Array]:
-        """Matrix and right-hand side of rows @ (a2L, a2U, a4L, a4U) ≤ right."""
-        up, h2, h4, excess = self.up[chosen], self.h2[chosen], self.h4[chosen], self.excess[chosen]
-        zero = np.zeros_like(h2)
-        greatest = np.stack([zero, -h2, h4, zero], axis=1)
-        least = np.stack([h2, zero, zero, -h4], axis=1)
-        return np.where(up[:, None], greatest, least), np.where(up, -excess, excess)
-
-    def breach(self, ends: Array) -> Array:
-        """By how much (in r_n) each row is broken."""
-        matrix, right = self.rows(np.arange(len(self)))
-        return np.asarray(matrix @ ends - right)
+    The greatest radius must reach the sample where its band ends below, the least where it ends
+    above.
+    """
+    share, values, up = _steps(sample, band)
+    law = fit.distribution
+    xi = (law.quantile(share) - law.lower) / (law.upper - law.lower)
+    h1, h2, h3, h4 = (polynomial.polyval(xi, h) for h in SHAPES)
+    excess, zero = values - fit.a1 * h1 - fit.a3 * h3, np.zeros_like(h2)
+    greatest = np.stack([zero, -h2, -h4, zero], axis=1)
+    least = np.stack([h2, zero, zero, h4], axis=1)
+    return np.where(up[:, None], greatest, least), np.where(up, -excess, excess)
 
 
 def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
@@ -155,12 +130,11 @@ def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
 
 
 def _solve(
-    fit: HermiteFit, core: list[tuple[float, float | None]], wish: _Containment, chosen: Array
+    fit: HermiteFit, core: list[tuple[float, float | None]], matrix: Array, right: Array
 ) -> list[float]:
-    """Ends (a2L, a2U, a4L, a4U) of least p-box area under the chosen rows, corners monotone."""
+    """Ends (a2L, a2U, a4L, a4U) of least p-box area under the rows, corners monotone."""
     from scipy.optimize import linprog
 
-    matrix, right = wish.rows(chosen)
     monotone = []
     for i in (0, 1):
         for j in (2, 3):
@@ -174,38 +148,9 @@ def _solve(
         b_ub=np.concatenate([right, np.tile(fit.rising + 1e-9, 4)]),
         bounds=core,
     )
-    if result.status == 0:
-        return [float(x) for x in result.x]
-    least = _least_breach(
-        matrix, right, np.concatenate(monotone), np.tile(fit.rising + 1e-9, 4), core
-    )
-    raise UnfitDataError(
-        f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution: the"
-        f" best leaves r_n = {wish.values[chosen[least[0]]]:.4g} outside by {least[1]:.2g}; widen"
-        " the limits, or the band (where none is given, by more confidence)"
-    )
-
-
-def _least_breach(
-    matrix: Array,
-    right: Array,
-    monotone: Array,
-    rising: Array,
-    core: list[tuple[float, float | None]],
-) -> tuple[int, float]:
-    """Place and size of the breach of the least bad p-box."""
-    from scipy.optimize import linprog
-
-    slack = np.concatenate([-np.ones((len(matrix), 1)), np.zeros((len(monotone), 1))])
-    result = linprog(
-        [0, 0, 0, 0, 1],
-        A_ub=np.hstack([np.concatenate([matrix, monotone]), slack]),
-        b_ub=np.concatenate([right, rising]),
-        bounds=[*core, (0, None)],
-    )
     if result.status != 0:
-        raise RefusedError(
-            "the slopes that the supports must hold make maps that are not monotone; take those of"
-            " a fit with these ends"
+        raise FailedError(
+            f"no p-box of monotone cubics from {fit.a1:g} to {fit.a3:g} contains the distribution",
+            "widen the limits, or the band",
         )
-    return int(np.argmax(matrix @ result.x[:4] - right)), float(result.x[4])
+    return [float(x) for x in result.x]

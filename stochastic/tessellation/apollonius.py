@@ -2,36 +2,32 @@
 
 The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j. It is
 star-shaped around c_i, and bounded by 1/ρ(φ) = max_j (a_j cos φ + b_j sin φ + c_j): one hyperbola
-per neighbour (see `hyperbola`), joined by an upper envelope (see `envelope`). A disc inside another
-one has no cell. In an open window the cells are cut at the window's edges, each of which acts as
-the wall towards the disc's own mirror image.
+per neighbour (see `wall`), joined by an upper envelope (see `upper_envelopes`). In an open window
+the cells are cut at the window's edges, each of which acts as the wall towards the disc's own
+mirror image.
 
 This differs from the paper in: 1. No triangulation of the discs is made; every cell stands on its
-own, so that touching, overlapping, hidden and cocircular discs need no special case.
+own, so that touching, overlapping, and cocircular discs need no special case.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.neighbour_search import (
-    Pairs,
-    Surroundings,
-    hidden_discs,
-    nearest_in_each_class,
-    size_classes,
-)
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.circle_envelope import (
     Arcs,
     anomaly,
     sector_area,
     upper_envelopes,
 )
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic.tessellation.surroundings import Pairs, pairs_within
+
+NEAR = 3.0  # mean spacings from a disc's edge within which discs bound its cell at first
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +36,7 @@ class Apollonius:
 
     Args:
         discs: The discs.
-        areas: Area of each cell, shape (n,), in m²; 0 where a disc is hidden.
-        hidden: Whether the disc lies inside another one and has no cell, shape (n,).
+        areas: Area of each cell, shape (n,), in m².
         cell: Disc whose cell each arc bounds, shape (m,), rising; arcs of a cell in the order of
             their angle.
         neighbour: Disc on the other side, shape (m,); the disc itself for its own image; −1 at the
@@ -51,9 +46,8 @@ class Apollonius:
         end: Angle where it ends, shape (m,), `start` ≤ `end` ≤ `start` + 2π.
     """
 
-    discs: Discs
+    discs: Particles
     areas: Array
-    hidden: Array
     cell: Array
     neighbour: Array
     apart: Array
@@ -62,9 +56,8 @@ class Apollonius:
 
     @property
     def reduced_radii(self) -> Array:
-        """r_n = r/a with a = √A/2 (section 4.1), shape (n,); nan for hidden discs."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.hidden, np.nan, 2 * self.discs.radii / np.sqrt(self.areas))
+        """r_n = r/a with a = √A/2 (section 4.1), shape (n,)."""
+        return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
     @property
     def cut(self) -> Array:
@@ -74,7 +67,7 @@ class Apollonius:
         return touched
 
     def wall(self) -> tuple[Array, Array]:
-        """Sums d + Δ and differences d − Δ of every arc (see `hyperbola`), shape (m,), in m."""
+        """Sums d + Δ and differences d − Δ of every arc (see `wall`), shape (m,), in m."""
         return _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
 
     def radius_at(self, arc: Array, angle: Array) -> Array:
@@ -84,51 +77,34 @@ class Apollonius:
         return np.asarray(near * far / ((far - near) + (far + near) * np.cos(psi)))
 
 
-def apollonius(discs: Discs) -> Apollonius:
-    """Apollonius diagram of `discs`, overlapping and hidden ones among them.
+def apollonius(discs: Particles) -> Apollonius:
+    """Apollonius diagram of `discs`, of which none lies inside another one.
 
-    The neighbours are certain, not guessed: cells from the nearest few discs of each size bound the
-    true ones, and a disc j can only cut the cell of i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j; all
-    such discs are then taken into account.
+    The neighbours are certain, not guessed: cells from the discs nearby bound the true ones, and a
+    disc j can only cut the cell of i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j; all such discs are
+    then taken into account.
 
     Args:
         discs: Periodic box or open window.
     """
-    hidden = hidden_discs(discs, 16 * np.finfo(float).eps * discs.size.max())
-    reach = 2 * _first_bound(discs, hidden) - discs.radii
-    surroundings = Surroundings(discs, reach)
+    widest = float(discs.radii.max())
+    largest = np.zeros(len(discs))
+    for _, walls in _walls(discs, np.full(len(discs), widest + NEAR * discs.spacing)):
+        largest += walls.largest_radius()
     areas, parts = np.zeros(len(discs)), []
-    for of in surroundings.portions():
-        walls = _Walls.towards(discs, surroundings.pairs(of, reach), of=of, hidden=hidden)
+    for _, walls in _walls(discs, 2 * largest - discs.radii + widest):
         areas += walls.areas()
         arcs, pairs = walls.arcs, walls.pairs
-        parts.append(
-            (
-                arcs.owner,
-                pairs.second[arcs.function],
-                pairs.apart[arcs.function],
-                arcs.start,
-                arcs.end,
-            )
-        )
-    return Apollonius(
-        discs, areas, hidden, *(np.concatenate(column) for column in zip(*parts, strict=True))
-    )
+        second, apart = pairs.second[arcs.function], pairs.apart[arcs.function]
+        parts.append((arcs.owner, second, apart, arcs.start, arcs.end))
+    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Apollonius(discs, areas, *columns)
 
 
-def _first_bound(discs: Discs, hidden: Array) -> Array:
-    """Upper bound of each cell's largest radius from a few neighbours, shape (n,)."""
-    largest: Array = np.zeros(len(discs))
-    of: Array = np.flatnonzero(~hidden)
-    number = math.ceil(24 / sum(1 for _ in size_classes(discs.radii)))
-    for _ in range(3):
-        few = _Walls.towards(discs, nearest_in_each_class(discs, number, of), of=of, hidden=hidden)
-        largest[of] = few.largest_radius()[of]
-        of = np.flatnonzero(largest - discs.radii > 3 * np.sqrt(discs.area / len(discs)))
-        number *= 4
-        if not len(of) or number > 4 * len(discs):
-            break
-    return largest
+def _walls(discs: Particles, reach: Array) -> Iterator[tuple[Rows, _Walls]]:
+    """Cells of portions of the discs with all others within reach as their neighbours."""
+    for of, pairs in pairs_within(discs, np.arange(len(discs)), reach):
+        yield of, _Walls.towards(discs, pairs, of=of)
 
 
 def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
@@ -142,19 +118,15 @@ def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[
 class _Walls:
     """Walls of every disc towards the others, and the envelopes that they form."""
 
-    discs: Discs
+    discs: Particles
     pairs: Pairs
     arcs: Arcs
 
     @classmethod
-    def towards(cls, discs: Discs, others: Pairs, *, of: Array, hidden: Array) -> _Walls:
-        """Cells of the discs `of` with the `others` and their own images as only neighbours.
-
-        Hidden discs, whose cell would be a line at most, are nobody's neighbours.
-        """
+    def towards(cls, discs: Particles, others: Pairs, *, of: Rows) -> _Walls:
+        """Cells of the discs `of` with the `others` and their own images as only neighbours."""
         near, far = _near_far(discs.radii, others.first, others.second, others.apart)
-        seen = (near > 0) & (far > 0) & ~hidden[others.first] & ~hidden[others.second]
-        pairs = Pairs.join([others.where(seen), _bounds(discs, of[~hidden[of]])])
+        pairs = Pairs.join([others.where((near > 0) & (far > 0)), _bounds(discs, of)])
         near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
         direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
         amplitude = 1 / near + 1 / far
@@ -205,7 +177,7 @@ class _Walls:
         return largest
 
 
-def _bounds(discs: Discs, of: Array) -> Pairs:
+def _bounds(discs: Particles, of: Array) -> Pairs:
     """Bounds of every cell: own images in a periodic box, mirror images in a window."""
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size

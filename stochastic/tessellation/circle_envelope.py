@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError
 
 
 def anomaly(psi: Array, near: Array, far: Array) -> Array:
@@ -81,7 +82,7 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
         counts: Functions in each group, shape (n,), sum k; a group of none has no arcs.
 
     Raises:
-        RuntimeError: A sweep does not close; this would be an error of the program.
+        FailedError: A sweep does not close; this would be an error of the program.
     """
     first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
     order = np.argsort(counts, kind="stable")
@@ -125,7 +126,7 @@ def _sweep(
             a, b, c, live, limit, phi = a[on], b[on], c[on], live[on], limit[on], phi[on]
         if not len(live):
             return _arcs(took, table, group)
-    raise RuntimeError(
+    raise FailedError(
         "an envelope did not close after four times as many steps as it has functions"
     )
 

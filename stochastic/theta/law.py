@@ -1,14 +1,15 @@
-"""What a law of the basic random variable θ has to offer (section 3.1), and the beta law."""
+"""Laws of the basic random variable θ (section 3.1), and the beta law."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[Any]  # of floats; shapes and units are said in words
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
 MASS_GAP = 1e-8
 """Most by which the integral of a density may miss the difference of its distribution function."""
@@ -45,35 +46,30 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
     """Refuse a support that is not two finite ends in order, `NARROWEST` or more apart.
 
     Raises:
-        ValueError: It is not.
+        RefusedError: It is not.
     """
     least = NARROWEST * max(abs(lower), abs(upper), unit)
     ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
     if not (ordered and upper - lower >= 0.999 * least):  # 9.999 … 10 is wide enough
-        raise ValueError(
-            f"the support of θ is [{lower}, {upper}]; it needs two finite ends, lower < upper"
-            + (f", {least:.2g} or more apart" if ordered else "")
-        )
+        apart = f", {least:.2g} or more apart" if ordered else ""
+        raise RefusedError("support of θ", [lower, upper], f"two finite ends, rising{apart}")
 
 
 def require_shares(share: Array) -> None:
     """Refuse probabilities outside [0, 1].
 
     Raises:
-        ValueError: One lies outside.
+        RefusedError: One lies outside.
     """
-    if not ((share >= 0) & (share <= 1)).all():
-        raise ValueError(
-            f"a probability is {share[~((share >= 0) & (share <= 1))].flat[0]:g}; each must lie in"
-            " [0, 1]"
-        )
+    if (wrong := ~((share >= 0) & (share <= 1))).any():
+        raise RefusedError("probability", share[wrong].flat[0], "values in [0, 1]")
 
 
 def panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
     """Edges of panels on which a rule integrates the density, rising, shape (m + 1,), m ≥ n.
 
     A panel whose integrals miss those by the distribution function is halved. Corners and
-    jumps of the density, steep ends and narrow peaks are found so without being named.
+    jumps of the density, steep ends and narrow peaks are met by halving alone.
 
     Args:
         law: Law of θ.
@@ -81,7 +77,7 @@ def panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array
         rule: Nodes and weights of a rule on [−1, 1].
 
     Raises:
-        ValueError: What all panels miss together stays above `MASS_GAP`: density and distribution
+        RefusedError: What all panels miss together stays above `MASS_GAP`: density and distribution
             function are not of one law, or the density is not finite.
     """
     for _ in range(_HALVINGS):
@@ -91,11 +87,9 @@ def panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array
             break
         edges = np.insert(edges, coarse + 1, (edges[coarse] + edges[coarse + 1]) / 2)
     if not (total := float(_mass_gaps(law, edges, rule).sum())) <= MASS_GAP:
-        raise ValueError(
-            f"the density of θ and its distribution function differ by {total:.1e} of probability,"
-            f" and at most {MASS_GAP:g} is allowed: pdf must be the derivative of cdf, finite"
-            " everywhere on the support"
-        )
+        key = "probability between the density of θ and its distribution function"
+        cure = "pdf must be the derivative of cdf, finite everywhere on the support"
+        raise RefusedError(key, f"{total:.1e}", f"differences up to {MASS_GAP:g}", cure)
     return edges
 
 
@@ -132,7 +126,7 @@ class Beta:
         upper: Right end of the support, greater than `lower`.
 
     Raises:
-        ValueError: A value lies outside its range.
+        RefusedError: A value lies outside its range.
     """
 
     p: float = 1.0
@@ -144,10 +138,7 @@ class Beta:
         require_support(self.lower, self.upper)
         for name, exponent in (("p", self.p), ("q", self.q)):
             if not 1 <= exponent <= LARGEST_EXPONENT:
-                raise ValueError(
-                    f"the exponent {name} of the beta law is {exponent:g}; it must lie in [1,"
-                    f" {LARGEST_EXPONENT:g}], where the density is finite"
-                )
+                raise RefusedError(name, exponent, f"exponents in [1, {LARGEST_EXPONENT:g}]")
 
     def xi(self, theta: ArrayLike) -> Array:
         """θ carried to [0, 1], any shape; ends beyond the support stay there."""

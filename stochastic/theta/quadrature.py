@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.theta.law import Array, ThetaLaw, panel_edges
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stochastic.theta.law import ThetaLaw, panel_edges
 
 
 @dataclass(frozen=True)
@@ -38,10 +40,6 @@ def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRu
     layers; where the density is smooth, the error of the mean of a smooth function falls with the
     power 2·points of the layer height.
     """
-    if layers < 1 or points < 1:
-        raise ValueError(
-            f"got {layers} layers with {points} points each; at least one of either is needed"
-        )
     edges = np.linspace(distribution.lower, distribution.upper, layers + 1)
     return _weighted(distribution, edges, np.polynomial.legendre.leggauss(points))
 
@@ -70,10 +68,10 @@ def gauss_rule(
         between: Ends of a part of the support; the whole of it if left out.
 
     Raises:
-        ValueError: No point is asked for, or density and distribution function disagree.
+        RefusedError: There is no point, or density and distribution function disagree.
     """
     if points < 1:
-        raise ValueError(f"got a rule of {points} points; at least one is needed")
+        raise RefusedError("points", points, "numbers from 1 on")
     fine = _fine_rule(distribution, 16 + 2 * points, between)
     held = fine.weights > _NEGLIGIBLE
     at, weights = fine.nodes[held], fine.weights[held]
@@ -98,9 +96,7 @@ def _fine_rule(law: ThetaLaw, points: int, between: tuple[float, float] | None) 
 
 
 FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
-LARGEST = (
-    30.0  # Lebesgue constant up to which a polynomial is trusted: rules in layers have far more
-)
+LARGEST = 30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
 
 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
@@ -140,8 +136,8 @@ def lebesgue(nodes: Array, at: Array) -> float:
     distance = nodes[:, None] - nodes
     np.fill_diagonal(distance, 1.0)
     gaps = np.asarray(at, float).ravel()[:, None] - nodes
-    found = np.zeros(len(gaps))
+    sums = np.zeros(len(gaps))
     for own in range(len(nodes)):
         others = np.arange(len(nodes)) != own
-        found += np.abs(np.prod(gaps[:, others] / distance[own, others], axis=1))
-    return float(found.max())
+        sums += np.abs(np.prod(gaps[:, others] / distance[own, others], axis=1))
+    return float(sums.max())

@@ -9,7 +9,9 @@ from math import erfc, sqrt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.stochastic.theta.law import Array, require_shares, require_support
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stochastic.theta.law import require_shares, require_support
 
 __all__ = ["Array", "TruncatedNormal"]
 
@@ -23,7 +25,7 @@ class TruncatedNormal:
         upper: Right end of the support, greater than `lower`.
 
     Raises:
-        ValueError: The ends are not finite or not in order.
+        RefusedError: The ends are not finite or not in order.
     """
 
     lower: float = -3.0
@@ -32,10 +34,8 @@ class TruncatedNormal:
     def __post_init__(self) -> None:
         require_support(self.lower, self.upper, unit=1.0)
         if not self.mass > 0:
-            raise ValueError(
-                f"the standard normal gives the support [{self.lower}, {self.upper}] of θ no"
-                " probability; it needs one nearer to 0"
-            )
+            cure = "the standard normal law gives this one no probability"
+            raise RefusedError("support of θ", [self.lower, self.upper], "ends nearer to 0", cure)
 
     @cached_property
     def mass(self) -> float:
@@ -79,5 +79,5 @@ class TruncatedNormal:
 def _normal(theta: ArrayLike) -> Array:
     """Distribution function of the standard normal law, any shape; SciPy would start later."""
     values = np.asarray(theta, float)
-    found = [erfc(-one / sqrt(2)) / 2 for one in values.ravel()]
-    return np.array(found).reshape(values.shape)
+    shares = [erfc(-one / sqrt(2)) / 2 for one in values.ravel()]
+    return np.array(shares).reshape(values.shape)

@@ -47,7 +47,7 @@ class Quantity:
         (lambda: F + True, "holds True; it needs plain numbers"),
         (lambda: Phase("3 GPa"), "Young's modulus is '3 GPa'; a phase takes plain numbers"),
         (lambda: Phase(F), "an input of fuzzy.propagate"),
-        (lambda: HermiteMap("a", 0.1, 0.2, 0.1), "each must be a plain number"),
+        (lambda: HermiteMap("a", 0.1, 0.2, 0.1), "radii inside"),
         (lambda: named("series").solve(RADIUS, MATRIX, STIFF), "a list of the inclusions' phases"),
         (
             lambda: named("series").solve(MATRIX, RADIUS, [STIFF]),

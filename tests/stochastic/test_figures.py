@@ -11,11 +11,10 @@ from alphacut.stochastic.figures.cells import (
     plot_cells,
 )
 from alphacut.stochastic.figures.statistics import draw_neighbour_statistics
-from alphacut.stochastic.particles.discs import Discs
 from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.tessellation.apollonius import apollonius
-from alphacut.stochastic.tessellation.delaunay import neighbours
 
 EQUAL = Packing(120, 0.2, LogNormalRadii(1e-3, 1e-3)).make(np.random.default_rng(1))
 MANY = Packing(800, 0.2, LogNormalRadii(1e-3, 4e-3)).make(np.random.default_rng(2))
@@ -28,7 +27,7 @@ def closed():
     plt.close("all")
 
 
-def walls(discs: Discs) -> list[np.ndarray]:
+def walls(discs: Particles) -> list[np.ndarray]:
     """What is drawn of a section's cells, in mm."""
     axes = plt.figure().add_subplot()
     plot_cells(axes, apollonius(discs))
@@ -69,7 +68,7 @@ def test_a_corner_of_a_section_has_the_cells_of_the_whole_and_says_so():
 def test_pictures_of_equal_discs_say_that_they_are_not_the_section():
     pictures = [
         draw_neighbours(EQUAL),
-        draw_neighbour_statistics([neighbours(EQUAL)], 2e-3),
+        draw_neighbour_statistics(EQUAL),
         draw_two_point(EQUAL, np.random.default_rng(1)),
     ]
     for drawn in pictures:

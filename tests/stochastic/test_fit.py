@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import integrate
 
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
-from alphacut.stochastic.errors import RefusedError
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
+from alphacut.stochastic.fit.hermite_fit import HermiteFit, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 
 LAW = TruncatedNormal()
@@ -38,7 +38,6 @@ def test_weighted_distribution_by_hand():
     assert sample.quantile([0.1, 0.5, 0.6, 1]).tolist() == [0.2, 0.2, 0.5, 0.8]
     assert sample.mean == pytest.approx(0.425)
     assert sample.share_within(0.3, 0.9) == pytest.approx(0.5)
-    assert sample.area_fraction == pytest.approx(np.pi / 4 * (0.02 + 0.0625 + 0.16))
 
 
 def test_limits_keep_their_share():
@@ -86,6 +85,11 @@ def test_fit_stays_monotone_and_nearest():
                 assert FIT.misfit(sample, slopes) <= FIT.misfit(sample, (other[0], other[1])) + 1e-5
 
 
+def holds(band, a2, a4):
+    """Both slopes lie in the band."""
+    return band.a2[0] <= a2 <= band.a2[2] and band.a4[0] <= a4 <= band.a4[2]
+
+
 def test_slopes_lie_in_their_band_for_twenty_seeds():
     for seed in range(100, 120):
         band = slope_band(
@@ -95,7 +99,7 @@ def test_slopes_lie_in_their_band_for_twenty_seeds():
             resamples=200,
             generator=np.random.default_rng(seed),
         )
-        assert band.holds(0.3, 0.5), seed
+        assert holds(band, 0.3, 0.5), seed
 
 
 def test_band_misses_a_wrong_map():
@@ -106,7 +110,7 @@ def test_band_misses_a_wrong_map():
         resamples=200,
         generator=np.random.default_rng(0),
     )
-    assert not band.holds(0.3, 0.5)
+    assert not holds(band, 0.3, 0.5)
 
 
 @pytest.mark.parametrize("slopes", [(0.01, 0.5), (2.15, 0.3), (0.3, 2.1)])
@@ -126,28 +130,6 @@ def test_supports_hold_the_true_slopes_and_only_monotone_maps(slopes):
         cut += band.monotone(FIT) != band
     assert held >= 0.95 * 40 - 3 * np.sqrt(40 * 0.95 * 0.05)
     assert cut > 15
-
-
-@pytest.mark.parametrize("steep", [3.2, 3.6, 3.99])
-def test_a_slope_steeper_than_three_chords_goes_with_few_others(steep):
-    chord = FIT.a3 - FIT.a1
-    low, high = (slope / chord for slope in FIT.slopes_beside(steep * chord))
-    for turned in (False, True):
-        for other, monotone in ((low, True), (high, True), (low - 0.01, False)):
-            pair = (other * chord, steep * chord) if turned else (steep * chord, other * chord)
-            assert rises(FIT.map(pair)) is monotone
-        middle = (low + high) / 2 * chord
-        ends = (0.0, steep * chord, 9.0), (-1.0, middle, 9.0)
-        first, second = ends[::-1] if turned else ends
-        kept = SlopeBand(first, second, 0.99).monotone(FIT)
-        assert kept.holds(*((middle, steep * chord) if turned else (steep * chord, middle)))
-        assert all(rises(FIT.map((a2, a4))) for a2 in kept.a2 for a4 in kept.a4)
-
-
-def test_slopes_of_no_monotone_map_cannot_be_held():
-    band = SlopeBand((9.0, 9.5, 9.9), (9.0, 9.5, 9.9), 0.99)
-    with pytest.raises(RefusedError, match="make maps that are not monotone"):
-        least_pbox(FIT, drawn(TRUE, 100, 1), 0.1, hold=band)
 
 
 def test_band_narrows_with_the_root_of_the_sample():
@@ -191,7 +173,7 @@ def two_sorts(number: int, seed: int) -> AreaWeighted:
 def test_pbox_contains_the_sample_but_for_the_band(sample, band):
     try:
         box = least_pbox(FIT, sample, band)
-    except RefusedError:
+    except FailedError:
         assert band == 0.0  # the staircase itself may need steeper ends than a monotone cubic has
         return
     assert box.contains(sample, band)
@@ -249,18 +231,15 @@ def test_pbox_area_is_the_area_between_the_bounds():
     assert box.area == pytest.approx(exact, rel=1e-10)
 
 
-def test_hopeless_samples_are_refused_with_the_reason():
+def test_hopeless_samples_are_refused():
     half = np.concatenate([np.full(500, 0.14), np.full(500, 0.86)])
-    with pytest.raises(
-        RefusedError,
-        match=r"no p-box of monotone cubics from 0\.13 to 0\.87 .* r_n = 0\.\d+ outside by",
-    ):
+    with pytest.raises(FailedError, match=r"no p-box of monotone cubics from 0\.13 to 0\.87"):
         least_pbox(FIT, AreaWeighted.of(half), 0.01)
     with pytest.raises(RefusedError, match="five packings"):
         AreaWeighted.of([0.2, 0.3], groups=[0, 0]).band(0.9, 10, np.random.default_rng(0))
-    with pytest.raises(RefusedError, match="0 of 100 reduced radii lie"):
+    with pytest.raises(RefusedError, match="with 0 reduced radii"):
         drawn(TRUE, 100, 0).truncated(0.5, 0.5001)
-    with pytest.raises(ValueError, match="finite"):
+    with pytest.raises(RefusedError, match="finite"):
         AreaWeighted.of([np.nan])
 
 

@@ -2,20 +2,12 @@
 it is not.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from alphacut.case.load import load
-from alphacut.rve import Phase
-from alphacut.stages.material.campaign import campaign
-from alphacut.stages.material.cell import CellChoice
-from alphacut.stages.material.cell_models import cell_model
-from alphacut.stochastic import HermiteMap, TruncatedNormal, gauss_rule, layered_rule
+from alphacut.stochastic import TruncatedNormal, gauss_rule, layered_rule
 from alphacut.stochastic.theta.quadrature import between_nodes, lebesgue
 
-CASES = Path(__file__).parents[2] / "cases"
 AT = np.linspace(-3, 3, 61)
 
 
@@ -38,8 +30,8 @@ def test_the_error_falls_with_the_nodes_of_a_gauss_rule(points, error):
     ],
 )
 def test_other_nodes_are_joined_without_overshoot(nodes):
-    found = between_nodes(nodes, np.sign(nodes), AT)
-    assert np.abs(found[(nodes[0] <= AT) & (nodes[-1] >= AT)]).max() <= 1 + 1e-12
+    curve = between_nodes(nodes, np.sign(nodes), AT)
+    assert np.abs(curve[(nodes[0] <= AT) & (nodes[-1] >= AT)]).max() <= 1 + 1e-12
 
 
 def test_the_lebesgue_constant_is_that_of_the_polynomials():
@@ -48,30 +40,6 @@ def test_the_lebesgue_constant_is_that_of_the_polynomials():
     basis = [np.polyval(np.polyfit(nodes, row, 2), at) for row in np.eye(3)]
     assert lebesgue(nodes, at) == pytest.approx(np.abs(basis).sum(0).max())
     assert lebesgue(np.arange(41.0), at) == np.inf
-
-
-def test_a_response_has_curves_good_to_four_digits_whatever_its_modulus_needs():
-    radius, matrix, particle = (
-        HermiteMap(0.1337, 0.1, 0.8663, 0.1692),
-        Phase(20e9, 0.3),
-        Phase(80e9, 0.3),
-    )
-    exact = cell_model(CellChoice("series")).solve(radius, matrix, [particle])[0].curve
-    truth = between_nodes(exact.theta, exact.s11, AT)
-    errors = []
-    for limited in (False, True):
-        changes = [
-            "modulus.method=auto",
-            "modulus.tolerance=1e-3",
-            *(["response.quantity=s11"] if limited else []),
-        ]
-        case = load(CASES / "porous.toml", changes)
-        assert (case.sections.response is not None) == limited
-        choice = campaign(case).task.choice
-        model = cell_model(CellChoice("auto", tolerance=choice.tolerance))
-        own = model.solve(radius, matrix, [particle])[0].curve
-        errors.append(np.abs(between_nodes(own.theta, own.s11, AT) / truth - 1).max())
-    assert errors[1] < 1e-4 < 1e-2 < errors[0]
 
 
 def test_a_curve_between_nodes_is_the_same_to_the_last_bit_each_time():

@@ -70,7 +70,7 @@ def test_a_support_is_no_narrower_than_its_rounding_allows(law):
     rule = gauss_rule(law(*ends), points=5)
     assert rule.weights.sum() == pytest.approx(1, abs=1e-12)
     assert ends[0] < rule.mean(rule.nodes) < ends[1]
-    with pytest.raises(ValueError, match=r"lower < upper, 0\.001 or more apart"):
+    with pytest.raises(ValueError, match=r"two finite ends, rising, 0\.001 or more apart"):
         law(9.999999, 10.0)
 
 
@@ -122,7 +122,7 @@ def test_density_that_is_not_of_its_distribution_is_refused():
 
 @pytest.mark.parametrize("exponents", [(0.5, 2), (2, np.nan), (1, 1e9)])
 def test_exponents_outside_their_range_are_refused(exponents):
-    with pytest.raises(ValueError, match=r"exponent . of the beta law"):
+    with pytest.raises(ValueError, match=r"exponents in \[1, 1000\]"):
         Beta(*exponents)
 
 
@@ -135,7 +135,7 @@ def test_exponential_map_of_a_normal_is_log_normal():
     assert rule.mean(logs**2) - rule.mean(logs) ** 2 == pytest.approx(
         (deviation * stats.truncnorm(-3, 3).std()) ** 2
     )
-    with pytest.raises(ValueError, match="radius a3 of the exponential map is 1"):
+    with pytest.raises(ValueError, match="a3 is 1"):
         ExponentialMap(0.2, 1.0)
 
 
@@ -163,9 +163,9 @@ class Wide:
 @pytest.mark.parametrize(
     ("radius", "words"),
     [
-        (Wide(), r"gives r = -1 at θ = -3; radii must stay inside \(0, 1\)"),
+        (Wide(), r"r at θ = -3 is -1; allowed: radii inside \(0, 1\)"),
         (Wide(Own(upper=np.inf)), "two finite ends"),
-        (Wide(rise=np.zeros((1, 1))), r"the shape \(1, 65\)"),
+        (Wide(rise=np.zeros((1, 1))), r"is \(1, 65\); allowed: the shape of θ"),
     ],
 )
 def test_maps_that_are_none_are_refused(radius, words):

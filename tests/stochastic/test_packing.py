@@ -1,35 +1,33 @@
-"""Packings: what is handed out is what was asked for, and what cannot be is refused with the
-numbers.
-"""
+"""Packings of discs and spheres: what comes out meets the specification."""
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy import stats
 from scipy.spatial.distance import pdist
 
-from alphacut.stochastic.errors import RefusedError
-from alphacut.stochastic.particles.discs import Discs
-from alphacut.stochastic.particles.packing import Packing, packings
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.particles.relaxation import Relaxation, close_pairs, relaxed, smallest_gap
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.stochastic.particles import relaxation
+from alphacut.stochastic.particles.neighbour_search import close_pairs, smallest_gap
+from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
+from alphacut.stochastic.particles.wicksell import unfolded
+from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
-EQUAL, TENFOLD, HUNDREDFOLD = (
-    LogNormalRadii(1e-3, 1e-3),
-    LogNormalRadii(1e-3, 1e-2),
-    LogNormalRadii(1e-4, 1e-2),
-)
+EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 
 
-def brute_gap(discs: Discs) -> float:
-    """Smallest surface distance over all pairs and nine images."""
+def brute_gap(particles: Particles) -> float:
+    """Smallest surface distance over all pairs and images."""
     best = np.inf
-    for shift in ((i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)):
-        apart = discs.centres[:, None] - discs.centres[None] + discs.size * shift
-        gap = np.hypot(apart[..., 0], apart[..., 1]) - discs.radii[:, None] - discs.radii
-        if shift == (0, 0):
+    for shift in product((-1, 0, 1), repeat=len(particles.size)):
+        apart = particles.centres[:, None] - particles.centres[None] + particles.size * shift
+        gap = np.linalg.norm(apart, axis=-1) - particles.radii[:, None] - particles.radii
+        if not any(shift):
             np.fill_diagonal(gap, np.inf)
         best = min(best, gap.min())
     return best
@@ -37,84 +35,85 @@ def brute_gap(discs: Discs) -> float:
 
 @pytest.mark.parametrize("method", ["auto", "sequential", "relaxed"])
 @pytest.mark.parametrize(
-    ("law", "fraction", "gap"),
+    ("law", "fraction", "gap", "shape"),
     [
-        (EQUAL, 0.2, 0.0),
-        (EQUAL, 0.4, 1e-4),
-        (TENFOLD, 0.4, 0.0),
-        (TENFOLD, 0.2, 1e-3),
-        (HUNDREDFOLD, 0.3, 0),
+        (EQUAL, 0.4, 1e-4, DISCS),
+        (TENFOLD, 0.4, 0.0, DISCS),
+        (LogNormalRadii(1e-4, 1e-2), 0.3, 0.0, DISCS),
+        (LogNormalRadii(1e-3, 2e-3), 0.2, 1e-5, SPHERES),
     ],
 )
-def test_packing_meets_the_wish(law, fraction, gap, method):
-    discs = Packing(400, fraction, law, gap, method).make(np.random.default_rng(1))
-    assert len(discs) == 400
-    assert discs.area_fraction == pytest.approx(fraction, abs=1e-12)
-    assert brute_gap(discs) >= gap - 1e-15
-    assert (
-        stats.kstest(discs.radii, law.cdf).pvalue > 1e-4
-        if law is not EQUAL
-        else (discs.radii == 1e-3).all()
-    )
+def test_a_packing_meets_its_specification(law, fraction, gap, shape, method):
+    packing = Packing(300, fraction, law, gap, method, shape).make(np.random.default_rng(1))
+    assert len(packing) % 300 == 0
+    assert packing.fraction == pytest.approx(fraction, abs=1e-12)
+    assert brute_gap(packing) >= gap - 1e-15
+    assert smallest_gap(packing) == pytest.approx(brute_gap(packing), abs=1e-12)
+    if law is not EQUAL:
+        assert stats.kstest(packing.radii, law.cdf).pvalue > 1e-4
 
 
 @pytest.mark.parametrize(
-    ("law", "fraction"), [(EQUAL, 0.6), (TENFOLD, 0.6), (EQUAL, 0.72), (TENFOLD, 0.76)]
+    ("law", "fraction", "shape"),
+    [(EQUAL, 0.72, DISCS), (TENFOLD, 0.76, DISCS), (LogNormalRadii(1, 2), 0.5, SPHERES)],
 )
-def test_dense_packings_beyond_sequential_addition(law, fraction):
-    discs = Packing(500, fraction, law).make(np.random.default_rng(2))
-    assert brute_gap(discs) >= 0
-    assert discs.area_fraction == pytest.approx(fraction, abs=1e-12)
-    with pytest.raises(RefusedError, match=r"found no place for \d+ of"):
-        Packing(500, fraction, law, method="sequential").make(np.random.default_rng(2))
-
-
-@pytest.mark.parametrize("discs", [1, 2, 3, 7])
-def test_few_discs(discs):
-    packing = Packing(discs, 0.4, EQUAL).make(np.random.default_rng(0))
+def test_dense_packings_beyond_sequential_addition(law, fraction, shape):
+    packing = Packing(300, fraction, law, shape=shape).make(np.random.default_rng(2))
     assert brute_gap(packing) >= 0
-    assert smallest_gap(packing) == pytest.approx(min(brute_gap(packing), packing.size[0] - 2e-3))
+    assert packing.fraction == pytest.approx(fraction, abs=1e-12)
+    with pytest.raises(FailedError, match=r"no place for \d+ of"):
+        Packing(300, fraction, law, 0.0, "sequential", shape).make(np.random.default_rng(2))
 
 
 def test_one_seed_gives_one_packing_whatever_the_workers():
-    wish = Packing(200, 0.3, TENFOLD)
-    alone = list(packings(wish, 4, seed=5))
+    source = Simulated(Packing(60, 0.3, TENFOLD), 5)
     with ThreadPoolExecutor(3) as pool:
-        shared = list(packings(wish, 4, seed=5, executor=pool))
-    more = list(packings(wish, 6, seed=5))
-    for a, b, c in zip(alone, shared, more[:4], strict=True):
-        assert (a.centres == b.centres).all()
-        assert (a.centres == c.centres).all()
-    assert not np.isclose(alone[0].centres, alone[1].centres).any()
+        shared = source.sections(5, executor=pool)
+    alone, more = source.sections(5), Simulated(source.packing, 6).sections(5)
+    for a, b, c in zip(alone, shared, more[:5], strict=True):
+        assert (a.particles.centres == b.particles.centres).all()
+        assert (a.particles.centres == c.particles.centres).all()
+    assert not np.isclose(alone[0].particles.centres, alone[1].particles.centres).any()
 
 
-def test_refused_for_another_number_fraction_gap_or_law():
-    wish = Packing(300, 0.3, TENFOLD, gap=1e-4)
-    good = wish.make(np.random.default_rng(3))
-    wish.check(good)
-    with pytest.raises(RefusedError, match="299 discs where 300"):
-        wish.check(Discs(good.centres[1:], good.radii[1:], good.size))
-    with pytest.raises(RefusedError, match=r"area fraction 0\.29"):
-        wish.check(Discs(good.centres, good.radii * 0.99, good.size))
-    with pytest.raises(RefusedError, match="gap of"):
-        wish.check(Discs(good.centres * [1, 0.5], good.radii, good.size))
-    with pytest.raises(RefusedError, match="differ from their law"):
-        Packing(300, 0.3, LogNormalRadii(1e-3, 2e-2)).check(good)
-    with pytest.raises(RefusedError, match="differ from their law"):
-        Packing(300, 0.3, EQUAL).check(good)
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("number", 0), ("fraction", 0.9), ("fraction", -0.1), ("gap", -1.0), ("gap", np.nan),
+        ("method", "poured"),
+    ],
+)  # fmt: skip
+def test_a_specification_without_meaning_is_refused(key, value):
+    with pytest.raises(RefusedError) as refused:
+        Packing(**({"number": 10, "fraction": 0.2, "radii": EQUAL} | {key: value}))
+    assert refused.value.value is value
 
 
-def test_impossible_wishes_are_refused_with_the_numbers():
-    with pytest.raises(RefusedError, match=r"1\.098.* still overlap"):
-        relaxed(
-            np.ones(100),
-            np.sqrt(100 * np.pi / 0.83),
-            gap=0.3,
-            generator=np.random.default_rng(0),
-            rule=Relaxation(steps=200),
-        )
-    with pytest.raises(RefusedError, match="does not fit"):
-        Packing(1, 0.8, EQUAL, gap=1e-3).make(np.random.default_rng(0))
+def _generator():
+    return np.random.default_rng(0)
+
+
+def test_what_finds_no_place_fails_with_the_numbers():
+    with pytest.raises(FailedError, match="still overlap"):
+        relaxation.relaxed(np.ones(40), np.full(2, 11.5), gap=0.2, generator=_generator())
+    with pytest.raises(RefusedError, match="gaps that leave"):
+        Packing(50, 0.2, EQUAL, gap=5e-3).make(_generator())
+    with pytest.raises(RefusedError, match="more than 100000"):
+        Packing(50, 0.2, EQUAL, gap=1e3).make(_generator())
+
+
+def test_particles_without_meaning_are_refused():
+    good = dict(centres=[(0.1, 0.1), (0.5, 0.5)], radii=[0.1, 0.1], size=(1, 1))
+    for change, key in (
+        (dict(radii=[0.1]), "radii"),
+        (dict(radii=[0.1, -0.2]), "radii[1]"),
+        (dict(radii=[0.1, np.nan]), "radii[1]"),
+        (dict(size=(1, 0)), "size"),
+        (dict(centres=[(0.1, 0.1), (2, 0.5)], periodic=False), "centres[1]"),
+    ):
+        with pytest.raises(RefusedError) as refused:
+            Particles(**(good | change))
+        assert refused.value.key == key
 
 
 def test_sequential_centres_are_uniform_and_without_direction():
@@ -122,35 +121,19 @@ def test_sequential_centres_are_uniform_and_without_direction():
     assert stats.kstest((packing.centres / packing.size).ravel(), "uniform").pvalue > 1e-4
     first, second = close_pairs(packing, 2e-3)
     apart = packing.separation(first, second)
-    assert (
-        stats.kstest(np.mod(np.arctan2(apart[:, 1], apart[:, 0]), np.pi) / np.pi, "uniform").pvalue
-        > 1e-4
-    )
+    angle = np.mod(np.arctan2(apart[:, 1], apart[:, 0]), np.pi) / np.pi
+    assert stats.kstest(angle, "uniform").pvalue > 1e-4
 
 
-def test_shaking_brings_discs_nearer_than_pushing_left_them():
-    still = relaxed(
-        np.ones(400),
-        np.sqrt(400 * np.pi / 0.6),
-        gap=0.0,
-        generator=np.random.default_rng(1),
-        rule=Relaxation(sweeps=0),
-    )
-    shaken = relaxed(
-        np.ones(400), np.sqrt(400 * np.pi / 0.6), gap=0.0, generator=np.random.default_rng(1)
-    )
-    nearest = [np.sort(pdist(centres) - 2)[:400] for centres in (still, shaken)]
-    assert nearest[1][:40].mean() < 0.5 * nearest[0][:40].mean()
-
-
-def test_close_pairs_are_all_found():
-    discs = Packing(300, 0.3, HUNDREDFOLD).make(np.random.default_rng(6))
-    first, second = close_pairs(discs, 1e-3)
-    apart = discs.separation(np.arange(300)[:, None], np.arange(300)[None])
-    near = np.hypot(apart[..., 0], apart[..., 1]) - discs.radii[:, None] - discs.radii < 1e-3
-    assert sorted(map(tuple, np.sort(np.stack([first, second]), axis=0).T)) == list(
-        zip(*np.nonzero(np.triu(near, 1)), strict=True)
-    )
+def test_shaking_brings_discs_nearer_than_pushing_left_them(monkeypatch):
+    box = np.full(2, np.sqrt(400 * np.pi / 0.6))
+    nearest = []
+    for sweeps in (0, relaxation.SWEEPS):
+        monkeypatch.setattr(relaxation, "SWEEPS", sweeps)
+        generator = np.random.default_rng(1)
+        centres = relaxation.relaxed(np.ones(400), box, gap=0.0, generator=generator)
+        nearest.append(np.sort(pdist(centres) - 2)[:40].mean())
+    assert nearest[1] < 0.5 * nearest[0]
 
 
 def test_log_normal_law():
@@ -160,13 +143,35 @@ def test_log_normal_law():
     assert TENFOLD([-3, 3]) == pytest.approx([1e-3, 1e-2])
     radii = TENFOLD.sample(200_000, np.random.default_rng(0))
     rule = gauss_rule(TENFOLD.distribution, points=40)
-    square = rule.mean(TENFOLD(rule.nodes) ** 2)
-    assert (radii**2).mean() == pytest.approx(square, rel=0.02)
+    assert (radii**2).mean() == pytest.approx(rule.mean(TENFOLD(rule.nodes) ** 2), rel=0.02)
     assert TENFOLD.cdf([0.0, 5e-4, 2e-2]).tolist() == [0, 0, 1]
-    with pytest.raises(ValueError, match="smallest <= largest"):
-        LogNormalRadii(2.0, 1.0)
 
 
-def test_a_gap_wider_than_the_square_is_named_as_the_culprit():
-    with pytest.raises(RefusedError, match=r"gap 1 m does not fit.*smaller gap"):
-        Packing(50, 0.2, LogNormalRadii(1e-3, 2e-3), gap=1.0).make(np.random.default_rng(1))
+@pytest.mark.parametrize("radii", [(2.0, 1.0), (1e-303, 1.0), (1.0, 1e308), (np.nan, 1.0)])
+def test_radii_of_no_particle_are_refused(radii):
+    with pytest.raises(RefusedError, match="radii from"):
+        LogNormalRadii(*radii)
+
+
+def test_a_measured_law_takes_its_values_in_equal_shares():
+    law = MeasuredRadii((3e-3, 1e-3, 2e-3, 2e-3))
+    assert law.cdf([0.5e-3, 1e-3, 1.5e-3, 2e-3, 3e-3]).tolist() == pytest.approx(
+        [0, 0, 1 / 6, 2 / 3, 1]
+    )
+    radii = law.sample(20_000, np.random.default_rng(1))
+    assert (radii.min(), radii.max()) == pytest.approx((1e-3, 3e-3), rel=1e-3)
+    assert MeasuredRadii((1e-3,)).sample(3, np.random.default_rng(1)).tolist() == [1e-3] * 3
+
+
+def test_circles_of_spheres_unfold_to_their_law():
+    """A sphere of radius R is hit in proportion to R, at a uniform height."""
+    rng, law = np.random.default_rng(3), LogNormalRadii(1.0, 3.0)
+    spheres = law.sample(400_000, rng)
+    hit = spheres[rng.random(len(spheres)) < spheres / 3]
+    circles = hit * np.sqrt(1 - rng.random(len(hit)) ** 2)
+    unfolded_law = unfolded(circles[circles > 1], visible=1.0, largest=3.0)
+    share = np.linspace(0.1, 0.9, 9)
+    expected = np.quantile(spheres, share)
+    assert np.quantile(unfolded_law.values, share) == pytest.approx(expected, rel=0.03)
+    with pytest.raises(RefusedError, match="10 or more"):
+        unfolded([2.0] * 9, visible=1.0, largest=3.0)

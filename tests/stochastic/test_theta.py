@@ -51,7 +51,7 @@ def test_support_without_probability_is_refused():
 
 
 def test_probability_outside_its_range_is_refused():
-    with pytest.raises(ValueError, match=r"1\.5; each must lie in"):
+    with pytest.raises(ValueError, match=r"1\.5; allowed: values in"):
         TruncatedNormal().quantile([0.5, 1.5])
 
 
@@ -145,7 +145,5 @@ def test_means_of_arrays_and_constants():
 
 
 def test_rules_without_nodes_are_refused():
-    with pytest.raises(ValueError, match="at least one"):
-        layered_rule(TruncatedNormal(), layers=0, points=3)
-    with pytest.raises(ValueError, match="at least one"):
+    with pytest.raises(ValueError, match="from 1 on"):
         gauss_rule(TruncatedNormal(), points=0)

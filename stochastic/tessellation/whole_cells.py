@@ -16,12 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.errors import UnfitDataError
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic.tessellation.apollonius import Apollonius
-from alphacut.stochastic.theta.truncated_normal import Array
 
 # directions of the left, right, lower and upper edge
 EDGES = np.array([np.pi, 0.0, -np.pi / 2, np.pi / 2])
+ANGLES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,62 +42,34 @@ def whole_cells(diagram: Apollonius) -> WholeCells:
     """Cells clear of the window's edge, with weights that make up for the others.
 
     Raises:
-        UnfitDataError: No cell is whole.
+        RefusedError: No cell is whole.
     """
     discs = diagram.discs
     if not discs.periodic:
         reach = _reach(diagram)
         inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
         room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
-        disc = np.flatnonzero((reach <= room).all(axis=1) & ~diagram.hidden & ~diagram.cut)
+        disc = np.flatnonzero((reach <= room).all(axis=1) & ~diagram.cut)
         if not len(disc):
-            raise UnfitDataError(
-                f"none of the {len(discs)} cells is whole within the window: take a larger window"
-            )
+            allowed = "windows in which the edge leaves a cell whole"
+            raise RefusedError("size", discs.size.tolist(), allowed, "take a larger section")
         fits = (
             inner - np.stack([reach[disc, :2].sum(axis=1), reach[disc, 2:].sum(axis=1)], axis=1)
         ).prod(axis=1)
-        return WholeCells(disc, discs.area / fits)
-    disc = np.flatnonzero(~diagram.hidden)
-    return WholeCells(disc, np.ones(len(disc)))
+        return WholeCells(disc, discs.measure / fits)
+    return WholeCells(np.arange(len(discs)), np.ones(len(discs)))
 
 
 def _reach(diagram: Apollonius) -> Array:
     """Greatest ρ (1 + cos ψ) − r of each cell towards the four edges, shape (n, 4), in m.
 
-    On an arc 1/ρ = C + M cos(φ − φ_j); ρ (1 + cos(φ − φ_e)) is greatest at an end of the arc or
-    where its derivative vanishes.
+    The greatest of `ANGLES` on each arc, its ends among them: their second order is far below what
+    the largest disc beyond the edge is known by.
     """
-    near, far = diagram.wall()
-    amplitude, constant = 1 / near + 1 / far, 1 / near - 1 / far
-    towards = np.arctan2(diagram.apart[:, 1], diagram.apart[:, 0])
+    angle = np.linspace(diagram.start, diagram.end, ANGLES)
+    rho = diagram.radius_at(np.arange(len(diagram.cell)), angle)
     reach = np.full((len(diagram.discs), 4), -np.inf)
     for edge, direction in enumerate(EDGES):
-        for angle in (
-            diagram.start,
-            diagram.end,
-            *_stationary(amplitude, constant, towards, direction),
-        ):
-            inside = diagram.start + np.mod(angle - diagram.start, 2 * np.pi)
-            inside = np.where(inside <= diagram.end, inside, diagram.start)
-            along = constant + amplitude * np.cos(inside - towards)
-            with np.errstate(divide="ignore"):
-                value = np.where(along > 0, (1 + np.cos(inside - direction)) / along, np.inf)
-            np.maximum.at(reach[:, edge], diagram.cell, value)
+        out = (rho * (1 + np.cos(angle - direction))).max(axis=0)
+        np.maximum.at(reach[:, edge], diagram.cell, np.where(rho.min(axis=0) > 0, out, np.inf))
     return reach - diagram.discs.radii[:, None]
-
-
-def _stationary(
-    amplitude: Array, constant: Array, towards: Array, direction: float
-) -> tuple[Array, Array]:
-    """The two angles at which ρ (1 + cos(φ − φ_e)) is stationary.
-
-    The derivative of (1 + cos(φ − φ_e)) / (C + M cos(φ − φ_j)) vanishes where
-    −C sin(φ − φ_e) + M sin(φ − φ_j) + M sin(φ_e − φ_j) = 0, that is a cos φ + b sin φ + c = 0.
-    """
-    a = constant * np.sin(direction) - amplitude * np.sin(towards)
-    b = -constant * np.cos(direction) + amplitude * np.cos(towards)
-    c = amplitude * np.sin(direction - towards)
-    middle = np.arctan2(b, a)
-    spread = np.arccos(np.clip(-c / np.maximum(np.hypot(a, b), 1e-300), -1, 1))
-    return middle - spread, middle + spread

@@ -1,0 +1,129 @@
+"""Discs in a rectangle and spheres in a box, periodic or seen through an open window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.refused import RefusedError
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Particles of one kind in their cells, of two or three dimensions.
+
+    Args:
+        particles: discs or spheres.
+        cells: Measure of a cell: area or volume.
+        dimensions: 2 or 3.
+        factor: Share of a cell of side 2 that a particle of radius 1 takes.
+        reach: Greatest r_n that a map may have; a cell as tight holds a particle that almost
+            touches its sides.
+        sequential: Share of the box up to which random sequential addition is quick.
+        densest: Share of the box that packed particles may take, below random close packing.
+    """
+
+    particles: str
+    cells: str
+    dimensions: int
+    factor: float
+    reach: float
+    sequential: float
+    densest: float
+
+    @property
+    def largest(self) -> float:
+        """r_n of a particle that fills its cell."""
+        return float(self.factor ** (-1 / self.dimensions))
+
+    def shares(self, radii: ArrayLike) -> Array:
+        """Share of a cell that particles take, of reduced radii of any shape."""
+        return np.asarray(self.factor * np.asarray(radii, float) ** self.dimensions)
+
+    def measure(self, radii: ArrayLike) -> Array:
+        """Area in m² or volume in m³ of particles, of radii in m of any shape."""
+        return self.shares(radii) * 2.0**self.dimensions
+
+
+DISCS = Shape("discs", "area", 2, np.pi / 4, 0.99, 0.45, 0.82)
+SPHERES = Shape("spheres", "volume", 3, np.pi / 6, 0.97, 0.25, 0.58)
+
+
+@dataclass(frozen=True, eq=False)
+class Particles:
+    """Discs in the rectangle [0, width] × [0, height], or spheres in a box.
+
+    Args:
+        centres: shape (n, 2) or (n, 3), in m, inside the rectangle or box.
+        radii: shape (n,), in m, not negative.
+        size: Sides of the rectangle or box, shape (2,) or (3,), in m.
+        periodic: Whether it repeats itself in all directions; otherwise it is a window on a larger
+            section.
+
+    Raises:
+        RefusedError: A shape is wrong, a number is not finite, or a particle has a negative radius
+            or lies outside.
+    """
+
+    centres: Array
+    radii: Array
+    size: Array
+    periodic: bool = True
+
+    def __post_init__(self) -> None:
+        size = np.array(self.size, float).ravel()
+        centres = np.array(self.centres, float).reshape(-1, len(size))
+        radii = np.array(self.radii, float).ravel()
+        if not 0 < len(radii) == len(centres):
+            allowed = f"{len(centres)} positions, of one particle or more"
+            raise RefusedError("radii", f"{len(radii)} numbers", allowed)
+        if not (np.isfinite(size).all() and (size > 0).all()):
+            raise RefusedError("size", size.tolist(), "positive, finite lengths in m")
+        _refuse(~np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
+        _refuse(~((radii >= 0) & (radii < np.inf)), "radii", radii, "finite lengths from 0 m on")
+        if self.periodic:
+            wrapped = np.mod(centres, size)
+            centres = np.where(wrapped < size, wrapped, 0.0)
+        else:
+            outside = ((centres < 0) | (centres > size)).any(axis=1)
+            _refuse(outside, "centres", centres, f"places in the window of {size.tolist()} m")
+        for name, value in (("centres", centres), ("radii", radii), ("size", size)):
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+    @property
+    def shape(self) -> Shape:
+        """Kind of the particles."""
+        return DISCS if len(self.size) == 2 else SPHERES
+
+    @property
+    def measure(self) -> float:
+        """Area of the rectangle in m², or volume of the box in m³."""
+        return float(self.size.prod())
+
+    @property
+    def fraction(self) -> float:
+        """Measure of all particles over that of the rectangle or box."""
+        return float(self.shape.measure(self.radii).sum() / self.measure)
+
+    @property
+    def spacing(self) -> float:
+        """Side of the square or cube of one particle's share, in m."""
+        return float((self.measure / len(self)) ** (1 / len(self.size)))
+
+    def separation(self, first: Array, second: Array) -> Array:
+        """Vectors from centres `first` to the nearest images of `second`, shape (…, d), in m."""
+        apart = self.centres[second] - self.centres[first]
+        return apart - self.size * np.round(apart / self.size) if self.periodic else apart
+
+
+def _refuse(bad: Mask, name: str, values: Array, allowed: str) -> None:
+    """Refuses the first bad one of some values."""
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise RefusedError(f"{name}[{row}]", values[row].tolist(), allowed)
