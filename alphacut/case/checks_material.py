@@ -13,8 +13,6 @@ from alphacut.io.provenance import door
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.radius_map import MapFamily
 
-WIDEST = 20  # ratio of radii behind circles
-
 
 def particles(case: Case) -> Iterator[Problem]:
     """Exactly one source of particles, and numbers in it that fit together."""
@@ -45,54 +43,12 @@ def particles(case: Case) -> Iterator[Problem]:
     if study.packing:
         yield from sizes(case, "packing", study.packing)
     if study.spheres:
-        yield from sphere_sizes(case, study.spheres)
+        yield from sizes(case, "spheres", study.spheres)
     if study.circles:
         for name, pair in (("size", study.circles.size), ("origin", study.circles.origin)):
             if len(pair) != 2:
                 key = f"microstructure.circles.{name}"
                 yield Problem(key, f"got {len(pair)} values", allowed="two: across and up")
-
-
-def sphere_sizes(case: Case, spheres: PackedSpheres) -> Iterator[Problem]:
-    """The radii of packed spheres: measured, or two ends of a law or of what circles are of."""
-    key = "microstructure.spheres"
-    if spheres.file and spheres.circles:
-        yield Problem(
-            f"{key}.circles",
-            "the radii come from measured spheres besides",
-            spheres.circles,
-            f"one of {key}.file and {key}.circles",
-        )
-        return
-    yield from sizes(case, "spheres", spheres)
-    for name in ("visible", "level"):
-        if case.asked(f"{key}.{name}") and not spheres.circles:
-            yield case.problem(
-                f"{key}.{name}",
-                "this has an effect on the circles of a section alone",
-                f"beside {key}.circles",
-            )
-    small, large, seen = spheres.smallest_radius, spheres.largest_radius, spheres.visible
-    if spheres.circles and small is not None and large is not None:
-        if large > WIDEST * small:
-            yield case.problem(
-                f"{key}.largest_radius",
-                f"this is {large / small:.3g} times the smallest, and cubes that hold both kinds"
-                " of spheres would take too many",
-                f"at most {WIDEST} times the smallest radius",
-            )
-        if small == large:
-            yield case.problem(
-                f"{key}.largest_radius",
-                "circles are of spheres between two radii, and these are the same",
-                f"more than {key}.smallest_radius",
-            )
-        if seen is not None and seen >= small:
-            yield case.problem(
-                f"{key}.visible",
-                "circles must be seen from below the smallest sphere's radius on",
-                f"less than {key}.smallest_radius",
-            )
 
 
 def sizes(case: Case, source: str, packing: Packing | PackedSpheres) -> Iterator[Problem]:

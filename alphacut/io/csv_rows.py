@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import csv
 import re
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
-from alphacut.stochastic.particles.csv_columns import Rows, not_text, with_points
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic.particles.csv_columns import NUMBER
+
+Rows = list[tuple[int, list[str]]]
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class CsvFile:
     def rows(self, least: int = 1) -> Rows:
         """Line and entries of the header and of each row; empty lines and comments are left out.
 
-        Commas separate them, or semicolons or tabs, beside which numbers may have decimal commas.
+        Commas separate them, or semicolons or tabs.
 
         Args:
             least: Rows that there must be below the header.
@@ -55,20 +56,14 @@ class CsvFile:
             raise self.unreadable(what, self.allowed)
         header = kept[0][1]
         separator = ";" if ";" in header else "\t" if "\t" in header else ","
-        rows = [(number, next(csv.reader([line], delimiter=separator))) for number, line in kept]
-        if separator == ",":
-            return rows
-        try:
-            return [rows[0], *with_points(rows[1:], self.path)]
-        except ValueError as error:
-            raise self.unreadable(str(error), "points, or commas throughout") from None
+        return [(number, next(csv.reader([line], delimiter=separator))) for number, line in kept]
 
     def finite(self, rows: Rows, count: int, what: str, allowed: str) -> Array:
         """The rows as numbers, shape (rows, count); BadInput where one is not `count` of them."""
         table = np.full((len(rows), count), np.nan)
         for values, (line, row) in zip(table, rows, strict=True):
-            with suppress(ValueError):
-                values[:] = [float(text) for text in row] if len(row) == count else np.nan
+            if len(row) == count and all(NUMBER.fullmatch(text.strip()) for text in row):
+                values[:] = [float(text) for text in row]
             if not np.isfinite(values).all():
                 raise self.refuse(line, f"this row is {what}", ",".join(row), allowed)
         return table
@@ -83,7 +78,7 @@ class CsvFile:
         try:
             return self.path.read_text(encoding="utf-8-sig").splitlines()
         except UnicodeDecodeError:
-            what = f"the {self.what} {not_text(self.path)}"
+            what = f"the {self.what} is not text in UTF-8"
             raise self.unreadable(what, self.allowed) from None
         except OSError as error:
             reason = (error.strerror or str(error)).lower()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from alphacut.stages.material.micrograph import compared
 from markupsafe import Markup
 
 from alphacut.figures.captions import core, in_words, widest
@@ -11,7 +12,6 @@ from alphacut.report.tables import code, paragraphs, section, sentence, table
 from alphacut.rve.anisotropy import shear_ratio_in_words
 from alphacut.stages.image.document import interval
 from alphacut.stages.material import response
-from alphacut.stages.material.micrograph import compared
 
 
 def microstructure(found: Document, seen: Markup) -> Markup:

@@ -9,7 +9,6 @@ Each line is a check with its figure and its limit; exit status 1 where one is b
   Keller (J. Fluid Mech. 142, 269, 1984) towards contact;
 - Hashin–Shtrikman and the trace bounds, and declared errors against a thousandfold tolerance, on
   random cells of radius 0.1 … 0.95 and contrast 1e-3 … 1e3;
-- grids of voxels, another method altogether, to their own declared error;
 - processor time of a radius at 1e-8, and what is declared beyond 0.8.
 Finite elements are set beside the series by benchmarks.rve.sphere_elements.
 """
@@ -34,18 +33,13 @@ from alphacut.rve.spheres.bounds import (
 )
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
-from alphacut.stochastic.spheres.spheres import Spheres
 from alphacut.stochastic.theta.truncated_normal import Array
-from benchmarks.rve.many_random_cells import limit_of_grids
-from benchmarks.rve.voxels.stiffness import stiffness_of
-from benchmarks.rve.voxels.voxels import voxels_of
 
 RESULTS = Path(__file__).parents[1] / "results"
 MATRIX = Phase(20e9)
 CONTRASTS = (1e-3, 1e-2, 0.1, 4.0, 100.0, 1e3)
 RADII = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95)
 SECONDS = 0.1  # processor time allowed to a radius
-GRIDS = (13, 21, 33)
 
 
 @dataclass(frozen=True)
@@ -191,25 +185,6 @@ def random_cells(draws: int, seed: int) -> Iterator[Check]:
     yield Check(f"Hashin-Shtrikman and traces, {draws} draws: outside by", float(outside), 1e-8)
 
 
-def voxels(seed: int) -> Iterator[Check]:
-    """Grids of voxels about a random place, over their own declared error."""
-    rng = np.random.default_rng([seed, 8])
-    for radius, contrast in ((0.5, 0.1), (0.7, 4.0), (0.85, 10.0)):
-        inclusion = Phase(20e9 * contrast, 0.2)
-        places = rng.uniform(0, 2, (4, 1, 3))
-        cells = [Spheres(place, np.array([radius]), 2.0) for place in places]
-        found = np.mean(
-            [
-                [stiffness_of(voxels_of(c, n), MATRIX, inclusion).moduli for n in GRIDS]
-                for c in cells
-            ],
-            axis=0,
-        )
-        limit, error = limit_of_grids(found, GRIDS)
-        apart = float(abs(limit / moduli(radius, MATRIX, inclusion) - 1).max())
-        yield Check(f"voxels, r = {radius:g}, contrast {contrast:g}: difference", apart, error)
-
-
 def times() -> Iterator[Check]:
     """Processor time of all three moduli at 1e-8, lattice sums at hand; median of contrasts."""
     for radius in RADII:
@@ -235,8 +210,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=RESULTS, help="folder for the results")
     options = parser.parse_args(arguments)
     checks = []
-    drawn = random_cells(options.draws, options.seed), voxels(options.seed)
-    for group in (closed_limits(), published(), *drawn, times()):
+    drawn = random_cells(options.draws, options.seed)
+    for group in (closed_limits(), published(), drawn, times()):
         for check in group:
             checks.append(check)
             print(

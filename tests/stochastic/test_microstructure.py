@@ -323,7 +323,9 @@ def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
     result = study(Study(Simulated(spheres, 6), seed=2, bootstrap=100))
     numbers = summary(result)
     assert numbers["mean_volume_fraction_of_map"] == pytest.approx(0.2, rel=6e-3)
-    assert numbers["volume_fraction_of_cells"] == pytest.approx(numbers["volume_fraction"], rel=1e-5)
+    assert numbers["volume_fraction_of_cells"] == pytest.approx(
+        numbers["volume_fraction"], rel=1e-5
+    )
     for section in result.sections:
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-5)
     assert "13_pbox" in draw(result, tmp_path)

@@ -75,8 +75,7 @@ class Packing(Section):
     file: Annotated[
         str | None,
         Key(
-            "CSV file of measured radii or diameters, a column r [mm] or d [mm], in place of both;"
-            " or a sieve curve, columns size [mm] and passing [%]",
+            "CSV file of measured radii or diameters, a column r [mm] or d [mm], in place of both",
             file=True,
         ),
     ] = None
@@ -98,10 +97,6 @@ class Circles(Section):
     periodic: Annotated[
         bool, Key("whether the section repeats itself; otherwise it is an open window")
     ] = False
-    unit: Annotated[str, Key("unit of columns whose header names none")] = ""
-    drop: Annotated[bool, Key("leave out rows that make no sense instead of refusing the file")] = (
-        False
-    )
     overlap: Annotated[
         float,
         Key("overlap that counts as error of measurement, over the smaller radius", allowed=RATIO),
@@ -120,7 +115,6 @@ class Photograph(Section):
     particles: Annotated[
         Literal["auto", "bright", "dark"], Key("bright or dark against the matrix")
     ] = "auto"
-    drop: Annotated[bool, Key("go on without the pieces that are no round particles")] = False
     crop: Annotated[
         tuple[float, ...] | None,
         Key(
@@ -135,8 +129,7 @@ class Photograph(Section):
 class PackedSpheres(Section):
     """Spheres packed at random in a periodic cube and divided into Laguerre cells.
 
-    Equal, truncated log-normal (eq. 11), of measured radii, or of the radii that the circles of a
-    plane section leave possible.
+    Equal, truncated log-normal (eq. 11), or of measured radii.
     """
 
     packings: Annotated[int, PACKINGS] = 20
@@ -153,41 +146,21 @@ class PackedSpheres(Section):
     smallest_radius: Annotated[
         float | None,
         positive(
-            "smallest radius of the log-normal law, or of the spheres that circles are of;"
-            " needed without measured radii",
+            "smallest radius of the log-normal law; needed without a file",
             "m",
         ),
     ] = None
     largest_radius: Annotated[
         float | None,
         positive(
-            "largest radius of the log-normal law, or the one that no sphere exceeds; needed"
-            " without measured radii",
+            "largest radius of the log-normal law; needed without a file",
             "m",
         ),
     ] = None
     file: Annotated[
         str | None,
         Key(
-            "CSV file of measured radii or diameters, a column r [mm] or d [mm]; or a sieve curve,"
-            " columns size [mm] and passing [%]",
+            "CSV file of measured radii or diameters, a column r [mm] or d [mm]",
             file=True,
         ),
     ] = None
-    circles: Annotated[
-        str | None,
-        Key(
-            "CSV file of the circles of a plane section, a column r [mm] or d [mm]; the spheres'"
-            " radii are unfolded from them",
-            file=True,
-        ),
-    ] = None
-    visible: Annotated[
-        float | None,
-        positive(
-            "radius from which on every circle is seen; the smallest circle's if left out", "m"
-        ),
-    ] = None
-    level: Annotated[
-        float, Key("chance with which the bounds of unfolded radii hold", allowed=UNIT)
-    ] = 0.95

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.frame import Accelerogram
-from alphacut.io.csv_rows import CsvFile
+from alphacut.io.csv_rows import CsvFile, Rows
 from alphacut.io.units import factor
-from alphacut.stochastic.particles.csv_columns import Rows
 from alphacut.stochastic.theta.truncated_normal import Array
 
 COLUMNS = [("time", "s", "time|t"), ("acceleration", "m/s^2", r"acceleration|acc\.?|a")]

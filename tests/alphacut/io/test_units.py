@@ -7,7 +7,6 @@ import pytest
 
 from alphacut.io import units
 from alphacut.io.units import EVERYDAY, QUANTITIES, factor, registry
-from alphacut.stochastic.particles import csv_columns
 
 PAIRS = [(unit, si) for si, sizes in EVERYDAY.items() for unit in sizes]
 
@@ -42,13 +41,6 @@ def test_a_force_for_a_mass_is_told(unit, si, told):
 
 def test_a_gal_is_a_hundredth_of_a_metre_per_second_squared():
     assert factor("gal", "m/s^2") == factor("Gal", "m/s^2") == Decimal("0.01")
-
-
-@pytest.mark.parametrize("unit", ["px", "pixel", "Pixels", "kpx", "point", "pp", "pica", "didot"])
-def test_a_unit_of_print_is_no_length(unit):
-    with pytest.raises(ValueError, match="give the length of one pixel"):
-        factor(unit, "m")
-    assert units.PRINTED == csv_columns.PRINTED
 
 
 @pytest.mark.parametrize("unit", [name for names in units.ACCEPTED.values() for name in names])
