@@ -1,0 +1,131 @@
+"""Fuzzy peaks: the largest magnitude of each output over the motion, as intervals by level.
+
+At the nodes no motion peaks higher than its envelope, and each has at least the magnitude that its
+band is away from zero. Both are read off bounds that exclude values and bounds that are attained,
+so that a peak is as sure as its envelope; what the steps between nodes may add counts as error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.envelope import Envelope
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Ends, Nature
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks:
+    """Largest magnitude of each output over time.
+
+    Args:
+        alpha: Levels, rising, shape (A,).
+        outputs: Names, m of them.
+        lower: Magnitude at the nodes that each motion reaches, as the bounds have it, (A, m).
+        upper: Magnitude at the nodes that none passes, as the bounds have it, shape (A, m).
+        error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope
+            and of the steps between nodes, shape (A, m).
+        reached: Magnitude that a motion in the cut is known to reach, shape (A, m).
+        natures: Nature of each output's bounds, m of them.
+    """
+
+    alpha: Array
+    outputs: tuple[str, ...]
+    lower: Array
+    upper: Array
+    error: Array
+    reached: Array
+    natures: tuple[Nature, ...]
+
+    def column(self, output: str) -> int:
+        """Index of an output.
+
+        Raises:
+            RefusedError: There is no such output.
+        """
+        if output not in self.outputs:
+            raise RefusedError("output", output, ", ".join(self.outputs))
+        return self.outputs.index(output)
+
+    def most(self, output: str) -> Ends:
+        """Ends between which the greatest peak in each cut lies; infinite where nothing excludes.
+
+        Attained bounds exclude nothing: a motion that was not looked at may peak higher.
+        """
+        k = self.column(output)
+        attained = self.natures[k] is Nature.ATTAINED
+        above = np.full(len(self.alpha), np.inf) if attained else self._above[:, k]
+        return Ends(self.reached[:, k], above)
+
+    def least(self, output: str) -> Ends:
+        """Ends between which the least peak in each cut lies.
+
+        Each cut holds the highest one, none of whose motions peaks above its greatest.
+        """
+        k = self.column(output)
+        attained = self.natures[k] is Nature.ATTAINED
+        below = np.maximum(self.lower[:, k] - self.error[:, k], 0.0)
+        return Ends(np.zeros_like(below) if attained else below, self.most(output).upper[-1:])
+
+    @property
+    def _above(self) -> Array:
+        return self.upper + self.error
+
+
+def peaks(envelope: Envelope) -> Peaks:
+    """Fuzzy peaks of the magnitude of every output."""
+    stated, error, inner = Ends(envelope.lower, envelope.upper), _error(envelope), _inner(envelope)
+    size = np.maximum(stated.upper, -stated.lower)
+    away = np.maximum(np.maximum(stated.lower, -stated.upper), 0.0)
+    upper, lower = size.max(1), away.max(1)
+    above = within_steps(size + error, envelope.between).max(1) - upper
+    below = lower - np.maximum(away - error, 0.0).max(1)
+    reached = np.nan_to_num(np.maximum(inner.upper, -inner.lower).max(1), nan=0.0)
+    natures = _natures(envelope)
+    return Peaks(
+        np.asarray(envelope.alpha),
+        tuple(map(str, envelope.outputs)),
+        lower,
+        upper,
+        np.maximum(above, below),
+        np.maximum(reached, 0.0),
+        natures,
+    )
+
+
+def within_steps(size: Array, between: Array | None) -> Array:
+    """Bound of a magnitude in the step to each node, shape (…, T, m).
+
+    Args:
+        size: The magnitude at the nodes, shape (…, T, m).
+        between: What it may exceed both ends of each step by, shape (T, m); None for nothing.
+    """
+    if between is None:
+        return size
+    out = size.copy()
+    out[..., 1:, :] = np.maximum(size[..., 1:, :], size[..., :-1, :]) + between[1:]
+    return out
+
+
+def _natures(envelope: Envelope) -> tuple[Nature, ...]:
+    words = {"inner": Nature.ATTAINED, "guaranteed": Nature.GUARANTEED}
+    nature = words.get(envelope.nature, Nature.ESTIMATED)
+    return (nature,) * len(envelope.outputs)
+
+
+def _error(envelope: Envelope) -> Array:
+    """Error by which the stated bounds may be short, shape (A, T, m)."""
+    if envelope.error is None or envelope.nature == "guaranteed":
+        return np.zeros(envelope.lower.shape)
+    return np.asarray(envelope.error)
+
+
+def _inner(envelope: Envelope) -> Ends:
+    """Bounds that are attained, NaN where none is known, shape (A, T, m) each."""
+    if envelope.inner_lower is not None and envelope.inner_upper is not None:
+        return Ends(envelope.inner_lower, envelope.inner_upper)
+    error = _error(envelope)
+    return Ends(envelope.lower + error, envelope.upper - error)

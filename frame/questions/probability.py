@@ -1,0 +1,218 @@
+"""Fuzzy probability that limits are passed, with some inputs random and others fuzzy.
+
+The same random draws serve every fuzzy point (common random numbers), so that differences between
+points are no noise. The points are the corners of each α-cut and a spread inside, so the bounds of
+the probability are attained: another point may have a smaller or a greater one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.boxes import ALPHA, Boxes, boxes
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
+from alphacut.frame.checks.between_nodes import stray
+from alphacut.frame.checks.step_error import MARGIN, deviations, exact
+from alphacut.frame.dynamics.flow import Flow, LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.questions.passing import ANY
+from alphacut.frame.questions.peaks import within_steps
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
+
+LIMITS = 201
+"""Limits for which the probability is computed besides."""
+LOOKED_AT = 4
+"""Fuzzy points, and draws of each, whose motion between nodes is looked at."""
+MOST_CORNERS = 8
+"""Inputs of which the corners are tried."""
+
+Sampler = Callable[[np.random.Generator, int], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Probability:
+    """Probability that a magnitude passes its limit within the duration, by level.
+
+    Args:
+        alpha: Levels, shape (A,).
+        lower: Least probability over the fuzzy points tried, shape (A,).
+        upper: Greatest one, shape (A,).
+        error: What peaks between nodes may add to either, estimated, shape (A,).
+        deviation: Standard deviation of the estimates, the largest of all.
+        limits: Other limits, shape (L,), in SI units; shares of their limits for `ANY`.
+        curve: Least and greatest probability of passing each of them, shape (2, A, L).
+        evaluations: Motions computed.
+        nature: Always attained.
+    """
+
+    alpha: Array
+    lower: Array
+    upper: Array
+    error: Array
+    deviation: float
+    limits: Array
+    curve: Array
+    evaluations: int
+    nature: Nature = Nature.ATTAINED
+
+
+def probabilities(
+    model: LinearSystem | LagrangianSystem,
+    fuzzy: Mapping[str, FuzzyNumber],
+    random: Mapping[str, Sampler],
+    limits: Mapping[str, float],
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+    samples: int = 200,
+    spread: int = 64,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+) -> dict[str, Probability]:
+    """Fuzzy probability of passing each limit, and `ANY` of several, from the same motions.
+
+    Args:
+        model: A linear structure, moved by the exact propagator, or a general system, by the
+            midpoint rule.
+        fuzzy: Fuzzy parameters.
+        random: Random parameters, each a function from (generator, count) to values (count,).
+        limits: Largest magnitude allowed by output, in SI units.
+        duration: Length of the motion, in s.
+        step: Distance of nodes, in s.
+        alpha: Levels.
+        samples: Random draws.
+        spread: Points inside each α-cut.
+        rng: Source of the draws.
+        progress: Takes the share done.
+
+    Raises:
+        RefusedError: A parameter is both fuzzy and random, a limit is not positive or names no
+            output, or a random parameter does not give `samples` finite values.
+    """
+    sizes, columns = _limits(model, limits)
+    if both := sorted(set(fuzzy) & set(random)):
+        raise RefusedError("random", ", ".join(both), "inputs that are not fuzzy as well")
+    drawn = [_drawn(name, draw, rng, samples) for name, draw in random.items()]
+    draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
+    cuts = boxes(fuzzy, alpha)
+    flow = _flow(model, (*cuts.names, *random), duration, step)
+    tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
+    points = np.concatenate(tried)
+    looked_at = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
+    few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
+    between, off = stray(flow, few), _off(flow, few)
+    shares = []  # peaks over their limits: at least, at most, at most within steps
+    for count, point in enumerate(points, start=1):
+        size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
+        three = np.maximum(size - off, 0.0), size + off, within_steps(size + off, between)
+        shares.append([x.max(1)[:, columns] / sizes for x in three])
+        if progress:
+            progress(count / len(points))
+    every = np.moveaxis(np.array(shares), 1, 0)  # (three, points, draws, limits)
+    level = np.repeat(np.arange(len(tried)), [len(some) for some in tried])
+    events = [*np.moveaxis(every, -1, 0)] + ([every.max(-1)] if len(limits) > 1 else [])
+    scales = [*sizes, 1.0]
+    return {
+        name: _probability(event, level, cuts.alpha, scale, spreads=bool(random))
+        for name, event, scale in zip((*limits, ANY), events, scales, strict=False)
+    }
+
+
+def _limits(
+    model: LinearSystem | LagrangianSystem, limits: Mapping[str, float]
+) -> tuple[Array, list[int]]:
+    """The limits, shape (L,), and the columns of their outputs."""
+    for name, limit in limits.items():
+        if name not in model.outputs:
+            raise RefusedError("limits", name, ", ".join(map(str, model.outputs)))
+        if not limit > 0:
+            raise RefusedError(f"limit of {name}", limit, "a positive number")
+    outputs = list(model.outputs)
+    return np.array([*limits.values()], float), [outputs.index(name) for name in limits]
+
+
+def _drawn(name: str, draw: Sampler, rng: np.random.Generator, samples: int) -> Array:
+    values = np.asarray(draw(rng, samples), float)
+    if values.shape != (samples,) or not np.isfinite(values).all():
+        raise RefusedError(f"values of {name}", values.shape, f"{samples} finite numbers")
+    return values
+
+
+def _flow(
+    model: LinearSystem | LagrangianSystem, names: tuple[str, ...], duration: float, step: float
+) -> Flow:
+    if isinstance(model, LagrangianSystem):
+        return LagrangianFlow(model, names, duration, step)
+    return LinearFlow(model, names, duration, step, Exact())
+
+
+def _off(flow: Flow, points: Array) -> Array:
+    """Error of trajectories with a margin, from those at some points, shape (T, m)."""
+    if exact(flow):
+        return np.zeros((len(flow.time), len(flow.outputs)))
+    return MARGIN * np.maximum.accumulate(deviations(flow, points)[1].max(0), axis=0)
+
+
+def _tried(cuts: Boxes, level: int, spread: int) -> Array:
+    """Corners of an α-cut and points inside, shape (S, d)."""
+    lower, upper = cuts.unit(level)
+    if not (upper > lower).any():
+        return cuts.modal[None]
+    inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), spread)
+    ends = corners(lower, upper) if len(lower) <= MOST_CORNERS else inner[:0]
+    return np.asarray(cuts.to_physical(np.vstack([ends, inner])))
+
+
+def _probability(
+    event: Array, level: Array, alpha: Array, scale: float, *, spreads: bool
+) -> Probability:
+    """Probability that peaks pass 1.
+
+    Args:
+        event: Peaks over their limit: at least, at most, at most within steps; (3, points, draws).
+        level: Level of each point.
+        alpha: Levels.
+        scale: The limit.
+        spreads: Whether there are random inputs.
+    """
+    least, peak, more = event
+    limits = np.linspace(0.95 * least.min(), 1.05 * peak.max(), LIMITS)
+    low, _ = _bounds(least, level, np.append(limits, 1.0))
+    lowest, high = _bounds(peak, level, np.append(limits, 1.0))
+    above = [ends[:, 0] for ends in _bounds(more, level, np.ones(1))]
+    shares = np.append(low[:, -1], high[:, -1])
+    return Probability(
+        alpha,
+        low[:, -1],
+        high[:, -1],
+        np.maximum(above[0] - lowest[:, -1], above[1] - high[:, -1]),
+        float(_deviation(shares, peak.shape[1]).max()) if spreads else 0.0,
+        limits * scale,
+        np.stack([low[:, :-1], high[:, :-1]]),
+        peak.size,
+    )
+
+
+def _deviation(share: Array, draws: int) -> Array:
+    """Standard deviation of probabilities from shares of draws (Laplace's rule)."""
+    mean = (share * draws + 1) / (draws + 2)
+    return np.asarray(np.sqrt(mean * (1 - mean) / (draws + 3)))
+
+
+def _bounds(peak: Array, level: Array, limits: Array) -> tuple[Array, Array]:
+    """Least and greatest share of peaks above each limit, nested over levels, (A, L) each."""
+    rows = np.sort(peak, axis=1)
+    share = np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
+    parts = [share[level >= k] for k in range(level.max() + 1)]
+    return np.array([part.min(0) for part in parts]), np.array([part.max(0) for part in parts])

@@ -1,0 +1,129 @@
+"""Tolerances: the largest scale of all supports at which every limit is kept.
+
+Supports are scaled about their modal values. The scale is halved between one whose envelope
+excludes that a limit is passed and one whose envelope shows that it may be. Each step is one call
+of `envelope` on the support alone, and as sure as its nature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from alphacut.frame.propagation import envelope
+from alphacut.frame.questions.peaks import Peaks, peaks
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
+from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Scales of the supports: 1 are those of the inputs.
+
+    Args:
+        kept: Largest scale tried at which passing a limit is excluded; None where it is at none,
+            not even at scale 0.
+        passed: Least scale tried at which a limit is passed by a motion that is known; infinite
+            where none was met.
+        supports: Supports at the scale `kept`, by input, in SI units.
+        nature: Weakest nature of the envelopes that `kept` rests on.
+        envelopes: Number of envelopes computed.
+    """
+
+    kept: float | None
+    passed: float
+    supports: Mapping[str, tuple[float, float]]
+    nature: Nature
+    envelopes: int
+
+
+def scaled(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
+    """Supports at a scale about the modal values, as intervals."""
+    both = {name: (number.modal, number.support) for name, number in inputs.items()}
+    return {
+        name: Interval(modal - scale * (modal - low), modal + scale * (high - modal))
+        if scale > 0 and high > low
+        else Crisp(modal)
+        for name, (modal, (low, high)) in both.items()
+    }
+
+
+def tolerances(
+    model: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber],
+    limits: Mapping[str, float],
+    *,
+    duration: float,
+    step: float,
+    method: str | None = None,
+    most: float = 2.0,
+    precision: float = 0.01,
+    progress: Progress | None = None,
+) -> Tolerances:
+    """Largest scale of the supports at which no magnitude passes its limit.
+
+    Args:
+        model: The structure, whose outputs have the limits.
+        inputs: Fuzzy parameters, in SI units.
+        limits: Largest magnitude allowed by output, in SI units.
+        duration: Length of the motion, in s.
+        step: Distance of nodes, in s.
+        method: Method of the envelopes, as for `envelope`.
+        most: Largest scale that is tried.
+        precision: Distance of both scales, relative to `most`, at which the search ends.
+        progress: Takes the share done.
+
+    Raises:
+        RefusedError: A limit or a number is out of range, or supports at scale `most` reach values
+            without a meaning.
+    """
+    if not (most > 0 and 0 < precision < 1):
+        raise RefusedError("most and precision", (most, precision), "above 0; above 0 and below 1")
+    tried: dict[float, _Step] = {}
+
+    def step_at(scale: float) -> _Step:
+        numbers = scaled(inputs, scale)
+        times = {"duration": duration, "step": step}
+        bounds = envelope(model, numbers, **times, alpha=[0.0], method=method, progress=False)
+        tried[scale] = _judged(peaks(bounds), limits)
+        if progress:
+            progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
+        return tried[scale]
+
+    low = most if step_at(most).kept else 0.0
+    if low == 0.0 and step_at(0.0).kept:
+        low = _halved(step_at, low, most, precision * most)
+    passed = min((scale for scale, one in tried.items() if one.passed), default=np.inf)
+    supports = {name: tuple(x.support) for name, x in scaled(inputs, low).items()}
+    best = tried[low]
+    return Tolerances(low if best.kept else None, passed, supports, best.nature, len(tried))
+
+
+class _Step(NamedTuple):
+    """State of one scale: passing is excluded, passing is known, worth of both."""
+
+    kept: bool
+    passed: bool
+    nature: Nature
+
+
+def _judged(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
+    ends = {name: peaks.most(name) for name in limits}
+    nature = min((peaks.natures[peaks.column(x)] for x in limits), key=list(Nature).index)
+    kept = all(ends[name].upper[0] <= limit for name, limit in limits.items())
+    return _Step(kept, any(ends[x].lower[0] > limit for x, limit in limits.items()), nature)
+
+
+def _halved(step_at: Callable[[float], _Step], low: float, high: float, near: float) -> float:
+    """Largest scale kept, from one that is kept and one that is not."""
+    while high - low > near:
+        middle = (low + high) / 2
+        low, high = (middle, high) if step_at(middle).kept else (low, middle)
+    return low

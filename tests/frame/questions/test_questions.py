@@ -1,0 +1,185 @@
+"""Questions to a motion: peaks, passing of limits, tolerances, probabilities."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.questions.passing import ANY, passing
+from alphacut.frame.questions.peaks import peaks
+from alphacut.frame.questions.probability import probabilities
+from alphacut.frame.questions.tolerances import scaled, tolerances
+from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
+
+FRAME = StoreyFrame(
+    (9e3, 7e3),
+    (2.4, 3.0),
+    25e9,
+    1e-6,
+    (90, 60),
+    "storey",
+    (0.05, 0.0),
+    (0.0, 0.4),
+    outputs=("q1", "drift2", "base_shear"),
+)
+INPUTS = {"E": Triangular(23e9, 25e9, 26e9), "m2": Triangular(6.8e3, 7e3, 7.3e3)}
+ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
+ONE = StoreyFrame(  # q = v0 / ω sin ωt with ω² = 24 E I / (l³ m): it peaks at v0 √(l³ m / (24 E I))
+    (1e3,), (3.0,), 25e9, 1e-6, (0.0,), "storey", (0.0,), (0.3,), outputs=("q1",)
+)
+
+
+def motions(frame, inputs, count, *, level=0.0, duration=5, step=0.02):
+    rng = np.random.default_rng()
+    points = np.column_stack([rng.uniform(*inputs[name].cut(level), count) for name in inputs])
+    return np.abs(LinearFlow(frame, tuple(inputs), duration, step, Exact()).values(points)).max(1)
+
+
+def amplitude(mass):
+    return 0.3 * np.sqrt(27 * mass / (24 * 25e9 * 1e-6))
+
+
+@pytest.fixture(scope="module")
+def proved():
+    return peaks(envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=ALPHA))
+
+
+@pytest.mark.parametrize("level", [0, 2])
+def test_no_motion_peaks_outside_the_fuzzy_peak(proved, level):
+    size = motions(FRAME, INPUTS, 400, level=ALPHA[level])
+    assert (size <= proved.upper[level] + proved.error[level]).all()
+    assert (size >= proved.lower[level] - proved.error[level]).all()
+    assert size.max(0) == pytest.approx(proved.upper[level], rel=0.01)
+
+
+def test_the_limit_that_a_level_just_reaches_is_possible_to_that_level():
+    inputs = {"m1": Triangular(900, 1000, 1100)}
+    alpha = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+    of = peaks(envelope(ONE, inputs, duration=6, step=0.01, alpha=alpha))
+    assert set(of.natures) == {Nature.GUARANTEED}
+    middle = passing(of, {"q1": amplitude(1050)})["q1"]  # reached at the mass of level 0.5
+    assert middle.possibility == (0.4, 0.6)
+    assert middle.necessity == (0.0, 0.0)
+    assert passing(of, {"q1": amplitude(1101)})["q1"].verdict == "kept"
+    surely = passing(of, {"q1": amplitude(899)})["q1"]
+    assert surely.possibility == (1.0, 1.0)
+    assert surely.verdict in ("passed", "undecided")  # the least peak is a bound, not attained
+
+
+def test_a_limit_far_below_is_passed_by_all_motions(proved):
+    low = 0.9 * proved.lower[0]
+    answers = passing(proved, dict(zip(proved.outputs, low, strict=True)))
+    assert {one.verdict for one in answers.values()} == {"passed"}
+    assert answers[ANY].necessity == (1.0, 1.0)
+
+
+def test_any_of_several_limits_is_as_possible_as_the_most_possible(proved):
+    upper = proved.upper
+    limits = {"q1": upper[1, 0] * 0.999, "drift2": upper[3, 1] * 0.999, "base_shear": 1e9}
+    answers = passing(proved, limits)
+    assert answers["base_shear"].possibility == (0.0, 0.0)
+    assert answers[ANY].possibility == answers["drift2"].possibility
+    assert answers[ANY].possibility[0] >= answers["q1"].possibility[0]
+
+
+def test_attained_bounds_exclude_nothing_and_say_so():
+    motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="graph-follower")
+    of = peaks(motion)
+    assert set(of.natures) == {Nature.ATTAINED}
+    far = passing(of, {"q1": 10 * of.upper[0, 0]})["q1"]
+    assert (far.possibility, far.nature, far.verdict) == ((0, 1), Nature.ATTAINED, "undecided")
+    near = passing(of, {"q1": 0.9 * of.reached[1, 0]})["q1"]
+    assert near.possibility == (1.0, 1.0)
+    assert near.necessity == (0.0, 1.0)
+
+
+def test_levels_below_the_lowest_are_left_open():
+    motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0.5, 1))
+    answer = passing(peaks(motion), {"q1": 1.0})["q1"]
+    assert answer.possibility == (0.0, 0.5)
+    assert answer.verdict == "kept from α = 0.5 up"
+
+
+def test_the_scale_of_tolerances_is_kept_and_a_greater_one_passed():
+    inputs = {"m1": Triangular(900, 1000, 1100)}
+    limit = amplitude(1000 + 1.4 * 100)
+    answer = tolerances(ONE, inputs, {"q1": limit}, duration=6, step=0.01, most=3, precision=0.003)
+    assert answer.nature is Nature.GUARANTEED
+    assert answer.kept <= 1.4 <= answer.passed
+    assert answer.passed - answer.kept <= 0.03
+    assert answer.supports["m1"] == pytest.approx(
+        (1000 - 100 * answer.kept, 1000 + 100 * answer.kept)
+    )
+    assert motions(ONE, scaled(inputs, answer.kept), 500, duration=6, step=0.01).max() <= limit
+
+
+@pytest.mark.parametrize(("limit", "kept", "passed"), [(1e-3, None, 0.0), (9.0, 2.0, np.inf)])
+def test_tolerances_at_their_ends(limit, kept, passed):
+    answer = tolerances(
+        ONE, {"m1": Triangular(900, 1000, 1100)}, {"q1": limit}, duration=2, step=0.01
+    )
+    assert (answer.kept, answer.passed) == (kept, passed)
+
+
+def speed(rng, count):
+    return rng.normal(0.4, 0.1, count)
+
+
+def probable(frame=FRAME, inputs=INPUTS, limits=None, **changes):
+    settings = {"duration": 4, "step": 0.05, "alpha": (0, 0.5, 1), "spread": 16}
+    settings |= {"rng": np.random.default_rng(0), "samples": 400, **changes}
+    limits = limits or {"drift2": 0.16, "q1": 0.14}
+    return probabilities(frame, inputs, {"v2_0": speed}, limits, **settings)
+
+
+def test_probabilities_are_nested_and_agree_with_independent_draws():
+    answers = probable()
+    one = answers["drift2"]
+    assert (np.diff(one.upper) <= 0).all()
+    assert (np.diff(one.lower) >= 0).all()
+    assert one.lower[-1] == one.upper[-1]
+    assert (answers[ANY].upper >= one.upper).all()
+    draws = np.random.default_rng().normal(0.4, 0.1, 4000)
+    points = np.column_stack([np.full(4000, 25e9), np.full(4000, 7e3), draws])
+    size = np.abs(LinearFlow(FRAME, ("E", "m2", "v2_0"), 4, 0.05, Exact()).values(points)).max(1)
+    share = (size[:, 1] > 0.16).mean()
+    assert one.upper[-1] == pytest.approx(share, abs=5 * one.deviation)
+
+
+def test_the_curve_falls_from_one_to_none():
+    one = probable()["q1"]
+    assert (np.diff(one.curve, axis=-1) <= 0).all()
+    assert one.curve[0, 0, 0] == one.curve[1, 0, 0] == 1
+    assert one.curve[1, 0, -1] == 0
+
+
+@pytest.mark.parametrize(
+    ("limits", "random", "key"),
+    [
+        ({"q9": 1.0}, {}, "limits"),
+        ({"q1": 0.0}, {}, "limit of q1"),
+        ({"q1": 1.0}, {"E": speed}, "random"),
+        ({"q1": 1.0}, {"v2_0": lambda rng, n: rng.random(3)}, "values of v2_0"),
+    ],
+)
+def test_wrong_questions_are_refused(limits, random, key):
+    with pytest.raises(RefusedError) as refused:
+        probabilities(
+            FRAME, INPUTS, random, limits, duration=1, step=0.1, rng=np.random.default_rng(0)
+        )
+    assert refused.value.key == key
+
+
+def test_a_share_of_relative_tolerances_would_be_seen():
+    """The error of an envelope widens its peaks: without it the reference would lie outside."""
+    motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="graph-follower")
+    of = peaks(motion)
+    assert (of.error > 0).all()
+    assert (of.reached <= of.upper).all()
+    shaken = replace(motion, error=np.zeros_like(motion.lower), between=None)
+    assert (peaks(shaken).error == 0).all()
