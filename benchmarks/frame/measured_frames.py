@@ -19,9 +19,8 @@ import numpy as np
 
 from alphacut.case.load import load
 from alphacut.frame import StoreyFrame
-from alphacut.frame.update.chain import Chain, eigenvalue_ranges
-from alphacut.frame.update.measured import Measurement, measured_mode
-from alphacut.frame.update.posterior import RefutedError, update
+from alphacut.frame.identify import Measurement, RefutedError, identify, measured_mode
+from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.stages.vibration.structure import structure
 from alphacut.stages.vibration.update import learned
@@ -69,26 +68,27 @@ def tall_rows() -> list[dict[str, object]]:
         f"c{z + 1}": Interval(0.7 * k, 1.3 * k) for z, k in enumerate(STIFFNESS / 12)
     }
     chain = Chain.of(frame, tuple(prior))
-    low, high = eigenvalue_ranges(chain, np.full(18, np.log(0.7)), np.full(18, np.log(1.3)))
+    ends = eigenvalue_ranges(chain, np.full(18, np.log(0.7)), np.full(18, np.log(1.3)))
+    low, high = (float(np.sqrt(end[2]) / (2 * np.pi)) for end in ends)
     try:
-        found = update(frame, prior, tall_modes((1, 2)), alpha=(0.05,))
-        two = f"agree to {found.height[0]:.2f}"
-        low, high = (ends[0] for ends in found.frequencies)
+        result = identify(frame, prior, tall_modes((1, 2)), alpha=(0.05,))
+        two = f"agree to {result.height[0]:.2f}"
+        third = result.predictions()[2]
+        low, high = float(third.lower[0]), float(third.upper[0])
     except RefutedError:
         two = "refuted"
-        low, high = np.sqrt(low) / (2 * np.pi), np.sqrt(high) / (2 * np.pi)
     try:
-        update(frame, prior, tall_modes((1, 2, 3)), alpha=(0.05,))
+        identify(frame, prior, tall_modes((1, 2, 3)), alpha=(0.05,))
         three = "agree"
     except RefutedError:
         three = "refuted"
-    inside = bool(low[2] <= FREQUENCIES[2] <= high[2])
+    inside = low <= FREQUENCIES[2] <= high
     return [
         {
             "frame": "E-Defense, 18 storeys",
             "mode": 3,
-            "low": float(low[2]),
-            "high": float(high[2]),
+            "low": low,
+            "high": high,
             "measured": FREQUENCIES[2],
             "inside": inside,
             "learned_from": two,

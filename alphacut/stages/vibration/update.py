@@ -24,8 +24,7 @@ from alphacut.stages.vibration.structure import Structure
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.frame.update.measured import MeasuredMode
-    from alphacut.frame.update.posterior import Posterior
+    from alphacut.frame.identify import Identified, MeasuredMode
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Learned:
         structure: The structure with the inputs learned.
     """
 
-    posterior: Posterior | None
+    posterior: Identified | None
     refuted: str
     prior: Mapping[str, FuzzyNumber]
     held_out: tuple[HeldOut, ...]
@@ -97,7 +96,7 @@ class Learned:
 
 def prior_support(number: FuzzyNumber) -> tuple[float, float]:
     """The widest cut that a prior decides, in SI."""
-    from alphacut.frame.update.agreement import widest
+    from alphacut.frame.identify.possibility import widest
 
     return widest(number)
 
@@ -137,8 +136,7 @@ def learned(case: Case, wanted: Structure) -> Learned:
     Raises:
         BadInput: The file of modes is wrong, or an input cannot be learned.
     """
-    from alphacut.frame.update.measured import Measurement
-    from alphacut.frame.update.posterior import RefutedError, update
+    from alphacut.frame.identify import Measurement, RefutedError, identify
 
     if wanted.frame is None:
         raise BadInput.of("update", "natural modes are learned from for a storey frame")
@@ -148,20 +146,16 @@ def learned(case: Case, wanted: Structure) -> Learned:
     prior = inputs(case, wanted)
     try:
         measurement = Measurement(tuple(_measured(case, row) for row in used), given.independent)
-        found = update(wanted.frame, prior, measurement, alpha=given.alpha)
+        found = identify(wanted.frame, prior, measurement, alpha=given.alpha)
     except RefutedError as error:
         return Learned(None, str(error), prior, (), wanted)
     except ValueError as error:
         raise BadInput.of("update", str(error), file=str(case.path)) from None
-    low, high = found.frequencies
+    predictions = {one.mode: one for one in found.predictions()}
     predicted = tuple(
-        HeldOut(
-            row.mode,
-            float(row.frequencies.mean()),
-            (float(low[0, row.mode - 1]), float(high[0, row.mode - 1])),
-        )
+        HeldOut(row.mode, float(row.frequencies.mean()), (float(one.lower[0]), float(one.upper[0])))
         for row in rows
-        if row.mode in held and row.mode <= low.shape[1]
+        if row.mode in held and (one := predictions.get(row.mode)) is not None
     )
     after = replace(wanted, numbers={**wanted.numbers, **found.numbers})
     return Learned(found, "", prior, predicted, after)
@@ -212,7 +206,7 @@ def inputs(case: Case, wanted: Structure) -> dict[str, FuzzyNumber]:
 
 
 def _measured(case: Case, row: ModeRows) -> MeasuredMode:
-    from alphacut.frame.update.measured import measured_mode
+    from alphacut.frame.identify import measured_mode
 
     shapes = {floor: [*map(float, values)] for floor, values in row.amplitudes.items()}
     return measured_mode(

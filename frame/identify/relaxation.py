@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import csr_array
 
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.update.chain import Chain, chain_modes, eigenvalue_ranges
-from alphacut.frame.update.linear_bounds import LinearProgram
-from alphacut.frame.update.measured import MeasuredMode, ModeCut
+from alphacut.frame.identify.chain import Chain, chain_modes, eigenvalue_ranges
+from alphacut.frame.identify.linear_bounds import LinearProgram
+from alphacut.frame.identify.measured import MeasuredMode, ModeCut
+from alphacut.fuzzy.arrays import Array
 
 Linear = dict[int, float]
 """Coefficients by variable; that of CONSTANT stands alone."""
@@ -101,15 +101,15 @@ def scaled(x: Linear, factor: float) -> Linear:
 
 def total(x: Linear, y: Linear, factor: float = 1.0) -> Linear:
     """Sum x + factor · y."""
-    found = dict(x)
+    result = dict(x)
     for at, a in y.items():
-        found[at] = found.get(at, 0.0) + factor * a
-    return found
+        result[at] = result.get(at, 0.0) + factor * a
+    return result
 
 
 @dataclass(frozen=True, eq=False)
 class Relaxation:
-    """The linear program over a box, with the places of what is asked of it.
+    """The linear program over a box, with the expressions to bound.
 
     Args:
         program: The program.
@@ -143,7 +143,7 @@ def relaxation(
         chain: The frame.
         lower: Lower ends of the log parameters over their nominal values.
         upper: Upper ends.
-        modes: What was measured, at a level.
+        modes: Measured modes and their cuts at a level.
         amplitudes: Known ends of amplitudes that were not measured, by mode and floor.
     """
     rows = Rows()
@@ -169,11 +169,11 @@ def relaxation(
 
 
 def _sum(logs: list[Linear], powers: Array) -> Linear:
-    found: Linear = {}
+    result: Linear = {}
     for log, power in zip(logs, powers, strict=True):
         if power:
-            found = total(found, log, float(power))
-    return found or {CONSTANT: 0.0}
+            result = total(result, log, float(power))
+    return result or {CONSTANT: 0.0}
 
 
 def _shape_rows(
@@ -212,7 +212,7 @@ def _all_amplitudes(
     Floors between two measured ones are a chain between moved supports, whose matrix K − λ M is
     positive definite while λ stays below its own least frequency.
     """
-    n, found = len(mass), dict(cut.shape)
+    n, amplitudes = len(mass), dict(cut.shape)
     k = np.array([rows.range(x) for x in stiffness]) * chain.stiffness[:, None]
     m = np.array([rows.range(x) for x in mass]) * chain.mass[:, None]
     pins = [0, *sorted(cut.shape)]
@@ -236,8 +236,8 @@ def _all_amplitudes(
             right = float(np.hypot(right, k[following - 1, 1] * ends[following]))
             if size == 1:
                 right = k[pin, 1] * ends[pin] + k[following - 1, 1] * ends[following]
-        found |= {floor: (-right / least, right / least) for floor in floors}
-    return found
+        amplitudes |= {floor: (-right / least, right / least) for floor in floors}
+    return amplitudes
 
 
 def _frequency_rows(

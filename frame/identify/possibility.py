@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares, linprog
+from scipy.optimize import least_squares
 
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.update.chain import Chain
-from alphacut.frame.update.measured import Measurement
+from alphacut.frame.identify.chain import Chain
+from alphacut.frame.identify.measured import Measurement
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.sets.claimed import Claimed, Joint
 from alphacut.fuzzy.sets.numbers import Cut
 
@@ -28,7 +27,7 @@ class Agreement:
     Args:
         chain: The frame.
         prior: Fuzzy number of each parameter of the chain.
-        measured: The measured modes.
+        measured: Measured modes.
     """
 
     chain: Chain
@@ -37,7 +36,7 @@ class Agreement:
 
     @cached_property
     def numbers(self) -> dict[str, FuzzyNumber]:
-        """Parameters first, then what was measured."""
+        """Parameters first, then the measured quantities."""
         return {**self.prior, **self.measured.quantities}
 
     @cached_property
@@ -101,38 +100,16 @@ class Agreement:
         return np.asarray((self.values(self.chain.nominal * np.exp(logs)[None])[0] - middle) / half)
 
     def best(self, lower: Array, upper: Array) -> Array:
-        """Log parameters in a box of them, (d,), whose least agreement is about the largest."""
-        d = len(lower)
-        inside = np.where(upper > lower, (lower + upper) / 2, lower)
-        slack = 1e-9 * np.ones(d)
-        found = least_squares(
+        """Log parameters in a box of them, (d,), that agree best by least squares."""
+        d, slack = len(lower), 1e-9
+        fitted = least_squares(
             lambda x: self.distance(x)[d:],
-            inside,
+            np.where(upper > lower, (lower + upper) / 2, lower),
             jac=lambda x: self.slopes(x)[d:],
             bounds=(lower - slack, upper + slack),
             max_nfev=30,
-        ).x
-        best: Array = np.clip(found, lower, upper)
-        for _ in range(6):
-            step = self._minimax_step(best, lower, upper)
-            if step is None:
-                break
-            tried = np.stack([best + part * step for part in (1.0, 0.5, 0.25, 0.0)])
-            worst = [np.abs(self.distance(row)[d:]).max() for row in tried]
-            best = tried[int(np.argmin(worst))]
-            if np.argmin(worst) == 3:
-                break
-        return best
-
-    def _minimax_step(self, at: Array, lower: Array, upper: Array) -> Array | None:
-        d = len(at)
-        away, slopes = self.distance(at)[d:], self.slopes(at)[d:]
-        ones = np.ones((len(away), 1))
-        rows = np.block([[slopes, -ones], [-slopes, -ones]])
-        ends = [*zip(lower - at, upper - at, strict=True), (0, None)]
-        cost = np.append(np.zeros(d), 1.0)
-        found: Any = linprog(cost, A_ub=rows, b_ub=np.append(-away, away), bounds=ends)
-        return found.x[:d] if found.status == 0 else None
+        )
+        return np.asarray(np.clip(fitted.x, lower, upper))
 
 
 def widest(number: FuzzyNumber) -> Cut:

@@ -8,14 +8,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import chdtri
 
-from alphacut.frame.calculus.jet import Array
 from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import from_scatter
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.sets.claimed import Claimed
 
 NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
 ROUGH = 0.2  # deviation of the reference over its amplitude above which ratios have no law
-CHANCE = 1e-6  # probability below which values contradict the deviation that is given of them
+ROUGH_ALLOWED = f"values up to {ROUGH:g}"
+CHANCE = 1e-6  # probability below which values contradict their deviation
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,8 @@ class MeasuredMode:
         reference: The floor whose amplitude is 1; 0 where no shape was measured.
 
     Raises:
-        ValueError: The mode or a floor is below 1, the frequency may be 0 or less, or the reference
-            floor has an amplitude.
+        RefusedError: The mode or a floor is below 1, the frequency may be 0 or less, or the
+            reference floor has an amplitude.
     """
 
     mode: int
@@ -40,22 +42,20 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        if self.mode < 1 or any(floor < 1 for floor in self.shape):
-            raise ValueError(f"mode {self.mode}: modes and floors are numbered from 1")
-        if not self.frequency.modal > 0:
-            raise ValueError(
-                f"mode {self.mode}: its frequency is {self.frequency.modal:g} Hz; it must be"
-                " positive"
-            )
-        if self.shape and (self.reference < 1 or self.reference in self.shape):
-            raise ValueError(
-                f"mode {self.mode}: its reference floor is {self.reference}; it must be a floor"
-                " that is not among the measured amplitudes, since its own is 1"
-            )
+        floors = [*self.shape]
+        own = not floors or (self.reference >= 1 and self.reference not in floors)
+        for key, value, meaningful, allowed in (
+            ("number", self.mode, self.mode >= 1, "numbers from 1 on"),
+            ("floors", floors, min(floors, default=1) >= 1, "numbers from 1 on"),
+            ("frequency", self.frequency.modal, self.frequency.modal > 0, "positive values in Hz"),
+            ("reference", self.reference, own, "a floor beside those of the shape"),
+        ):
+            if not meaningful:
+                raise RefusedError(f"mode {self.mode}: {key}", value, allowed)
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:
-        """What was measured, by name: "f1", and "shape1_3" for the third floor."""
+        """Measured quantities by name: "f1", and "shape1_3" for the third floor."""
         return {
             f"f{self.mode}": self.frequency,
             **{f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()},
@@ -70,7 +70,7 @@ def measured_mode(
     frequency_deviation: float | None = None,
     shape_deviation: float | None = None,
 ) -> MeasuredMode:
-    """A mode from repeated values: what is claimed is the mean of the normal law of each.
+    """A mode from repeated values; the claim is the mean of the normal law of each.
 
     Args:
         mode: Its number by rising frequency, from 1.
@@ -78,18 +78,20 @@ def measured_mode(
         shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
             that of the reference floor, the highest near the largest: no chance decides.
         frequency_deviation: Standard deviation of one value as a share of it, where it is known
-            from elsewhere; from the values' own scatter if not given, which takes two at least.
+            from elsewhere; from the values' own scatter otherwise, which takes two at least.
         shape_deviation: The same of any amplitude, as a share of the largest of the mode. Those of
             all floors are taken to scatter alike.
 
     Raises:
-        ValueError: Values are too few or contradict their deviation, counts differ, or a reference
-            amplitude is 0 or scatters by more than `ROUGH`.
+        RefusedError: Values are too few or contradict their deviation, counts differ, or an
+            amplitude of the reference is 0 or scatters by more than `ROUGH`.
     """
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
-    if any(row.shape != values.shape for row in rows.values()) or values.ndim != 1:
-        raise ValueError(f"mode {mode}: each floor needs {values.size} amplitudes, as frequencies")
+    counts = [row.size for row in rows.values()]
+    if values.ndim != 1 or set(counts) - {values.size}:
+        allowed = f"{values.size} of each floor, as many as frequencies"
+        raise RefusedError(f"mode {mode}: amplitudes", counts, allowed)
     spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
     number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
@@ -98,17 +100,16 @@ def measured_mode(
     largest = max(means.values())
     reference = max(floor for floor, mean in means.items() if mean >= NEAR * largest)
     if not rows[reference].all():
-        raise ValueError(f"mode {mode}: an amplitude of floor {reference}, the reference, is 0")
+        key = f"mode {mode}: an amplitude of floor {reference}, the reference,"
+        raise RefusedError(key, 0, "values other than 0")
     shape = {}
     for floor in [floor for floor in rows if floor != reference]:
         what = f"mode {mode}: amplitudes q{floor}/q{reference} of floor {floor}"
         ratios = rows[floor] / rows[reference]
         square = _scatter(ratios, shape_deviation and shape_deviation * largest / means[reference])
         if square > ROUGH**2:
-            raise ValueError(
-                f"{what}: the reference scatters by {np.sqrt(square):.2g} of its amplitude, allowed"
-                f" is up to {ROUGH:g}; write means of several rows in their place"
-            )
+            value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
+            raise RefusedError(f"{what}: scatter of floor {reference}", value, ROUGH_ALLOWED, cure)
         # the reference scatters, too; the last factor is above the second order's
         share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
         both = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
@@ -125,21 +126,23 @@ def _scatter(ratios: Array, deviation: float | None) -> float:
 
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:
+    """The mean of measured values as a claim.
+
+    Raises:
+        RefusedError: Their scatter is unknown, or contradicts the deviation.
+    """
     count = len(values)
     if deviation is not None and not deviation > 0:
-        raise ValueError(f"{what}: {key} must be positive; leave it out, or give 0.01, say")
+        raise RefusedError(f"{what}: {key}", deviation, "positive values, such as 0.01, or none")
     if deviation is None and np.allclose(values, values[0], 1e-12, 0.0):
-        told = "one value tells" if count < 2 else f"{count} values that are all {values[0]:g} tell"
-        cure = "measure more" if count < 2 else "write all digits"
-        raise ValueError(f"{what}: {told} no scatter; {cure}, or give {key}, such as 0.01")
+        value, cure = f"{count} times {values[0]:g}", f"set {key}, such as 0.01"
+        raise RefusedError(what, value, "values that scatter", cure)
     if deviation is None:
         return from_data(values, "mean", law="normal")
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0
     if (count - 1) * (scatter / deviation) ** 2 > chdtri(max(count - 1, 1), CHANCE):
-        raise ValueError(
-            f"{what} scatter by {scatter:.3g}, and {key} makes that {deviation:.3g}, which chance"
-            f" does in one of {1 / CHANCE:.0e} cases; give a larger one, or none"
-        )
+        value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
+        raise RefusedError(f"{what}: {key} times the mean", value, allowed, "leave it out")
     return from_scatter(float(values.mean()), deviation, count, known=True)
 
 
@@ -153,7 +156,7 @@ class Measurement:
             dependence if not.
 
     Raises:
-        ValueError: There is no mode, or one twice.
+        RefusedError: There is no mode, or one twice.
     """
 
     modes: tuple[MeasuredMode, ...]
@@ -162,11 +165,11 @@ class Measurement:
     def __post_init__(self) -> None:
         numbers = [mode.mode for mode in self.modes]
         if not numbers or sorted(set(numbers)) != numbers:
-            raise ValueError(f"the measured modes are {numbers}; they must rise, one at least")
+            raise RefusedError("modes", numbers, "one or more, rising")
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:
-        """All that was measured, by name."""
+        """All measured quantities by name."""
         return {name: x for mode in self.modes for name, x in mode.quantities.items()}
 
     def cuts(self, alpha: float, beta: float) -> Iterator[tuple[MeasuredMode, ModeCut]]:
@@ -186,7 +189,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class ModeCut:
-    """What a mode may be at a level.
+    """Ranges of a mode at a level.
 
     Args:
         low: Least squared angular frequency, in 1/s².

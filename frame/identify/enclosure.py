@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.update.chain import Chain
-from alphacut.frame.update.measured import MeasuredMode, ModeCut
-from alphacut.frame.update.relaxation import Relaxation, relaxation
+from alphacut.frame.identify.chain import Chain
+from alphacut.frame.identify.measured import MeasuredMode, ModeCut
+from alphacut.frame.identify.relaxation import Relaxation, relaxation
+from alphacut.fuzzy.arrays import Array
 
 SETTLED = 0.03
 """Share of the widths that a further pass must take off to be worth another one."""
-PASSES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +35,7 @@ def enclosure(
     lower: Array,
     upper: Array,
     modes: list[tuple[MeasuredMode, ModeCut]],
-    passes: int = PASSES,
+    passes: int,
 ) -> Enclosure | None:
     """The box, from one that holds all parameters that are possible; None where none agree.
 
@@ -44,7 +43,7 @@ def enclosure(
         chain: The frame.
         lower: Lower ends of the log parameters over their nominal values, shape (d,).
         upper: Upper ends.
-        modes: What was measured, at a level.
+        modes: Measured modes and their cuts at a level.
         passes: Most passes over all ends.
     """
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
@@ -67,11 +66,11 @@ def enclosure(
         for at, expression in enumerate(held.parameters):
             if lower[at] == upper[at]:
                 continue
-            low, high, found = _ends(held, expression)
+            low, high, reached = _ends(held, expression)
             if max(low, lower[at]) > min(high, upper[at]):
                 return None
             ends[:, at] = max(low, lower[at]), min(high, upper[at])
-            rows += [_point(held, x, lower) for x in found if x is not None]
+            rows += [_point(held, x, lower) for x in reached if x is not None]
         lower, upper = ends
         points = np.array(rows).reshape(-1, len(lower))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -91,8 +90,8 @@ def _ends(
 
 def _point(held: Relaxation, x: Array, fixed: Array) -> Array:
     """Log parameters of a point of the linear program."""
-    found = [
+    logs = [
         sum(a * (1.0 if at < 0 else x[at]) for at, a in expression.items())
         for expression in held.parameters
     ]
-    return np.array(found, float).reshape(fixed.shape)
+    return np.array(logs, float).reshape(fixed.shape)

@@ -13,10 +13,10 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.sparse import csr_array, hstack
 
-from alphacut.frame.calculus.jet import Array
+from alphacut.fuzzy.arrays import Array
 
 ROUND_OFF = 1e-13
-"""Share of the sums' sizes that is given away for rounding."""
+"""Share of the sums' sizes by which bounds are widened for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +41,15 @@ class LinearProgram:
         The bound is infinite where the set is proved empty.
         """
         ends = np.column_stack([self.lower, self.upper])
-        found = linprog(objective, A_ub=self.rows, b_ub=self.right, bounds=ends, method="highs")
-        if found.status == 2:
+        result = linprog(objective, A_ub=self.rows, b_ub=self.right, bounds=ends, method="highs")
+        if result.status == 2:
             return (np.inf if self.empty() else self._box(objective)), None
-        if found.status != 0:
+        if result.status != 0:
             return self._box(objective), None
-        return self._proved(objective, np.minimum(found.ineqlin.marginals, 0.0)), found.x
+        return self._proved(objective, np.minimum(result.ineqlin.marginals, 0.0)), result.x
 
     def empty(self) -> bool:
-        """Whether no point is proved to fulfil all rows."""
+        """True if it is proved that no point fulfils all rows."""
         size = self.rows.shape[0]
         relaxed = LinearProgram(
             csr_array(hstack([self.rows, csr_array(-np.ones((size, 1)))])),

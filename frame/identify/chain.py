@@ -13,9 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.structures.storey_springs import springs
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
 ROUND_OFF = 1e-13
 """Share of the largest eigenvalue by which a computed one may be wrong, at most."""
@@ -46,15 +48,13 @@ class Chain:
         """The chain of a frame with some parameters uncertain.
 
         Raises:
-            ValueError: A name is no parameter of stiffness or mass, or weights soften the storeys:
-                stiffnesses are no products then.
+            RefusedError: A name is no parameter of stiffness or mass, or weights soften the
+                storeys, so that stiffnesses are no products.
         """
         n, values = frame.floors, frame.parameters
         if frame.gravity:
-            raise ValueError(
-                "gravity: natural modes are learned from without P-Delta, whose stiffness is no"
-                " product of powers; learn from a recorded motion, or leave it out"
-            )
+            allowed = "none: a storey softened by weight has no stiffness of such a product"
+            raise RefusedError("frame.gravity", frame.gravity, allowed)
         powers = np.zeros((2, n, len(names)))
         for column, name in enumerate(names):
             part = re.fullmatch(r"([clmkI])(\d+)", name)
@@ -64,10 +64,8 @@ class Chain:
                 row = int(part[2]) - 1
                 powers[int(part[1] == "m"), row, column] = -3 if part[1] == "l" else 1
             else:
-                raise ValueError(
-                    f"'{name}' cannot be learned from natural modes; E, I, c1 … c{n} (columns of a"
-                    f" storey), l1 …, m1 … can, or k1 … k{n} where stiffnesses are given"
-                )
+                allowed = f"E, I, c1 … c{n} (columns), l1 …, m1 …, or k1 … k{n} (stiffnesses)"
+                raise RefusedError("identify.parameters", name, allowed)
         modal = {name: Jet.constant([value], 0) for name, value in values.items()}
         k = np.array([at.value for at in springs(frame, modal)])[:, 0]
         nominal = np.array([values[name] for name in names])

@@ -1,0 +1,241 @@
+"""Parameters of a storey frame from its measured natural modes.
+
+At each level the cuts of all priors and of all measured quantities leave a set of parameters. Where
+the claims among them hold together with P >= 1 − α, the set holds the true parameters with that
+probability, if the opinions and the model are right. A box encloses the set, proved by linear
+relaxations (`enclosure`). Samples of the set (`Identified.samples`) show how much narrower it may
+be, and predictions (`Identified.predictions`) what its frames vibrate like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
+from alphacut.frame.identify.directions import Direction, directions
+from alphacut.frame.identify.enclosure import Enclosure, enclosure
+from alphacut.frame.identify.measured import Measurement
+from alphacut.frame.identify.possibility import Agreement, widest
+from alphacut.frame.identify.predictions import Prediction
+from alphacut.frame.identify.samples import walk
+from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.knowledge.joint import JointClaim
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.sets.claimed import Claim, Claimed
+from alphacut.fuzzy.sets.numbers import Cut
+from alphacut.fuzzy.sets.stepwise import outer_steps
+
+ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
+PASSES = 6
+
+
+class RefutedError(FailedError):
+    """No parameters in the priors agree with the measurement at the lowest level."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """Parameters that agree with measured modes.
+
+    Args:
+        agreement: Priors, measurement and their joint possibility.
+        alpha: Levels, shape (A,), rising.
+        lower: Lower ends of boxes proved to hold the sets, shape (A, d), in SI units. Above
+            `height` they repeat the last one that is not proved empty.
+        upper: Upper ends.
+        best: Parameters that agree best by least squares, shape (d,).
+        height: Possibility of `best`, and the least level whose set is proved empty (1 if none is).
+        directions: Directions of the logarithms of the parameters, most learned first.
+    """
+
+    agreement: Agreement
+    alpha: Array
+    lower: Array
+    upper: Array
+    best: Array
+    height: tuple[float, float]
+    directions: tuple[Direction, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters."""
+        return self.agreement.chain.names
+
+    @property
+    def claim(self) -> JointClaim:
+        """Coverage of the boxes: the claims, and the conditions under which they hold."""
+        joint = JointClaim.of(self.agreement.numbers)
+        model = ("the structure is such a storey frame",)
+        return JointClaim(self.agreement.joint, (*joint.given, *model), joint.opinions)
+
+    @property
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """The parameters as fuzzy numbers that hold together, for an envelope.
+
+        Below the lowest level the prior's support holds.
+        """
+        rule, priors = self.agreement.joint, self.agreement.prior
+        numbers: dict[str, FuzzyNumber] = {}
+        for column, name in enumerate(self.names):
+            ends = np.stack([self.lower[:, column], self.upper[:, column]])
+            alpha, decided = self.alpha, float(self.alpha[0])
+            if not isinstance(priors[name], Claimed):
+                alpha, decided = np.append(0.0, alpha), 0.0
+                ends = np.column_stack([priors[name].support, ends])
+            steps = outer_steps(tuple(alpha), tuple(ends[0]), tuple(ends[1]))
+            claim = Claim("" if rule is None else rule.means, self.claim.given)
+            numbers[name] = steps if rule is None else Claimed(steps, claim, decided, joint=rule)
+        return numbers
+
+    @property
+    def narrowed(self) -> dict[str, float]:
+        """Width of each parameter's lowest cut over that of its prior."""
+        level, priors = float(self.alpha[0]), self.agreement.prior
+        widths = [_prior_cut(priors[name], level, self.agreement).width for name in self.names]
+        shares = (self.upper[0] - self.lower[0]) / np.array(widths)
+        return dict(zip(self.names, map(float, shares), strict=True))
+
+    def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
+        """Points of the set at level `alpha[row]`, shape (number, d), about uniform in logarithms.
+
+        Raises:
+            FailedError: The best parameters do not agree to this level.
+        """
+        if self.height[0] < self.alpha[row]:
+            what = f"the best parameters agree to {self.height[0]:.3g}"
+            raise FailedError(what, f"take a level up to that, not {self.alpha[row]:g}")
+        nominal, level = self.agreement.chain.nominal, float(self.alpha[row])
+        logs = walk(
+            lambda x: self.agreement.possibility(nominal * np.exp(x)) >= level,
+            np.log(self.best / nominal),
+            (np.log(self.lower[row] / nominal), np.log(self.upper[row] / nominal)),
+            number,
+            np.random.default_rng(seed),
+        )
+        return np.asarray(nominal * np.exp(logs))
+
+    def predictions(self, number: int = 200, *, seed: int = 0) -> tuple[Prediction, ...]:
+        """Natural frequencies of all modes, measured or not, at each level.
+
+        Args:
+            number: Samples at the lowest level whose frequencies stand beside the proved range.
+            seed: Seed of the samples.
+        """
+        chain = self.agreement.chain
+        logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
+        ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
+        hertz = np.sqrt(np.maximum(np.array(ranges), 0.0)) / (2 * np.pi)  # (A, 2, n)
+        drawn = np.full((0, len(chain.mass)), np.nan)
+        if self.height[0] >= self.alpha[0]:
+            drawn = np.sqrt(chain.modes(self.samples(number, seed=seed))[0]) / (2 * np.pi)
+        used = {mode.mode: mode.frequency for mode in self.agreement.measured.modes}
+        return tuple(
+            Prediction(
+                k + 1, self.alpha, hertz[:, 0, k], hertz[:, 1, k], drawn[:, k], k + 1 in used
+            )
+            for k in range(len(chain.mass))
+        )
+
+
+def identify(
+    frame: StoreyFrame,
+    prior: Mapping[str, FuzzyNumber | float],
+    measured: Measurement,
+    *,
+    alpha: Sequence[float] = ALPHA,
+    passes: int = PASSES,
+) -> Identified:
+    """Parameters of a frame that agree with its measured natural modes.
+
+    Args:
+        frame: The frame; damping, motion and outputs do not matter.
+        prior: Fuzzy numbers of the parameters, of "E", "I", "c1" … (columns of a storey), "l1" …,
+            "m1" …, in SI units.
+        measured: The measured modes.
+        alpha: Levels, rising within (0, 1].
+        passes: Most passes of the enclosure at a level.
+
+    Raises:
+        RefusedError: An input is no parameter of the natural modes, a mode or floor is not the
+            frame's, or levels do not rise within (0, 1].
+        RefutedError: No parameters in the priors agree with the measurement at the lowest level.
+    """
+    numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
+    _refuse(frame, measured, numbers, alpha)
+    agreement = Agreement(Chain.of(frame, tuple(numbers)), numbers, measured)
+    levels = np.asarray(alpha, float)
+    boxes, empty = _boxes(agreement, levels, passes)
+    if not boxes:
+        raise RefutedError(
+            f"no parameters in their priors agree with the measured modes at α = {levels[0]:g}:"
+            f" a storey frame with such parameters is refuted (by chance with P <= {levels[0]:g})",
+            "widen the priors, or check masses and numbers of modes",
+        )
+    last = boxes[-1]
+    boxes += [last] * (len(levels) - len(boxes))
+    best = agreement.best(last.lower, last.upper)
+    point = agreement.chain.nominal * np.exp(best)
+    height = float(agreement.possibility(point[None])[0])
+    lower = _outward(np.stack([box.lower for box in boxes]), agreement, -1)
+    upper = _outward(np.stack([box.upper for box in boxes]), agreement, +1)
+    lost = directions(agreement, best)
+    return Identified(agreement, levels, lower, upper, point, (height, empty), lost)
+
+
+def _refuse(
+    frame: StoreyFrame,
+    measured: Measurement,
+    prior: Mapping[str, FuzzyNumber],
+    alpha: Sequence[float],
+) -> None:
+    """Refuses levels, modes, floors and priors without meaning for the frame."""
+    levels, floors = np.asarray(alpha, float), frame.floors
+    rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
+    least = min(widest(number).lower for number in prior.values())
+    most = max(max(mode.mode, mode.reference, *mode.shape, 1) for mode in measured.modes)
+    for key, value, meaningful, allowed in (
+        ("alpha", list(alpha), rising and levels[0] > 0 and levels[-1] <= 1, "rising in (0, 1]"),
+        ("modes", most, most <= floors, f"modes and floors from 1 to {floors}"),
+        ("parameters", least, least > 0, "positive priors"),
+    ):
+        if not meaningful:
+            raise RefusedError(f"identify.{key}", value, allowed)
+
+
+def _prior_cut(number: FuzzyNumber, alpha: float, agreement: Agreement) -> Cut:
+    """Cut of a prior at the joint level α."""
+    return number.cut(agreement.own_level(alpha) if isinstance(number, Claimed) else alpha)
+
+
+def _boxes(agreement: Agreement, levels: Array, passes: int) -> tuple[list[Enclosure], float]:
+    """Boxes of log parameters by level until one is empty, and that level."""
+    boxes: list[Enclosure] = []
+    nominal = agreement.chain.nominal
+    for level in map(float, levels):
+        cuts = [_prior_cut(x, level, agreement) for x in agreement.prior.values()]
+        lower, upper = np.log(np.array(cuts).T / nominal)
+        if boxes:
+            lower = np.maximum(lower, boxes[-1].lower)
+            upper = np.minimum(upper, boxes[-1].upper)
+        modes = [*agreement.measured.cuts(level, agreement.own_level(level))]
+        box = None
+        if (lower <= upper).all():
+            box = enclosure(agreement.chain, lower, upper, modes, passes)
+        if box is None:
+            return boxes, level
+        boxes.append(box)
+    return boxes, 1.0
+
+
+def _outward(logs: Array, agreement: Agreement, sign: int) -> Array:
+    """Parameters of log ends (A, d), rounded outward but not beyond the priors."""
+    ends = agreement.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)
+    limits = np.array([widest(x) for x in agreement.prior.values()])
+    return np.asarray(
+        np.minimum(ends, limits[:, 1]) if sign > 0 else np.maximum(ends, limits[:, 0])
+    )
