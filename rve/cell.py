@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array
 
 STRAIN = 0.01  # eq. 15
 IN_GPA = (0.01, 1e4)  # E that is no solid's in Pa (soft gels have 1e4) and is one's in GPa or MPa
@@ -37,19 +39,16 @@ class Phase:
     def __post_init__(self) -> None:
         for what, value in (("Young's modulus", self.modulus), ("Poisson's ratio", self.poisson)):
             if not isinstance(value, Real) or isinstance(value, bool):
-                raise ValueError(
-                    f"{what} is {value!r}; a phase takes plain numbers, in Pa: a fuzzy one is an"
-                    " input of fuzzy.propagate, and each sample makes its own phase"
-                )
+                cure = "a fuzzy one is an input of fuzzy.propagate, each sample makes its own phase"
+                raise RefusedError(what, repr(value), "plain numbers, in Pa", cure)
         if not (np.isfinite(self.modulus) and self.modulus > 0):
-            raise ValueError(
-                f"Young's modulus is {self.modulus:g} Pa; it must be positive and finite"
-            )
+            value = f"{self.modulus:g} Pa"
+            raise RefusedError("Young's modulus", value, "positive and finite numbers")
         if IN_GPA[0] <= self.modulus < IN_GPA[1] and self.modulus != 1:  # 1 scales others
-            told = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
-            warnings.warn(f"{told}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
+            soft = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
+            warnings.warn(f"{soft}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
         if not -1 < self.poisson < 0.5:
-            raise ValueError(f"Poisson's ratio is {self.poisson:g}; it must lie inside (-1, 0.5)")
+            raise RefusedError("Poisson's ratio", f"{self.poisson:g}", "values inside (-1, 0.5)")
 
     @property
     def stiffness(self) -> Array:
@@ -60,18 +59,61 @@ class Phase:
 
 
 @dataclass(frozen=True)
+class VoigtPhase:
+    """An elastic material of any plane-strain stiffness.
+
+    Args:
+        rows: Stiffness in Voigt order (11, 22, 12 with 2 ε12), symmetric positive definite, three
+            rows of three, in Pa.
+
+    Raises:
+        RefusedError: The matrix is not symmetric positive definite.
+    """
+
+    rows: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.rows, float)
+        right = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+        if right:
+            right = abs(matrix - matrix.T).max() <= 1e-9 * abs(matrix).max()
+        if not right or np.linalg.eigvalsh(matrix)[0] <= 0:
+            allowed = "symmetric positive definite matrices of 3 × 3, in Pa"
+            raise RefusedError("stiffness of the phase", matrix.tolist(), allowed)
+        rows = ((matrix + matrix.T) / 2).tolist()
+        object.__setattr__(self, "rows", tuple(map(tuple, rows)))
+
+    @property
+    def stiffness(self) -> Array:
+        """Plane-strain stiffness in Voigt order, (3, 3), in Pa (eq. 6)."""
+        return np.array(self.rows)
+
+
+AnyPhase = Phase | VoigtPhase
+
+
+@dataclass(frozen=True)
 class Cell:
-    """Periodic square cell of side 2 with one centred circular particle of random radius r(θ).
+    """Periodic square cell of side 2 with one centred particle of random radius r(θ).
 
     Args:
         matrix: Material outside the particle.
         inclusion: Material of the particle.
         radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
+        outline: Distance of the particle's edge from its centre over r(θ), a function of the angle;
+            None for a circle.
     """
 
-    matrix: Phase
-    inclusion: Phase
+    matrix: AnyPhase
+    inclusion: AnyPhase
     radius: RadiusMap
+    outline: Callable[[Array], Array] | None = None
+
+    @property
+    def square(self) -> bool:
+        """True where the stiffness has the symmetry of the square: round, isotropic."""
+        plain = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
+        return plain and self.outline is None
 
 
 MODULI = ("C11+C12", "C11-C12", "C33")
@@ -99,6 +141,19 @@ def with_ratio(moduli: Array) -> Array:
     by itself.
     """
     return np.concatenate([moduli, moduli[..., 1:2] / moduli[..., 2:3]], axis=-1)
+
+
+def axial_moduli(stiffness: Array, *, square: bool) -> Array:
+    """The three moduli and their ratio, shape (…, axes, 4).
+
+    Of the square-symmetric part where that is all there is, else besides with C11 and with C22
+    alone.
+    """
+    readings = [square_moduli(stiffness)]
+    for k in () if square else (0, 1):
+        axial, lateral = stiffness[..., k, k], stiffness[..., 0, 1]
+        readings.append(np.stack([axial + lateral, axial - lateral, stiffness[..., 2, 2]], -1))
+    return np.stack([with_ratio(one) for one in readings], axis=-2)
 
 
 def with_ratio_errors(errors: Array) -> Array:

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Protocol
+from typing import Any, Protocol
 
-from alphacut.rve.cell import Phase
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.cell import AnyPhase, Phase
 from alphacut.rve.result import Homogenised
 from alphacut.stochastic import RadiusMap
 
-MODELS = {  # name → module and class; imported when asked for, so that none is paid for in vain
+MODELS = {  # name → module and class, imported when named
     "prism": ("alphacut.rve.prism.model", "PrismModel"),
     "slices": ("alphacut.rve.slices.model", "SlicesModel"),
-    "table": ("alphacut.rve.table.model", "TableModel"),
     "series": ("alphacut.rve.series.model", "SeriesModel"),
-    "image": ("alphacut.rve.image.round_particle", "RasterModel"),
-    "auto": ("alphacut.rve.auto.model", "AutoModel"),
 }
-
-SPHERES = "alphacut.rve.spheres.series.model.SphereSeriesModel(), its solve takes the same"
 
 
 class Model(Protocol):
@@ -30,13 +26,12 @@ class Model(Protocol):
         """Name in `MODELS`."""
 
     def solve(
-        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+        self, radius_map: RadiusMap, matrix: Any, inclusions: Sequence[Any]
     ) -> list[Homogenised]:
         """One result for each of `inclusions`, in their order; what they share is done once.
 
         Raises:
-            RuntimeError: The model does not reach what it declares; the message says why and what
-                would help.
+            FailedError: The model does not reach what it declares.
         """
 
 
@@ -44,26 +39,28 @@ def named(name: str, **options: object) -> Model:
     """The model called `name` with its own options, e.g. ``named("slices", order=3)``.
 
     Raises:
-        ValueError: No such model, no such option of it, or a value out of range.
+        RefusedError: No such model, no such option of it, or a value out of range.
     """
     if name not in MODELS:
-        ball = f"; spheres are solved by {SPHERES}" if "sphere" in str(name) else ""
-        raise ValueError(f"the model is {name!r}; known models are {', '.join(MODELS)}{ball}")
-    module, cls = MODELS[name]
-    maker = getattr(import_module(module), cls)
+        raise RefusedError("model", repr(name), ", ".join(MODELS))
+    module, kind = MODELS[name]
+    maker = getattr(import_module(module), kind)
     unknown = sorted(set(options) - set(maker.__dataclass_fields__))
     if unknown:
-        allowed = ", ".join(maker.__dataclass_fields__)
-        raise ValueError(
-            f"the model {name} has no option {unknown[0]!r}; its options are {allowed}"
-            + (f"; spheres are solved by {SPHERES}" if unknown[0] == "particles" else "")
-        )
+        raise RefusedError(f"option of {name}", unknown[0], ", ".join(maker.__dataclass_fields__))
     model: Model = maker(**options)
     return model
 
 
-class CrossCheckError(RuntimeError):
-    """Two models of the same cell disagree."""
+def automatic(*phases: AnyPhase, **options: object) -> Model:
+    """The series, exact for circles of isotropic phases, or slices, for any other cell.
+
+    Args:
+        phases: All phases of the cell.
+        options: `outline` of the particle, if it is no circle, and others of slices.
+    """
+    plain = all(isinstance(phase, Phase) for phase in phases)
+    return named("series") if plain and not options else named("slices", **options)
 
 
 def cross_check(
@@ -72,19 +69,19 @@ def cross_check(
     """The largest relative difference in E between two models' results of the same cells.
 
     Raises:
-        ValueError: Both are results of one model.
-        CrossCheckError: The difference is above `tolerance`.
+        RefusedError: Both are results of one model.
+        FailedError: The difference is above `tolerance`.
     """
     same = {a.method for a in first} & {b.method for b in second}
     if same:
-        raise ValueError(f"cross_check: both results are of the model {min(same)}; take two models")
+        raise RefusedError("models of a cross-check", min(same), "results of two models")
     gaps = [abs(a.modulus - b.modulus) / abs(b.modulus) for a, b in zip(first, second, strict=True)]
     worst = max(range(len(gaps)), key=gaps.__getitem__)
     if not gaps[worst] <= tolerance:
         a, b = first[worst], second[worst]
-        raise CrossCheckError(
+        raise FailedError(
             f"{a.method} gives E = {a.modulus:.10g} Pa and {b.method} {b.modulus:.10g} Pa:"
-            f" {gaps[worst]:.2e} apart, {tolerance:.2e} is allowed; refine the coarser of the two"
-            " or allow more"
+            f" {gaps[worst]:.2e} apart, {tolerance:.2e} is allowed",
+            "refine the coarser of the two or allow more",
         )
     return gaps[worst]

@@ -164,16 +164,13 @@ def in_database(options: Mapping[str, str], *, wanted: Collection[str]) -> Itera
     except PETSc.Error as failure:
         asked = " ".join(f"-{PREFIX}{name} {options[name]}".rstrip() for name in wanted or options)
         raise OptionError(
-            f"PETSc refuses the options {asked}: {str(failure).splitlines()[-1].strip()}"
+            "PETSc options", asked, str(failure).splitlines()[-1].strip()
         ) from failure
     finally:
         for name in options:
             database.delValue(name)
     if unused:
-        raise OptionError(
-            f"PETSc has no use for -{PREFIX}{unused[0]} {options[unused[0]]}".rstrip()
-            + ": check its spelling"
-        )
+        raise OptionError(f"-{PREFIX}{unused[0]}", options[unused[0]], "what PETSc uses")
 
 
 def _used(name: str) -> bool:

@@ -1,42 +1,45 @@
-"""Ranges of what the cell's models are given, each refused in one sentence."""
+"""Ranges of what the cell's models take, each refused by its key."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from alphacut.rve.cell import Phase
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
 
 HALVES = "in halves of the cell's side"
+STIFFEST = 0.45
+"""Poisson's ratio above which quadratic elements lock."""
 
 
 def require_radius(radius: float) -> None:
     """Refuse a radius outside (0, 1).
 
     Raises:
-        ValueError: It lies outside.
+        RefusedError: It lies outside.
     """
     if not 0 < radius < 1:
-        raise ValueError(f"the radius is {radius:g}; it must lie in (0, 1), {HALVES}")
+        raise RefusedError("the radius", f"{radius:g}", f"values in (0, 1), {HALVES}")
 
 
 def require_mesh_size(size: float) -> None:
     """Refuse an edge length outside (0, 1].
 
     Raises:
-        ValueError: It lies outside.
+        RefusedError: It lies outside.
     """
     if not 0 < size <= 1:
-        raise ValueError(f"the mesh size is {size:g}; it must lie in (0, 1], {HALVES}")
+        raise RefusedError("the mesh size", f"{size:g}", f"values in (0, 1], {HALVES}")
 
 
 def require_points(points: int | None) -> None:
     """Refuse a rule in θ of fewer than two nodes; None leaves their number to the model.
 
     Raises:
-        ValueError: There are fewer.
+        RefusedError: There are fewer.
     """
     if points is not None and points < 2:
-        raise ValueError(f"the rule in θ has {points} points; it needs at least 2")
+        raise RefusedError("number of points of the rule in θ", points, "2 or more")
 
 
 def require_accuracy(value: float, least: float, what: str) -> None:
@@ -44,29 +47,45 @@ def require_accuracy(value: float, least: float, what: str) -> None:
 
     Args:
         value: The error allowed.
-        least: What can be reached.
+        least: The least that can be reached.
         what: Its name, such as "accuracy of the table".
 
     Raises:
-        ValueError: It lies outside.
+        RefusedError: It lies outside.
     """
     if not least <= value <= 0.1:
-        raise ValueError(f"the {what} is {value:g}; it must lie in [{least:g}, 0.1]")
+        raise RefusedError(f"the {what}", f"{value:g}", f"values in [{least:g}, 0.1]")
 
 
-def require_parts(radius_map: object, matrix: object, inclusions: object) -> None:
-    """Refuse what a model cannot solve for: the parts in another order, or no row of inclusions.
+def require_compressible(*phases: AnyPhase) -> None:
+    """Refuse phases in which quadratic elements lock.
 
     Raises:
-        ValueError: The first is no radius map, the second no phase, or the third no row of phases,
-            one at least.
+        RefusedError: A Poisson's ratio is above 0.45.
     """
-    row = inclusions if isinstance(inclusions, Sequence) else ()
+    ratio = max((phase.poisson for phase in phases if isinstance(phase, Phase)), default=0.0)
+    if ratio > STIFFEST:
+        cure = "finite elements lock above: take the series"
+        raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {STIFFEST:g}", cure)
+
+
+def require_parts(
+    radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
+) -> None:
+    """Refuse parts in another order, no inclusions, or phases that a model has no formula for.
+
+    Raises:
+        RefusedError: The first is no radius map, the second no phase, or the third no sequence of
+            phases, one at least.
+    """
+    kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
+    rows = inclusions if isinstance(inclusions, Sequence) else ()
     right = callable(radius_map) and hasattr(radius_map, "distribution")
-    if not (right and isinstance(matrix, Phase) and row and all(isinstance(x, Phase) for x in row)):
-        got = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
-        raise ValueError(
-            f"solve got {got}{' (empty)' if inclusions in ([], ()) else ''}; it takes the radius"
-            " map, the matrix's phase, and a list of the inclusions' phases, as"
-            " solve(radius, Phase(3e9), [Phase(70e9)])"
+    if not (right and rows and all(isinstance(one, kinds) for one in (matrix, *rows))):
+        parts = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
+        raise RefusedError(
+            "parts of the cell",
+            f"{parts}{' (empty)' if inclusions in ([], ()) else ''}",
+            "the radius map, the matrix's phase and a list of the inclusions' phases",
+            "any stiffness is for slices and prism; write solve(radius, Phase(3e9), [Phase(70e9)])",
         )

@@ -17,7 +17,8 @@ from alphacut.stochastic.theta.truncated_normal import Array
 if TYPE_CHECKING:
     import meshio
 
-    from alphacut.rve.prism.system import PrismSystem
+    from alphacut.rve.prism.fields import CellFields
+    from alphacut.stochastic import RadiusMap
 
 
 # From Basix's order of a wedge's edges to meshio's, Abaqus's and Gmsh's reader's: lower triangle,
@@ -67,7 +68,7 @@ def sphere_mesh(case: Case, radius: float) -> meshio.Mesh:
     """
     import meshio
 
-    from alphacut.rve.mesh.planar import TouchingError
+    from alphacut.rve.mesh.curved import TouchingError
     from alphacut.rve.spheres.fem.octant import whole_cell
 
     if case.mesh.size < FINEST:
@@ -124,10 +125,6 @@ def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
         meshio.write(partial, mesh, file_format=FORMATS[path.suffix], **own)
 
 
-VERTICES = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)]
-EDGES = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)]  # Basix's order
-NODES = np.array([*VERTICES, *((np.add(VERTICES[a], VERTICES[b]) / 2) for a, b in EDGES)], float)
-"""The 15 nodes of the reference wedge in Basix's order of vertices and edges, shape (15, 3)."""
 COMPONENTS = ("11", "22", "12")
 SIZES = (("displacement", 2), ("stress", 3))
 
@@ -146,30 +143,19 @@ def cell_fields(case: Case) -> meshio.Mesh:
     """
     import meshio
     from meshio._mesh import topological_dimension
-    from mpi4py import MPI
 
-    from alphacut.rve.mesh.prism_grid import PrismGrid
-    from alphacut.rve.mesh.triangulation import reference_radius, triangulate
-    from alphacut.rve.prism.system import PrismSystem
-    from alphacut.rve.prism.task import PrismTask, Stopwatch
-    from alphacut.rve.solver.options import SolverOptions
+    from alphacut.rve.prism import fields as prism
+    from alphacut.rve.prism.model import PrismModel
 
     require_conforming(case)
     radius, matrix, inclusion = modal_parts(case)
-    plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
-    system = PrismSystem(PrismGrid(plane, case.mesh.layers), MPI.COMM_SELF)
-    system.move(radius)
-    solved = PrismTask(system, SolverOptions("theta"), LOADS, Stopwatch()).solve(
-        (matrix, inclusion)
-    )
-    phase = np.tile(plane.inside.astype(np.int64), system.grid.layers)
-    stress = system.stress(solved.total, (matrix, inclusion), NODES, solved.pressure)
-    nodes, cells, mean = by_phase(system, phase, stress)
-    data = point_data(solved.total[nodes], mean)
+    model = PrismModel(case.mesh.size, case.mesh.layers)
+    fields = prism.cell_fields(model, radius, matrix, inclusion)
+    data = point_data(fields.displacement, fields.stress)
     topological_dimension.setdefault("wedge15", 3)  # see alphacut.export.fields
-    errors = relative_errors(system, (matrix, inclusion), nodes, cells, phase, data)
-    wedges = [("wedge15", cells[:, ORDER])]
-    return meshio.Mesh(system.positions[nodes], wedges, data, {"phase": [phase]}, info=errors)
+    errors = relative_errors(fields, radius, (matrix, inclusion), data)
+    wedges = [("wedge15", fields.cells[:, ORDER])]
+    return meshio.Mesh(fields.points, wedges, data, {"phase": [fields.phase]}, info=errors)
 
 
 def require_conforming(case: Case) -> None:
@@ -203,11 +189,9 @@ def point_data(displacement: Array, stress: Array) -> dict[str, Array]:
 
 
 def relative_errors(
-    system: PrismSystem,
+    fields: CellFields,
+    radius: RadiusMap,
     phases: tuple[Phase, Phase],
-    nodes: Array,
-    cells: Array,
-    phase: Array,
     data: dict[str, Array],
 ) -> dict[str, float]:
     """Relative error of each load's displacement and stress in L², weighted with f_Θ.
@@ -215,30 +199,26 @@ def relative_errors(
     The truth is the multipole series at every node; empty where it refuses.
 
     Args:
-        system: What the fields were computed on.
+        fields: Nodes, wedges and their volumes.
+        radius: The radius map.
         phases: Matrix and inclusion.
-        nodes: Node of the grid that each exported one is, shape (n,).
-        cells: Exported nodes of the wedges, shape (m, 15).
-        phase: Of each wedge, shape (m,).
-        data: The fields at the exported nodes by name.
+        data: The fields at the nodes by name.
     """
     from alphacut.rve.series.field import SeriesField
     from alphacut.rve.series.truncation import SeriesError
 
-    points, inside = system.positions[nodes], np.zeros(len(nodes), bool)
-    inside[cells[phase == 1]] = True
-    volume = system.slice_stress.determinants() @ system.form.weights
-    weight = np.zeros(len(nodes))
-    np.add.at(weight, cells, volume[:, None])
-    weight *= system.map.distribution.pdf(points[:, 2])
+    points, inside = fields.points, np.zeros(len(fields.points), bool)
+    inside[fields.cells[fields.phase == 1]] = True
+    weight = np.zeros(len(points))
+    np.add.at(weight, fields.cells, fields.volume[:, None])
     exact = {
-        f"{what}_{load + 1}": np.empty((len(nodes), size))
+        f"{what}_{load + 1}": np.empty((len(points), size))
         for what, size in SIZES
         for load in (0, 1)
     }
     for theta in np.unique(points[:, 2]):
         at = np.flatnonzero(points[:, 2] == theta)
-        field = SeriesField(float(system.map(theta)), *phases)
+        field = SeriesField(float(radius(theta)), *phases)
         for load, strain in enumerate(LOADS):
             for what, function in (("displacement", field.displacement), ("stress", field.stress)):
                 try:
@@ -261,14 +241,3 @@ def _relative(own: Array, exact: Array, weight: Array) -> float:
     twice = np.array([1.0, 1.0, 2.0])[: exact.shape[1]]
     apart, size = (weight @ (field**2 @ twice) for field in (own - exact, exact))
     return float(np.sqrt(apart / size))
-
-
-def by_phase(system: PrismSystem, phase: Array, stress: Array) -> tuple[Array, Array, Array]:
-    """Node of each wedge corner apart by phase, and mean stresses there, (n, 3, loads)."""
-    numbered = system.grid.cells + phase[:, None] * len(system.positions)
-    kept, cells = np.unique(numbered, return_inverse=True)
-    cells = cells.reshape(numbered.shape)
-    total = np.zeros((len(kept), *stress.shape[2:]))
-    np.add.at(total, cells, stress)
-    count = np.bincount(cells.ravel(), minlength=len(kept))
-    return kept % len(system.positions), cells, total / count[:, None, None]

@@ -119,8 +119,9 @@ def table_reused(accuracy: float) -> Way:
 
 
 def _table_modulus(table: object) -> float:
-    from alphacut.rve.slices.theta_rule import settle_rule
     from alphacut.rve.table.interpolant import Table
+
+    from alphacut.rve.slices.theta_rule import settle_rule
 
     assert isinstance(table, Table)
     moduli = np.array([PARTICLE.modulus])

@@ -48,9 +48,8 @@ def _cell(
 ) -> tuple[Array, float, int]:
     """σ11 and σ12 of unit loads, in Pa, processor seconds, and unknowns."""
     import dolfinx_mpc
-    from petsc4py import PETSc
-
     from alphacut.rve.mesh.planar import planar_mesh
+    from petsc4py import PETSc
 
     started = process_time()
     space, tags = _space(planar_mesh(radius, size=mesh_size), order)
@@ -72,9 +71,8 @@ def _space(mesh: PlanarMesh, order: int) -> tuple[Any, Any]:
     """Displacements on curved triangles, and tags: 0 in the matrix, 1 in the particle."""
     import basix.ufl
     import dolfinx
-    from mpi4py import MPI
-
     from alphacut.rve.mesh.planar import curved_nodes
+    from mpi4py import MPI
 
     points, cells = curved_nodes(mesh, order)
     element = basix.ufl.element("Lagrange", "triangle", order, shape=(2,))

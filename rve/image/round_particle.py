@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import Phase, square_moduli, with_ratio_errors
+from alphacut.rve.cell import Cell, Phase, square_moduli, with_ratio_errors
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.outlines.equation import Equation
@@ -79,7 +79,7 @@ class RasterModel:
                 errors,
                 f"{rule.nodes.size} nodes in θ, proved bounds on {self.pixels}² pixels",
             )
-            results.append(certified(result, radius_map, matrix, inclusion))
+            results.append(certified(result, Cell(matrix, inclusion, radius_map)))
         return results
 
     def slice(self, radius: float, matrix: Phase, inclusion: Phase) -> CrispBounds:

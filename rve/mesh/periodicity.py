@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from alphacut.rve.mesh.triangulation import Integers, Triangulation
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Rows
+from alphacut.rve.mesh.triangulation import Triangulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +25,14 @@ class Periodicity:
         count: Number of unknowns in all.
     """
 
-    unknown: Integers
+    unknown: Rows
     vertices: int
     count: int
 
-    def ends(self, plane: Triangulation) -> NDArray[np.int32]:
+    def ends(self, plane: Triangulation) -> Rows:
         """Unknowns of the vertices beside each midpoint's, −1 where fixed, shape (midpoints, 2)."""
         first = np.unique(self.unknown[plane.vertices :], return_index=True)[1]
-        return np.ascontiguousarray(self.unknown[plane.ends[first]], np.int32)
+        return np.asarray(self.unknown[plane.ends[first]])
 
 
 @lru_cache(maxsize=4)
@@ -60,27 +59,3 @@ def identify(plane: Triangulation) -> Periodicity:
     rank[order] = np.arange(len(order)) - 1
     unknown = rank[label]
     return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, len(order) - 1)
-
-
-def mismatch(positions: Array, fluctuation: Array) -> float:
-    """Largest difference of the fluctuation between opposite nodes, relative to its largest value.
-
-    It pairs the nodes by position on its own, so that it can find a wrong identification.
-
-    Args:
-        positions: Nodes (x1, x2, θ) of the cell, shape (n, 3).
-        fluctuation: Displacements less ε̄x, shape (n, 2, loads).
-    """
-    worst = 0.0
-    for axis in (0, 1):
-        order = [_along_side(positions, axis, end) for end in (-1.0, 1.0)]
-        if len(order[0]) != len(order[1]):
-            return float("inf")
-        worst = max(worst, float(abs(fluctuation[order[0]] - fluctuation[order[1]]).max()))
-    return worst / max(float(abs(fluctuation).max()), np.finfo(float).tiny)
-
-
-def _along_side(positions: Array, axis: int, end: float) -> Integers:
-    """Nodes of one side, in the order of their other coordinates."""
-    side = np.flatnonzero(abs(positions[:, axis] - end) < 1e-9)
-    return np.asarray(side[np.lexsort(np.round(positions[side][:, [1 - axis, 2]], 7).T)])

@@ -8,16 +8,14 @@ custom one.
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from alphacut.rve.interruption import uninterrupted
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
+from alphacut.rve.fenicsx import basix
 
-with uninterrupted():
-    import basix
-
-NODES = 15
+SLICES = 3  # Gauss points along θ in a layer
 PRISM = basix.CellType.prism
 
 
@@ -45,33 +43,33 @@ def _points_by_entity() -> list[list[Array]]:
 
 
 @cache
-def wedge() -> basix.finite_element.FiniteElement:
-    """The scalar element."""
+def wedge(components: int) -> Any:
+    """The element blocked to `components` values, for DOLFINx."""
     points = _points_by_entity()
     evaluations = [
         [np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in entity] for entity in points
     ]
-    kind = 0, basix.MapType.identity, basix.SobolevSpace.H1, False, 1, 2, basix.PolysetType.standard
-    return basix.create_custom_element(PRISM, [], _coefficients(), points, evaluations, *kind)
+    scalar = basix.ufl.custom_element(
+        PRISM, [], _coefficients(), points, evaluations, 0, basix.MapType.identity,
+        basix.SobolevSpace.H1, False, 1, 2, basix.PolysetType.standard,
+    )  # fmt: skip
+    return basix.ufl.blocked_element(scalar, shape=(components,))
 
 
-def slab_rule(*, planar_degree: int = 4, layer_points: int = 3) -> tuple[Array, Array]:
-    """Quadrature on the reference prism: a triangle rule times Gauss–Legendre along ζ.
+@cache
+def slab_rule() -> tuple[Array, Array]:
+    """Quadrature on the reference prism: six points of a triangle times three of Gauss along ζ.
 
     Returns:
-        Points, shape (layer_points · m, 3), ordered by ζ first, and weights of the same length,
-        their sum 1/2.
+        Points, shape (18, 3), ordered by ζ first, and weights, shape (18,), their sum 1/2.
     """
-    triangle, planar_weights = basix.make_quadrature(basix.CellType.triangle, planar_degree)
-    z, line_weights = basix.make_quadrature(basix.CellType.interval, 2 * layer_points - 1)
+    triangle, planar_weights = basix.make_quadrature(basix.CellType.triangle, 4)
+    z, line_weights = basix.make_quadrature(basix.CellType.interval, 5)
     order = np.argsort(z[:, 0])
     points = np.array([[*xy, z[k, 0]] for k in order for xy in triangle])
     return points, np.outer(line_weights[order], planar_weights).ravel()
 
 
-def tabulate(points: Array, *, derivatives: bool = False) -> Array:
-    """Shape functions at `points`, shape (n, 15), or their derivatives, shape (3, n, 15)."""
-    table = wedge().tabulate(1 if derivatives else 0, points)
-    return np.asarray(table[1:] if derivatives else table[0]).reshape(-1, len(points), NODES)[
-        slice(None) if derivatives else 0
-    ]
+def vertices_and_midpoints() -> Array:
+    """The 15 nodes of the reference prism, shape (15, 3)."""
+    return np.concatenate([point for entity in _points_by_entity()[:2] for point in entity])

@@ -1,117 +1,138 @@
-"""Stiffness of each phase on wedges (eq. 7).
-
-The form has no derivative along θ: div and D act on x alone. So a wedge is integrated slice by
-slice, at the Gauss points along θ; a slice is a triangle of six nodes, whose integral FFCx makes. A
-loop in C carries slices to wedges and adds them up.
-"""
+"""The form on cell × θ: mesh of wedges, weight f_Θ, and what is read off at quadrature points."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from time import perf_counter
-
 import numpy as np
-from numpy.typing import NDArray
 
-from alphacut.rve.cell import Phase
-from alphacut.rve.mesh import wedge
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.fenicsx import MPI, at_points, basix, fem, mesh_of, ufl
+from alphacut.rve.form import CellForm, strain
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.petsc import PETSc, block_values
-from alphacut.rve.solver.c_loops import WEDGES, c_loops
-from alphacut.rve.solver.integrals import triangle_integral
-from alphacut.stochastic import RadiusMap, ThetaLaw
-from alphacut.stochastic.theta.law import Array
+from alphacut.rve.mesh.wedge import SLICES, slab_rule, wedge
+from alphacut.stochastic import RadiusMap, layered_rule
 
 
-@dataclass
+class FoldedMeshError(FailedError):
+    """The mesh folds over where it follows a map."""
+
+
 class PrismForm:
-    """Integrals over the wedges of one grid; positions and phases are set anew for every map.
-
-    On several ranks each adds up what the wedges around its rows give to these.
+    """Wedge mesh, form and loads of one grid; positions and phases are set anew.
 
     Args:
-        grid: Topology of those wedges.
-        pairs: Unknown pair of each of their nodes, −1 where fixed, shape (wedges, 15).
-        rows: The unknowns of the rank.
-        places: Where blocks stand in matrices, shape (wedges, 15, 15); see `LevelNumbering.matrix`.
+        grid: Topology; each rank takes its share of the wedges.
+        comm: Communicator.
+
+    Attributes:
+        mesh: DOLFINx's.
+        space: Displacements, two at each node of a wedge.
+        node: Node of the grid that each of this rank's nodes is, shape (n,).
+        wedge: Wedge of the grid that each of its cells is, shape (m,).
+        layer: Its layer.
+        elastic: Stiffness and loads.
     """
 
-    grid: PrismGrid
-    pairs: NDArray[np.int32]
-    rows: range
-    places: NDArray[np.int32]
+    def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
+        self.grid = grid
+        self.mesh = mesh_of(comm, grid.cells, grid.nodes, wedge(3))
+        self.space = fem.functionspace(self.mesh, wedge(2))
+        self.wedge: Rows = np.asarray(self.mesh.topology.original_cell_index)
+        self.layer = self.wedge // len(grid.plane.triangles)
+        self.node = self._node_of_dof()
+        self._compile()
 
-    def __post_init__(self) -> None:
-        self.points, self.weights = wedge.slab_rule()
-        self.shapes = wedge.tabulate(self.points)
-        started = perf_counter()
-        self._integral = triangle_integral(2, weighted=True)
-        self.jit_seconds = perf_counter() - started
-        slices = self.points.reshape(3, -1, 3)[:, 0, 2]
-        self._along = np.column_stack([1 - slices, slices, 4 * slices * (1 - slices)])
-        self._heights = 2 * self.weights.reshape(3, -1).sum(axis=1)
-        first, stop = self.rows.start // 2, self.rows.stop // 2
-        own = (self.pairs >= first) & (self.pairs < stop)
-        self._pairs = np.where(own, self.pairs - first, -1).astype(np.int32)
-        self._giving = np.flatnonzero(own.any(axis=1)).astype(np.int32)
-        self._forces: dict[int, Array] = {}
+    def _node_of_dof(self) -> Rows:
+        sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
+        nodes = np.empty(sizes.size_local + sizes.num_ghosts, np.int64)
+        nodes[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
+        return nodes
 
-    def place(self, radius: RadiusMap) -> Array:
-        """Move the nodes to the cone of `radius`; returns their positions, shape (nodes, 3).
+    def _compile(self) -> None:
+        points, weights = slab_rule()
+        at_each = basix.ufl.quadrature_element("prism", points=points, weights=weights)
+        rule = {
+            "quadrature_rule": "custom",
+            "quadrature_points": points,
+            "quadrature_weights": weights,
+        }
+        dx = ufl.Measure("dx", domain=self.mesh, metadata=rule)
+        self.elastic = CellForm(self.space, fem.functionspace(self.mesh, at_each), dx)
+        self._u = fem.Function(self.space)
+        self._strain = at_points(strain(self._u), points)
+        self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
+
+    def place(self, radius: RadiusMap) -> None:
+        """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
 
         Raises:
-            ValueError: The density of θ is not positive at a quadrature point.
+            FoldedMeshError: An element is inverted.
+            RefusedError: The density of θ is not positive at a quadrature point.
         """
-        positions = self.grid.positions(radius)
-        self._nodes = positions[self.grid.cells]
-        self._weigh(radius.distribution)
-        return positions
-
-    def _weigh(self, law: ThetaLaw) -> None:
-        """Set the density of θ at the quadrature points, f_Θ of eq. 1."""
-        levels = self.grid.levels(law)
-        theta = levels[:-1, None] + np.diff(levels)[:, None] * self.points[:, 2]
-        density = law.pdf(theta)
+        positions, geometry = self.grid.positions(radius), self.mesh.geometry
+        geometry.x[:] = positions[geometry.input_global_indices]
+        self._levels = self.grid.levels(radius.distribution)
+        self._law = radius.distribution
+        theta, _ = self.slices()
+        density = radius.distribution.pdf(theta)
         if not (density > 0).all():
-            place = theta[~(density > 0)][0]
-            raise ValueError(
-                f"the density of θ is {law.pdf(place):g} at {place:.4g}, and every layer of the"
-                " product space needs probability: shorten the support, or take the series or a"
-                " table"
-            )
-        self._density = density[np.array(self.grid.own) // len(self.grid.plane.triangles)]
+            raise RefusedError(
+                f"density of θ at {theta[~(density > 0)][0]:.4g}", f"{density.min():g}",
+                "positive densities", "shorten the support, or take the series",
+            )  # fmt: skip
+        if not self.mesh.comm.allreduce(int((self.areas() <= 0).any())) == 0:
+            raise FoldedMeshError(
+                f"the mesh folds over where it follows the radius through {self.grid.layers} layers"
+                " in θ", "take more layers or a smaller mesh size",
+            )  # fmt: skip
+        points = len(slab_rule()[1]) // SLICES
+        self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), points)
+        self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
 
-    def mark(self, share: Array) -> None:
-        """Set the particle's share at the quadrature points, shape (cells, points)."""
-        self._share = share
-
-    def set_poisson(self, phases: tuple[Phase, Phase]) -> None:
-        """Take the phases' Poisson's ratios; Young's moduli stay 1."""
-        units = [Phase(1.0, phase.poisson).stiffness for phase in phases]
-        self._constants = [np.array([c[0, 0], c[0, 1], c[2, 2]]) for c in units]
-
-    def add_stiffness(self, phase: int, matrix: PETSc.Mat, modulus: float = 1.0) -> None:
-        """Add K_m (phase 0) or K_i (phase 1) of eq. 7, times a modulus, and keep its loads."""
-        own, weights = self._giving, modulus * self._density
+    def _inside(self, positions: Array, radius: RadiusMap) -> Array:
+        """Share of the particle at the quadrature points, shape (cells, points)."""
         if self.grid.conforming:
-            own = own[self.grid.inside[own] == bool(phase)]
-        else:
-            weights = weights * (self._share if phase else 1 - self._share)
-        weights, forces = weights[own], np.zeros((len(self.rows), 3))
-        c_loops(WEDGES).add_wedges(
-            self._integral, self._along.ctypes, self._heights.ctypes, len(own), own.ctypes,
-            weights.ctypes, self._nodes.ctypes, self._constants[phase].ctypes, self._pairs.ctypes,
-            self.places.ctypes, *block_values(matrix), forces.ctypes,
-        )  # fmt: skip
-        self._forces[phase] = forces / modulus
+            return np.repeat(self.grid.inside[self.wedge], len(slab_rule()[1])).astype(float)
+        shapes = wedge(1).tabulate(0, slab_rule()[0])[0].reshape(-1, 15)
+        x = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
+        return self.grid.sign(x, radius)
 
-    def load(self, phase: int, strain: Array) -> Array:
-        """Forces −⟨Bᵀ E ε̄⟩ of one phase for a unit modulus, on the unknowns of the rank.
-
-        They are what its stiffness, which is added before, makes of the displacements ε̄x.
+    def strains(self, displacement: Array) -> Array:
+        """(ε11, ε22, 2 ε12) at the points of the slices, shape (cells, 3, points, 3).
 
         Args:
-            phase: 0 the matrix, 1 the particle.
-            strain: Macroscopic strain (ε11, ε22, 2 ε12).
+            displacement: Of this rank's nodes, shape (nodes, 2).
         """
-        return np.asarray(self._forces[phase] @ strain)
+        self._u.x.array[:] = displacement.ravel()
+        return self._at_points(self._strain, 3)
+
+    def areas(self) -> Array:
+        """Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4."""
+        weights = slab_rule()[1].reshape(SLICES, -1)
+        planar = weights / (2 * weights.sum(axis=1, keepdims=True))
+        heights = np.diff(self._levels)[self.layer]
+        return self._at_points(self._volume, 1)[..., 0] / heights[:, None, None] * planar
+
+    def _at_points(self, expression: fem.Expression, size: int) -> Array:
+        cells = np.arange(len(self.wedge), dtype=np.int32)
+        values = np.asarray(expression.eval(self.mesh, cells))
+        return values.reshape(len(cells), SLICES, -1, size)
+
+    def particle(self) -> Array:
+        """Share of the particle at the points of the slices, shape (cells, 3, points)."""
+        return np.asarray(self.elastic.share.x.array.reshape(len(self.wedge), SLICES, -1))
+
+    def slices(self) -> tuple[Array, Array]:
+        """θ of the slices at Gauss points of the layers, and their weights, shape (3 layers,)."""
+        rule = layered_rule(self._law, layers=self.grid.layers, points=SLICES)
+        return rule.nodes, rule.weights
+
+    def of_slices(self, values: Array) -> Array:
+        """Values of the slices, (3 layers,), at this rank's wedges, shape (cells, 3)."""
+        return np.asarray(values.reshape(-1, SLICES)[self.layer])
+
+    def by_layer(self, values: Array) -> Array:
+        """Sums over this rank's wedges of each layer of values (cells, …), shape (layers, …)."""
+        sums = np.zeros((self.grid.layers, *values.shape[1:]))
+        np.add.at(sums, self.layer, values)
+        return sums

@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.settings import require_accuracy, require_parts, require_points
@@ -82,4 +82,4 @@ class SeriesModel:
                 )
             )
         pairs = zip(results, inclusions, strict=True)
-        return [certified(result, radius_map, matrix, phase) for result, phase in pairs]
+        return [certified(result, Cell(matrix, phase, radius_map)) for result, phase in pairs]

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.rve.cell import STRAIN, Cell, Phase, square_moduli
+from alphacut.fuzzy.arrays import Array
+from alphacut.rve.cell import STRAIN, Cell, square_moduli
 from alphacut.rve.certificate import ROUND_OFF, Limits, require, stiffness_checks
+from alphacut.rve.mesh.outline import area, circle
 from alphacut.rve.result import Homogenised, StressCurve
-from alphacut.stochastic import RadiusMap, ThetaRule
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic import ThetaRule
 
 AREA = 4.0
 
@@ -25,21 +26,27 @@ def curve_of(rule: ThetaRule, stiffness: Array) -> StressCurve:
     return StressCurve(rule.nodes, rule.weights, *stresses(stiffness), stiffness)
 
 
-def with_errors(curve: StressCurve, error: Array) -> StressCurve:
+def with_errors(curve: StressCurve, error: Array, *, square: bool = True) -> StressCurve:
     """The curve with the declared relative errors of its stresses.
 
     Args:
         curve: With its stiffness.
         error: Relative errors of C11 + C12, C11 − C12, C33 and their ratio at the nodes, shape
             (n, 4).
+        square: Whether x1 and x2 differ by the mesh alone.
     """
     moduli = square_moduli(np.asarray(curve.stiffness))
-    uneven = abs(STRAIN * moduli[:, 0] / curve.s11 - 1)  # of the mesh: x1 is not quite x2
+    uneven = abs(STRAIN * moduli[:, 0] / curve.s11 - 1) * square
     return replace(curve, error=np.stack([error[:, 0] + uneven, error[:, 2]], axis=-1))
 
 
-def mean_errors(curve: StressCurve, error: Array) -> Array:
+def mean_errors(curve: StressCurve, error: Array, *, square: bool = True) -> Array:
     """Relative errors of the mean moduli and their ratio from those at the nodes, shape (n, 4).
+
+    Args:
+        curve: With its stiffness.
+        error: As in `with_errors`.
+        square: Whether x1 and x2 differ by the mesh alone.
 
     Returns:
         Of C11 + C12, C11 − C12, C33 and the ratio of the last two means, shape (4,).
@@ -47,9 +54,9 @@ def mean_errors(curve: StressCurve, error: Array) -> Array:
     moduli = square_moduli(np.asarray(curve.stiffness))
     mean = curve.weights @ moduli
     own = curve.weights @ (moduli * error[:, :3]) / mean
-    found = np.append(own, ratio_error(curve.weights, moduli, error))
-    found[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)  # of the mesh: x1 is not quite x2
-    return found
+    errors = np.append(own, ratio_error(curve.weights, moduli, error))
+    errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1) * square
+    return errors
 
 
 def ratio_error(weights: Array, moduli: Array, error: Array) -> float:
@@ -68,18 +75,17 @@ def ratio_error(weights: Array, moduli: Array, error: Array) -> float:
     return float(min(p @ ratio + abs(p - q) @ s, q @ ratio + abs(p - q) @ d))
 
 
-def certified(
-    result: Homogenised, radius_map: RadiusMap, matrix: Phase, inclusion: Phase
-) -> Homogenised:
-    """Result with the certificate of its stiffness, within the estimated error.
+def certified(result: Homogenised, cell: Cell) -> Homogenised:
+    """Result with its cell and the certificate of its stiffness, within the estimated error.
 
     Raises:
         CertificateError: Symmetry or a bound is violated.
     """
     curve = result.curve
     if curve.stiffness is None:
-        return result
-    fraction = np.pi / AREA * radius_map(curve.theta) ** 2
-    checks = stiffness_checks(curve.stiffness, fraction, curve.weights, (matrix, inclusion))
+        return replace(result, cell=cell)
+    fraction = area(cell.outline or circle) / AREA * cell.radius(curve.theta) ** 2
+    phases = cell.matrix, cell.inclusion
+    checks = stiffness_checks(curve.stiffness, fraction, curve.weights, phases)
     limits = Limits(discretisation=ROUND_OFF + result.largest_error)
-    return replace(result, checks=require(checks, limits), cell=Cell(matrix, inclusion, radius_map))
+    return replace(result, checks=require(checks, limits), cell=cell)

@@ -1,6 +1,6 @@
-"""The slices model: planar cell problems at the nodes of a rule in θ.
+"""The slices model: plane cell problems at the nodes of a rule in θ.
 
-The product-space form has no θ-derivative, so its exact solution at each θ is the planar problem
+The product-space form has no θ-derivative, so its exact solution at each θ is the plane problem
 with radius r(θ).
 """
 
@@ -12,18 +12,22 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.rve.cell import Phase, square_moduli, with_ratio
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell import AnyPhase, Cell, axial_moduli, square_moduli
+from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.rve.result import Homogenised
-from alphacut.rve.settings import require_mesh_size, require_parts, require_points
+from alphacut.rve.settings import (
+    require_compressible,
+    require_mesh_size,
+    require_parts,
+    require_points,
+)
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
 from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array
 
-# least share of the last change that is taken to be left: by order 4, the same where order 2 locks
-# and so changes by much, and by lower orders, which are not yet regular
-_FADE, _LOCKED_FADE, _IRREGULAR_FADE = 0.03, 0.05, 0.08
-_LOCKING = 0.45  # Poisson's ratio above which order 2 locks
+_FADE = 0.03  # least share of the last change that is taken to be left by order 4
 _ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
 _CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
@@ -35,90 +39,86 @@ _SHARED = np.array([0.03, 0.5, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 @dataclass(frozen=True)
 class SlicesModel:
-    """Planar finite elements with curved sides at the nodes of a Gauss rule in θ.
+    """Plane finite elements with curved sides at the nodes of a Gauss rule in θ.
 
     Args:
         order: Polynomial degree of the elements, 2 to 4.
         mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
         points: Nodes in θ, of each smooth piece where the map jumps or bends; at least 2.
-        centre: Centre of the particle in the cell [−1, 1]²; the moduli do not depend on it.
+        outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
         progress: Called with the fraction done.
 
     Raises:
-        ValueError: A value lies outside its range.
+        RefusedError: A value lies outside its range.
     """
 
     order: int = 4
     mesh_size: float = 0.2
     points: int = 10
-    centre: tuple[float, float] = (0.0, 0.0)
+    outline: Outline = circle
     progress: Callable[[float], None] | None = None
     name = "slices"
 
     def __post_init__(self) -> None:
         if self.order not in _ORDERS:
-            raise ValueError(
-                f"the order of the planar elements is {self.order}; it must be 2, 3 or 4"
-            )
+            raise RefusedError("order of the elements", self.order, "2, 3, 4")
         require_mesh_size(self.mesh_size)
         require_points(self.points)
 
     def solve(
-        self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
+        self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> list[Homogenised]:
         """One result for each of `inclusions`, in their order.
 
         Raises:
-            PlanarError: A linear system was not solved.
+            PlaneError: A linear system was not solved.
+            TouchingError: Particles nearly touch.
+            RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
         """
-        require_parts(radius_map, matrix, inclusions)
+        require_parts(radius_map, matrix, inclusions, isotropic=False)
+        require_compressible(matrix, *inclusions)
         start = perf_counter()
         rule = theta_rule(radius_map, points=self.points)
         at_nodes = np.round(radius_map(rule.nodes), DIGITS)
         radii = np.unique(np.concatenate([at_nodes, np.round(extreme_radii(radius_map), DIGITS)]))
+        nodes = np.searchsorted(radii, at_nodes)
         slices = self._slices(radii, matrix, inclusions)
-        seconds = {stage: sum(s.seconds[stage] for s in slices) for stage in slices[0].seconds}
-        seconds["total"] = perf_counter() - start - seconds["jit"]
+        seconds = {"total": perf_counter() - start}
+        outline = None if is_round(self.outline) else self.outline
         results = []
         for m, inclusion in enumerate(inclusions):
-            stiffness = np.array([s.stiffness[m] for s in slices])
-            in_theta = theta_error(
-                radius_map,
-                rule,
-                radii=radii,
-                moduli=square_moduli(stiffness),
-                phases=(matrix, inclusion),
-            )
-            nodes = np.searchsorted(radii, at_nodes)
-            error = np.array([s.error[m] for s in slices])[nodes]
+            stiffness = np.array([one.stiffness(self.order)[m] for one in slices])
+            moduli, phases = square_moduli(stiffness), (matrix, inclusion)
+            in_theta = theta_error(radius_map, rule, radii=radii, moduli=moduli, phases=phases)
+            cell = Cell(matrix, inclusion, radius_map, outline)
+            error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
             curve = curve_of(rule, stiffness[nodes])
             result = Homogenised(
-                with_errors(curve, _POINTWISE * error),
+                with_errors(curve, _POINTWISE * error[nodes], square=cell.square),
                 self.name,
-                slices[0].solver,
-                max(s.unknowns for s in slices),
+                "cholesky",
+                max(one.unknowns[_ORDERS.index(self.order)] for one in slices),
                 (),
                 seconds,
-                {"space": mean_errors(curve, error), "theta": in_theta},
+                {
+                    "space": mean_errors(curve, error[nodes], square=cell.square),
+                    "theta": in_theta,
+                },
                 f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size"
                 f" {self.mesh_size:g}",
             )
-            results.append(certified(result, radius_map, matrix, inclusion))
+            results.append(certified(result, cell))
         return results
 
-    def _slices(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> list[Slice]:
-        """The cells solved, one for each radius; orders below 4 are judged by the next."""
+    def _slices(
+        self, radii: Array, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+    ) -> list[Slice]:
+        """The cells solved, one for each radius, by all orders: the others judge the result's."""
         slices = []
         for radius in radii:
             slices.append(
                 solve_slice(
-                    radius,
-                    matrix,
-                    inclusions,
-                    orders=_ORDERS,  # whichever the result is taken from: the rest judge it
-                    order=self.order,
-                    mesh_size=self.mesh_size,
-                    centre=self.centre,
+                    radius, matrix, inclusions, mesh_size=self.mesh_size, outline=self.outline
                 )
             )
             if self.progress:
@@ -128,113 +128,75 @@ class SlicesModel:
 
 @dataclass(frozen=True)
 class Slice:
-    """A planar cell solved for m inclusions by elements of several orders on one mesh.
+    """A plane cell solved for m inclusions by elements of orders 2, 3 and 4 on one mesh.
 
     Args:
-        orders: Rising.
-        order: That of the result.
-        by_order: Stiffness by order, in Pa, shape (orders, m, 3, 3).
-        unknowns: Of the result's linear system.
-        solver: Its solver.
-        factorisations: How many were made.
-        seconds: Wall time: mesh, jit, assemble, solve.
-        locks: Whether a phase is nearly incompressible.
+        by_order: Stiffness by order, in Pa, shape (3, m, 3, 3).
+        unknowns: Of each order's linear system.
         mesh_size: Edge length of the mesh, in halves of the cell's side.
         cancelled: Relative round-off that a stiff particle's forces leave of each inclusion where
             they cancel, shape (m, 1).
     """
 
-    orders: tuple[int, ...]
-    order: int
     by_order: Array
-    unknowns: int
-    solver: str
-    factorisations: int
-    seconds: dict[str, float]
-    locks: bool
+    unknowns: tuple[int, ...]
     mesh_size: float
     cancelled: Array
 
-    @property
-    def stiffness(self) -> Array:
-        """By the result's order, shape (m, 3, 3), in Pa."""
-        return np.asarray(self.by_order[self.orders.index(self.order)])
+    def stiffness(self, order: int) -> Array:
+        """By one order, shape (m, 3, 3), in Pa."""
+        return np.asarray(self.by_order[_ORDERS.index(order)])
 
-    @property
-    def gaps(self) -> Array:
-        """Relative change of the moduli and the ratio by each rise of order, (orders − 1, m, 4)."""
-        moduli = with_ratio(square_moduli(self.by_order))
-        return np.asarray(np.abs(moduli[:-1] / moduli[1:] - 1))
-
-    @property
-    def error(self) -> Array:
+    def error(self, order: int, *, square: bool) -> Array:
         """Declared relative errors of C11 + C12, C11 − C12, C33 and the ratio, shape (m, 4).
 
-        The distance from the highest order, and the declared error of that one.
-        """
-        both = self.stiffness, self.by_order[-1]
-        own, highest = (with_ratio(square_moduli(one)) for one in both)
-        return np.asarray((1 + np.abs(own / highest - 1)) * (1 + self._error_of_highest) - 1)
+        The distance from order 4, and the declared error of that one.
 
-    @property
-    def _error_of_highest(self) -> Array:
-        """Declared errors by the highest order, shape (m, 4).
+        Args:
+            order: Of the result.
+            square: Whether the stiffness has the symmetry of the square; else errors along either
+                axis count.
+        """
+        moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 4)
+        own = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
+        gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2)
+        return np.asarray((1 + own) * (1 + self._error_of_highest(gaps)) - 1)
+
+    def _error_of_highest(self, gaps: Array) -> Array:
+        """Declared errors by order 4, shape (m, 4), from changes by each rise of order, (2, m, 4).
 
         The geometric series of further orders, times a safety factor. What one order more leaves
-        of the last change is what the last rise left of the one before; where order 2 locks, of
-        the modulus where it left most. One modulus may change little by chance: each counts a share
-        of the largest error.
+        of the last change is what the last rise left of the one before. One modulus may change
+        little by chance: each counts a share of the largest error.
         """
-        gaps, least = self.gaps, _LOCKED_FADE if self.locks else _FADE
-        fade = np.full(gaps.shape[1:], least if self.orders[-1] == 4 else _IRREGULAR_FADE)
-        if len(gaps) > 1:
-            fade = np.clip(gaps[-1] / np.maximum(gaps[-2], 1e-300), fade, 0.5)
-        if self.locks:
-            fade = fade.max(axis=1, keepdims=True)
+        fade = np.clip(gaps[1] / np.maximum(gaps[0], 1e-300), _FADE, 0.5)
         safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
-        found = safety * gaps[-1] * fade / (1 - fade)
-        shared = _SHARED * found[:, :3].max(axis=1, keepdims=True)
-        return np.asarray(np.maximum(found, shared) + _ROUND_OFF + self.cancelled)
+        error = safety * gaps[1] * fade / (1 - fade)
+        shared = _SHARED * error[:, :3].max(axis=1, keepdims=True)
+        return np.asarray(np.maximum(error, shared) + _ROUND_OFF + self.cancelled)
 
 
 def solve_slice(
     radius: float,
-    matrix: Phase,
-    inclusions: Sequence[Phase],
+    matrix: AnyPhase,
+    inclusions: Sequence[AnyPhase],
     *,
-    orders: Sequence[int],
-    order: int | None = None,
     mesh_size: float,
-    centre: tuple[float, float] = (0.0, 0.0),
-    share: bool = False,
+    outline: Outline = circle,
 ) -> Slice:
-    """Solve one planar cell by each of the rising `orders` on one mesh.
+    """Solve one plane cell by orders 2, 3 and 4 on one mesh."""
+    from alphacut.rve.mesh.curved import plane_mesh
+    from alphacut.rve.slices.plane_cell import PlaneCell
 
-    The result is that of `order`, by default the highest.
-    """
-    from alphacut.rve.mesh.planar import planar_mesh
-    from alphacut.rve.planar.problem import PlanarCell
-    from alphacut.rve.planar.system import SOLVER
-
-    started = perf_counter()
-    mesh = planar_mesh(radius, size=mesh_size, centre=centre)
-    seconds = {"mesh": perf_counter() - started}
-    cells = [PlanarCell(mesh, order) for order in orders]
-    started = perf_counter()
-    stiffness = np.array([cell.stiffness(matrix, inclusions, share=share) for cell in cells])
-    seconds["solve"] = perf_counter() - started - sum(cell.seconds["assemble"] for cell in cells)
-    for name in ("mesh", "jit", "assemble"):
-        seconds[name] = seconds.get(name, 0.0) + sum(cell.seconds[name] for cell in cells)
-    chosen = orders[-1] if order is None else order
+    mesh = plane_mesh(radius, size=mesh_size, outline=outline)
+    cells = [PlaneCell(mesh, order) for order in _ORDERS]
+    stiffness = [
+        [cell.stiffness((matrix.stiffness, one.stiffness)) for one in inclusions] for cell in cells
+    ]
+    contrast = [[one.stiffness[2, 2] / matrix.stiffness[2, 2]] for one in inclusions]
     return Slice(
-        tuple(orders),
-        chosen,
-        stiffness,
-        cells[list(orders).index(chosen)].unknowns,
-        SOLVER,
-        sum(cell.factorisations for cell in cells),
-        seconds,
-        max(phase.poisson for phase in (matrix, *inclusions)) > _LOCKING,
+        np.array(stiffness),
+        tuple(cell.unknowns for cell in cells),
         mesh_size,
-        _CANCELLED * radius * np.array([[one.modulus / matrix.modulus] for one in inclusions]),
+        _CANCELLED * radius * np.array(contrast),
     )

@@ -10,12 +10,13 @@ from typing import TypeGuard
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.bounds import mori_tanaka
-from alphacut.rve.cell import Phase, square_moduli, with_ratio
+from alphacut.rve.cell import AnyPhase, square_moduli, with_ratio
 from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule, require_map
-from alphacut.stochastic.theta.law import Array
 
 _SAMPLES = 2049
 _LEAST_JUMP, _LEAST_BEND = 1e-3, 1e-8  # in radii, over one or two steps of the sampling
@@ -37,7 +38,7 @@ def can_hash(of: object) -> TypeGuard[Hashable]:
     return True
 
 
-class RuleError(RuntimeError):
+class RuleError(FailedError):
     """No rule in θ reaches the wanted accuracy."""
 
 
@@ -157,9 +158,9 @@ def settle_rule(
             return list(curves), list(errors), list(finest)
         if counts[-1] >= _MOST_POINTS:
             raise RuleError(
-                f"the rule of {count} nodes in θ leaves a relative error of {np.max(gaps):.1e} and"
-                f" {accuracy:.1e} is wanted: the radius map is not smooth; allow a larger error, or"
-                " give the number of nodes"
+                f"the rule of {count} nodes in θ leaves a relative error of {np.max(gaps):.1e};"
+                f" {accuracy:.1e} is allowed: the radius map is not smooth",
+                "allow a larger error, or give the number of nodes",
             )
         count = counts[1]
 
@@ -215,7 +216,7 @@ def theta_error(
     *,
     radii: Array,
     moduli: Array,
-    phases: tuple[Phase, Phase],
+    phases: tuple[AnyPhase, AnyPhase],
 ) -> Array:
     """Declared relative errors by `rule`, shape (4,), from slices solved.
 
@@ -252,6 +253,6 @@ def theta_error(
     return np.asarray(SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
 
 
-def _dilute(radii: Array, phases: tuple[Phase, Phase]) -> Array:
+def _dilute(radii: Array, phases: tuple[AnyPhase, AnyPhase]) -> Array:
     """The moduli of Mori and Tanaka at radii, shape (n, 3)."""
     return mori_tanaka(np.pi / 4 * radii**2, *phases)

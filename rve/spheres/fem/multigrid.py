@@ -8,7 +8,7 @@ quadratic ones too, its stiffness is Galerkin's.
 
 from __future__ import annotations
 
-from alphacut.rve.petsc import PETSc, in_database
+from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.options import PREFIX
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -62,9 +62,13 @@ class TwoSpaces:
         inner.setOperators(coarse)
         inner.pc.setType("gamg")
         inner.pc.setCoordinates(nodes)
-        with in_database(_OPTIONS, wanted=_OPTIONS):
-            krylov.setFromOptions()
-            krylov.setUp()
+        database = PETSc.Options(PREFIX)
+        for name, value in _OPTIONS.items():
+            database[name] = value
+        krylov.setFromOptions()
+        krylov.setUp()
+        for name in _OPTIONS:
+            database.delValue(name)
         self._krylov = krylov
 
     def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> int:

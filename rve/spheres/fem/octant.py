@@ -9,8 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from alphacut.rve.interruption import uninterrupted
-from alphacut.rve.mesh.planar import TouchingError
-from alphacut.rve.ranks import Ranks
+from alphacut.rve.mesh.curved import TouchingError
 from alphacut.rve.settings import require_mesh_size, require_radius
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -55,7 +54,8 @@ def octant(radius: float, *, size: float, comm: MPI.Intracomm = MPI.COMM_SELF) -
     try:
         gmsh.option.setNumber("General.NumThreads", 1)
         gmsh.option.setNumber("General.Terminal", 0)  # errors are raised, the rest is not for here
-        Ranks(comm).first(lambda: _generate_sound(radius, size))
+        if comm.rank == 0:
+            _generate_sound(radius, size)
         return gmshio.model_to_mesh(gmsh.model, comm, 0, gdim=3)
     finally:
         gmsh.finalize()

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 
-import alphacut.rve.petsc  # noqa: F401
+import alphacut.rve.fenicsx  # noqa: F401
 from alphacut.rve.interruption import uninterrupted
 
 with uninterrupted():

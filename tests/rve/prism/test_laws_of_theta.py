@@ -35,5 +35,5 @@ class Empty(Beta):
 
 
 def test_layers_without_probability_are_refused():
-    with pytest.raises(ValueError, match=r"density of θ is 0 at .* needs probability"):
+    with pytest.raises(ValueError, match=r"density of θ at .* is 0; allowed: positive densities"):
         PrismModel(0.3, 4).solve(HermiteMap(0.2, 0.1, 0.8, 0.2, Empty()), MATRIX, [PARTICLE])

@@ -205,7 +205,8 @@ def test_smooth_maps_are_not_cut(slopes):
 
 
 @pytest.mark.parametrize(
-    ("options", "message"), [({"points": 1}, "at least 2"), ({"accuracy": 1e-15}, "must lie in")]
+    ("options", "message"),
+    [({"points": 1}, "2 or more"), ({"accuracy": 1e-15}, "allowed: values in")],
 )
 def test_options_out_of_range(options, message):
     with pytest.raises(ValueError, match=message):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.rve import Phase
-from alphacut.rve.mesh.planar import TouchingError
+from alphacut.rve.mesh.curved import TouchingError
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.fem import multigrid

@@ -1,0 +1,89 @@
+"""DOLFINx and PETSc, and the places where DOLFINx 0.9, 0.10 and 0.11 differ.
+
+PETSc reads ``~/.petscrc`` when it is first imported, DOLFINx imports it too: whatever needs either
+takes it from here. Signals stay the program's.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import cffi
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.rve.interruption import uninterrupted
+
+with uninterrupted():
+    import petsc4py  # after MPI, and before DOLFINx: its wheels need that
+    from mpi4py import MPI
+
+    petsc4py.init(["alphacut", "-skip_petscrc", "-no_signal_handler"])
+    import basix
+    import basix.ufl
+    import dolfinx
+    import ufl
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+    from petsc4py import PETSc
+
+__all__ = [
+    "MPI", "PETSc", "at_points", "basix", "compiled", "factors", "fem", "mesh_of", "option_is_used",
+    "petsc", "ufl",
+]  # fmt: skip
+
+# twice as fast as the default -O2, equal to round-off; other processes may compile the same
+JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}
+
+
+def compiled(form: ufl.Form) -> fem.Form:
+    """The form, compiled or from DOLFINx's cache."""
+    with (
+        warnings.catch_warnings()
+    ):  # UFL signs a form by its quadrature points, which print in full
+        warnings.filterwarnings("ignore", message="Applying str")
+        return fem.form(form, jit_options=JIT)
+
+
+def at_points(value: Any, points: Array) -> fem.Expression:
+    """A UFL expression, compiled, at `points` of the reference cell."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Applying str")
+        return fem.Expression(value, points, jit_options=JIT)
+
+
+def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
+    """Mesh whose positions are all 0 yet; consecutive cells go to the same rank.
+
+    Args:
+        comm: Communicator.
+        cells: All cells by their nodes, in Basix's order.
+        nodes: Number of nodes.
+        element: Coordinate element.
+    """
+    cells, places = (
+        np.array_split(one, comm.size)[comm.rank]
+        for one in (cells, np.zeros((nodes, element.reference_value_shape[0])))
+    )
+
+    def stay(*_: Any) -> Any:
+        kept = dolfinx.graph.adjacencylist(np.full((len(cells), 1), comm.rank, np.int32))
+        return getattr(kept, "_cpp_object", kept)
+
+    own = {"partitioner": stay} if comm.size > 1 else {}
+    return dolfinx.mesh.create_mesh(comm, cells=cells, x=places, e=element, **own)
+
+
+def option_is_used(name: str) -> bool:
+    """True if PETSc has asked for the option; petsc4py does not wrap this question."""
+    interface = cffi.FFI()
+    interface.cdef("int PetscOptionsUsed(void *options, const char *name, char *used);")
+    used = interface.new("char[8]")  # as large as any PetscBool
+    interface.dlopen(PETSc.__file__).PetscOptionsUsed(interface.NULL, name.encode(), used)
+    return any(byte != b"\0" for byte in used)
+
+
+def factors() -> str:
+    """The library that factorises plane problems, the fastest of those at hand."""
+    return "cholmod" if PETSc.Sys.hasExternalPackage("cholmod") else "mumps"

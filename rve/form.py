@@ -1,0 +1,62 @@
+"""The elasticity form of the cell, for triangles and for wedges of the product space (eq. 1 to 7).
+
+div and D act on x alone: on the product space, whose mesh is three-dimensional, the form has no
+derivative along θ.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
+
+
+def strain(u: Any) -> Any:
+    """In-plane strain (ε11, ε22, 2 ε12) of displacements; θ is not differentiated (eq. 5)."""
+    gradient = ufl.grad(u)
+    return ufl.as_vector([gradient[0, 0], gradient[1, 1], gradient[0, 1] + gradient[1, 0]])
+
+
+class CellForm:
+    """Stiffness and loads of a fluctuation in two phases; what stands in them is set anew.
+
+    Args:
+        space: Displacements of two components.
+        points: Values at quadrature points, or in cells.
+        dx: The measure.
+
+    Attributes:
+        density: f_Θ of eq. 1 at the points; 1 where there is no θ.
+        share: Part of the particle at the points, 0 or 1 (eq. 13).
+    """
+
+    def __init__(self, space: fem.FunctionSpace, points: fem.FunctionSpace, dx: Any) -> None:
+        mesh = space.mesh
+        self.density, self.share = fem.Function(points), fem.Function(points)
+        self._phases = [fem.Constant(mesh, np.zeros((3, 3))) for _ in range(2)]
+        self._uniform = fem.Constant(mesh, np.zeros(3))
+        u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+        density, (matrix, inclusion) = self.density, self._phases
+        stiffness = matrix + self.share * (inclusion - matrix)  # eq. 13
+        stress = stiffness * strain(u)  # eq. 6
+        # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
+        self._stiffness = compiled(density * ufl.dot(stress, strain(v)) * dx)
+        self._load = compiled(-density * ufl.dot(stiffness * self._uniform, strain(v)) * dx)
+
+    def set_phases(self, stiffness: tuple[Array, Array]) -> None:
+        """Take the Voigt matrices of matrix and particle, in Pa."""
+        for constant, value in zip(self._phases, stiffness, strict=True):
+            constant.value[:] = value
+
+    def add_stiffness(self, matrix: PETSc.Mat) -> None:
+        """Add the stiffness of eq. 7 to a matrix, whose local-to-global map reduces it."""
+        petsc.assemble_matrix(matrix, self._stiffness)
+        matrix.assemble()
+
+    def load(self, uniform: Array) -> Array:
+        """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
+        self._uniform.value[:] = uniform
+        return np.array(fem.assemble_vector(self._load).array)

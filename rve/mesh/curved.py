@@ -1,0 +1,159 @@
+"""Plane cell as Gmsh triangles of any order with a curved interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.refused import FailedError
+from alphacut.rve.fenicsx import basix
+from alphacut.rve.mesh import square
+from alphacut.rve.mesh.outline import Outline, circle, extents, reach, require_fit
+from alphacut.rve.settings import require_mesh_size
+
+EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
+_CLOSEST = 0.9995
+_COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
+
+
+class TouchingError(FailedError):
+    """Particles so close that the mesh between them has no end."""
+
+
+@dataclass(frozen=True)
+class PlaneMesh:
+    """Straight-sided triangles of the cell [−1, 1]², opposite sides matching.
+
+    Args:
+        points: Vertices, shape (n, 2).
+        triangles: Vertices of each triangle in rising order, shape (m, 3), so that two neighbours
+            run along their edge the same way.
+        inside: Whether a triangle belongs to the particle, shape (m,).
+        radius: Radius of the particle.
+        outline: Of the particle.
+    """
+
+    points: Array
+    triangles: Rows
+    inside: Mask
+    radius: float
+    outline: Outline = circle
+
+
+def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> PlaneMesh:
+    """Mesh one cell, finer where the particle is small or nearly touches its images.
+
+    Args:
+        radius: Radius of the particle over half the cell's side.
+        size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
+        outline: Of the particle.
+
+    Raises:
+        RefusedError: A value out of range.
+        TouchingError: Particles nearly touch.
+    """
+    require_mesh_size(size)
+    require_fit(outline, radius)
+    if radius * reach(outline) > _CLOSEST:
+        raise TouchingError(
+            f"the particle reaches to {radius * reach(outline):.6g} of half the cell's side and"
+            f" plane meshes end at {_CLOSEST:g}: the gap between particles would need elements"
+            " without end",
+            "lower the radius",
+        )
+    size, (wide, high, least) = min(size, _COARSEST), (radius * one for one in extents(outline))
+    points, triangles, inside = square.triangles(
+        size, radius, outline, lambda x, y: size * _grading(x, y, wide, high, least)
+    )
+    shared = np.intersect1d(triangles[inside], triangles[~inside])
+    x, y = points[shared].T  # Gmsh's splines are near the outline only
+    points[shared] *= (radius * outline(np.arctan2(y, x)) / np.hypot(x, y))[:, None]
+    return PlaneMesh(points, np.sort(triangles, axis=1), inside, radius, outline)
+
+
+def _grading(x: float, y: float, wide: float, high: float, least: float) -> float:
+    """Local edge length over the nominal one, less near the particle and in gaps.
+
+    The factors spread the error evenly over radii from 0.1 to 0.98. Gmsh calls this for every
+    point, hence no NumPy.
+
+    Args:
+        x: First coordinate.
+        y: Second coordinate.
+        wide: Greatest |x1| of the particle.
+        high: Greatest |x2|.
+        least: Least distance of its outline from the centre.
+    """
+    x, y = abs(x), abs(y)
+    near = 1.4 * max(hypot(x, y), least)
+    beside = 1 - wide + y * y / (2 * wide) + max(0.0, wide - x)
+    above = 1 - high + x * x / (2 * high) + max(0.0, high - y)
+    return min(1.0, near, 4 * beside, 4 * above)
+
+
+def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
+    """Nodes of Lagrange triangles of `order`, the interface's edges bent onto the outline.
+
+    Inside a triangle the bend fades with the bubble of its edge, so the map stays smooth and the
+    elements keep their order.
+
+    Returns:
+        Positions (n, 2) and the nodes of each triangle (m, (order + 1)(order + 2)/2).
+    """
+    element = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped
+    )
+    lattice: Array = np.asarray(element.points, float)
+    barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
+    ends, edges = _number_edges(mesh.triangles)
+    places = np.einsum("nl,eld->end", barycentric, mesh.points[mesh.triangles])
+    sides = [
+        np.bincount(edges[mesh.inside == flag].ravel(), minlength=len(ends))
+        for flag in (False, True)
+    ]
+    on_interface = (sides[0] > 0) & (sides[1] > 0)
+    for k, (a, b) in enumerate(EDGES):
+        bent = np.flatnonzero(on_interface[edges[:, k]])
+        places[bent] += _bend(mesh, mesh.triangles[bent][:, [a, b]], barycentric[:, [a, b]])
+    cells = _number_nodes(
+        mesh.triangles, edges, vertices=len(mesh.points), edge_count=len(ends), order=order
+    )
+    points = np.empty((cells.max() + 1, 2))
+    points[cells] = places
+    return points, cells
+
+
+def _number_edges(triangles: Rows) -> tuple[Rows, Rows]:
+    """The two vertices of each edge (k, 2) and the edges of each triangle (m, 3)."""
+    pairs = np.stack([triangles[:, list(pair)] for pair in EDGES], axis=1)
+    ends, edges = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
+    return ends, edges.reshape(-1, 3)
+
+
+def _number_nodes(
+    triangles: Rows, edges: Rows, *, vertices: int, edge_count: int, order: int
+) -> Rows:
+    on_edge, within = order - 1, (order - 1) * (order - 2) // 2
+    along = [vertices + edges[:, [k]] * on_edge + np.arange(on_edge) for k in range(3)]
+    first = vertices + edge_count * on_edge
+    return np.hstack(
+        [triangles, *along, first + np.arange(len(triangles))[:, None] * within + np.arange(within)]
+    )
+
+
+def _bend(mesh: PlaneMesh, ends: Rows, weights: Array) -> Array:
+    """Displacement of all nodes of triangles with the edge `ends` (k, 2) on the outline."""
+    a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
+    start, stop = (np.arctan2(p[:, 1], p[:, 0]) for p in (a, b))
+    turn = (stop - start + np.pi) % (2 * np.pi) - np.pi
+    along = (1 + weights[:, 1] - weights[:, 0]) / 2
+    angle = start[:, None] + turn[:, None] * along
+    distance = mesh.radius * np.asarray(mesh.outline(angle))
+    arc = distance[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    chord = a[:, None] + (b - a)[:, None] * along[:, None]
+    bubble = weights.prod(axis=1)
+    share = np.divide(bubble, along * (1 - along), out=np.zeros_like(bubble), where=bubble > 1e-14)
+    return np.asarray((arc - chord) * share[:, None])

@@ -1,0 +1,86 @@
+"""Outlines of the particle: the distance s(φ) from the centre over the radius ρ(θ) of the map."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+
+Outline = Callable[[Array], Array]
+"""Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
+_ANGLES = np.linspace(0, 2 * np.pi, 721)
+_ROUND = 1e-12
+
+
+def circle(angle: Array) -> Array:
+    """The default, s = 1."""
+    return np.ones_like(angle)
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """An ellipse of the area of the circle, π ρ².
+
+    Args:
+        aspect: Semi-axis along x1 over that along x2, in [1/4, 4].
+
+    Raises:
+        RefusedError: The aspect is out of range.
+    """
+
+    aspect: float
+
+    def __post_init__(self) -> None:
+        if not 0.25 <= self.aspect <= 4:
+            raise RefusedError("aspect of the ellipse", self.aspect, "values in [0.25, 4]")
+
+    def __call__(self, angle: Array) -> Array:
+        """Distances over ρ at angles."""
+        return np.asarray(
+            1 / np.sqrt(np.cos(angle) ** 2 / self.aspect + np.sin(angle) ** 2 * self.aspect)
+        )
+
+
+def is_round(outline: Outline) -> bool:
+    """True for the circle."""
+    return outline is circle or bool(np.ptp(outline(_ANGLES)) < _ROUND)
+
+
+def area(outline: Outline) -> float:
+    """Area for ρ = 1: ∮ s²/2 dφ; π for a circle."""
+    return float(np.mean(outline(_ANGLES[:-1]) ** 2) * np.pi)
+
+
+def reach(outline: Outline) -> float:
+    """Greatest coordinate on the outline for ρ = 1, below 1/ρ where the particle fits."""
+    extents = outline(_ANGLES) * np.maximum(abs(np.cos(_ANGLES)), abs(np.sin(_ANGLES)))
+    return float(extents.max())
+
+
+def extents(outline: Outline) -> tuple[float, float, float]:
+    """Greatest |x1| and |x2|, and least distance from the centre, for ρ = 1."""
+    s = outline(_ANGLES)
+    return (
+        float((s * abs(np.cos(_ANGLES))).max()),
+        float((s * abs(np.sin(_ANGLES))).max()),
+        float(s.min()),
+    )
+
+
+def require_fit(outline: Outline, radius: float) -> None:
+    """Refuse a particle that touches a side of the cell.
+
+    Raises:
+        RefusedError: It does, or its outline is no positive distance.
+    """
+    s = outline(_ANGLES)
+    if not (s > 0).all() or abs(s[0] - s[-1]) > 1e-9 * s[0]:
+        raise RefusedError("outline", s.min(), "positive distances of period 2π")
+    if not radius > 0 or radius * reach(outline) >= 1:
+        limit = 1 / reach(outline)
+        raise RefusedError("radius", f"{radius:g}", f"values in (0, {limit:.4g}), in halves of the"
+                           " cell's side")  # fmt: skip

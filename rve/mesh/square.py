@@ -1,0 +1,114 @@
+"""Gmsh's triangles of the cell [−1, 1]² around its particle, opposite sides matching."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.rve.mesh.outline import Outline, is_round
+
+Triangles = tuple[Array, Rows, Mask]
+Sizes = Callable[[float, float], float]
+_ARC = np.linspace(0, np.pi / 2, 17)[1:-1]  # of a quarter of an outline
+
+
+def triangles(
+    size: float, radius: float, outline: Outline, sizes: Sizes | None = None
+) -> Triangles:
+    """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,).
+
+    Args:
+        size: Edge length, in halves of the cell's side.
+        radius: Radius of the particle; 0 for a mesh that knows nothing of it.
+        outline: Of the particle.
+        sizes: Edge length at (x1, x2), in place of `size`.
+    """
+    with _model() as gmsh:
+        geo = gmsh.model.geo
+        surfaces = _particle(geo, size, radius, outline) if radius else _square(geo, size)
+        if sizes:
+            _grade(gmsh, sizes)
+        gmsh.model.mesh.generate(2)
+        tags, xyz, _ = gmsh.model.mesh.getNodes()
+        number = np.zeros(int(tags.max()) + 1, np.int64)
+        number[tags] = np.arange(len(tags))
+        blocks = [
+            number[gmsh.model.mesh.getElementsByType(2, s)[1].astype(np.int64)].reshape(-1, 3)
+            for s in surfaces
+        ]
+    inside = np.concatenate([np.full(len(b), radius > 0 and k == 0) for k, b in enumerate(blocks)])
+    # the centres of arcs are points without triangles
+    used, packed = np.unique(np.concatenate(blocks), return_inverse=True)
+    return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), inside
+
+
+@contextmanager
+def _model() -> Iterator[Any]:
+    """Gmsh with an empty model, quiet, on one thread."""
+    import gmsh  # here: loading it takes a tenth of a second, and kept meshes need none
+
+    gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.NumThreads", 1)
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+def _grade(gmsh: Any, sizes: Sizes) -> None:
+    """Take edge lengths from a function alone."""
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+    # of the size along a curve; the default asks for thousands of points
+    gmsh.option.setNumber("Mesh.LcIntegrationPrecision", 1e-4)
+    gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: sizes(x, y))
+
+
+def _sides(geo: Any, size: float) -> int:
+    """Curve loop of the square with opposite sides periodic."""
+    import gmsh
+
+    corners = [geo.addPoint(x, y, 0, size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    sides = [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+    geo.synchronize()
+    for first, second, shift in ((sides[3], sides[1], (2, 0)), (sides[0], sides[2], (0, 2))):
+        affine = np.eye(4)
+        affine[:2, 3] = shift
+        gmsh.model.mesh.setPeriodic(1, [second], [first], affine.ravel().tolist())
+    return int(geo.addCurveLoop(sides))
+
+
+def _square(geo: Any, size: float) -> tuple[int]:
+    """The cell without a particle: its surface."""
+    surface = geo.addPlaneSurface([_sides(geo, size)])
+    geo.synchronize()
+    return (surface,)
+
+
+def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[int, int]:
+    """Cell with its particle bounded by four curves: surfaces of particle and matrix."""
+    import gmsh
+
+    def point(angle: float) -> int:
+        distance = radius * float(outline(np.array(angle)))
+        return int(geo.addPoint(distance * np.cos(angle), distance * np.sin(angle), 0, size))
+
+    centre, quarters = geo.addPoint(0, 0, 0, size), np.arange(4) * np.pi / 2
+    if is_round(outline):  # exact zeros, so that meshes are the same everywhere
+        axes = ((1, 0), (0, 1), (-1, 0), (0, -1))
+        r = radius * float(outline(np.array(0.0)))
+        poles = [geo.addPoint(r * x, r * y, 0, size) for x, y in axes]
+        arcs = [geo.addCircleArc(poles[k], centre, poles[(k + 1) % 4]) for k in range(4)]
+    else:
+        poles = [point(angle) for angle in quarters]
+        between = [[point(angle + turn) for turn in _ARC] for angle in quarters]
+        arcs = [geo.addSpline([poles[k], *between[k], poles[(k + 1) % 4]]) for k in range(4)]
+    loop = geo.addCurveLoop(arcs)
+    particle, matrix = geo.addPlaneSurface([loop]), geo.addPlaneSurface([_sides(geo, size), loop])
+    geo.synchronize()
+    gmsh.model.mesh.embed(0, [centre], 2, particle)
+    return particle, matrix

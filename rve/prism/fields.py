@@ -1,0 +1,86 @@
+"""Displacements and stresses at the nodes of the product space, for ParaView and other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.rve.cell import AnyPhase
+from alphacut.rve.fenicsx import at_points, fem
+from alphacut.rve.form import strain
+from alphacut.rve.mesh.wedge import vertices_and_midpoints
+from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.problem import PrismProblem
+from alphacut.stochastic import RadiusMap
+
+NODES = 15
+
+
+@dataclass(frozen=True)
+class CellFields:
+    """Total fields under each load; nodes on the interface stand twice, once for each phase.
+
+    Args:
+        points: (x1, x2, θ), shape (n, 3).
+        cells: Nodes of the wedges in Basix's order, shape (m, 15).
+        phase: 0 the matrix, 1 the particle, shape (m,).
+        displacement: In halves of the cell's side, shape (n, 2, loads).
+        stress: (σ11, σ22, σ12), means over the wedges of one phase that meet in a node, shape
+            (n, 3, loads), in Pa.
+        volume: Of the wedges, weighted with f_Θ, shape (m,).
+    """
+
+    points: Array
+    cells: Rows
+    phase: Rows
+    displacement: Array
+    stress: Array
+    volume: Array
+
+
+def cell_fields(
+    model: PrismModel, radius_map: RadiusMap, matrix: AnyPhase, inclusion: AnyPhase
+) -> CellFields:
+    """Fields of one cell, on one rank, by a mesh that follows the interface.
+
+    Raises:
+        ConvergenceError: The linear solver stopped early.
+        FoldedMeshError: The map bends more than the layers can follow.
+    """
+    problem, phases = model.problem(radius_map), (matrix.stiffness, inclusion.stiffness)
+    form, grid = problem.form, problem.form.grid
+    problem.assemble(phases)
+    vectors = problem.solver(model.options).solve(problem.loads(model.loads)).vectors
+    fluctuations = [problem.field(vector) for vector in vectors]
+    positions = grid.positions(radius_map)
+    total = np.empty((grid.nodes, 2, len(vectors)))
+    wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
+    for k, (uniform, u) in enumerate(zip(model.loads, fluctuations, strict=True)):
+        tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
+        total[form.node, :, k] = u + positions[form.node, :2] @ tensor
+        wedges[form.wedge, ..., k] = _strain_at_nodes(problem, u) + uniform
+    inside = grid.inside.astype(np.int64)
+    stress = np.array(phases)[inside][:, None] @ wedges
+    numbered = grid.cells + inside[:, None] * grid.nodes
+    kept, cells = np.unique(numbered, return_inverse=True)
+    cells = cells.reshape(numbered.shape)
+    mean = np.zeros((len(kept), 3, len(vectors)))
+    np.add.at(mean, cells, stress)
+    mean /= np.bincount(cells.ravel())[:, None, None]
+    volume = np.empty(len(cells))
+    heights = form.of_slices(form.slices()[1])
+    volume[form.wedge] = (form.areas() * heights[..., None]).sum(axis=(1, 2))
+    nodes = kept % grid.nodes
+    return CellFields(positions[nodes], cells, inside, total[nodes], mean, volume)
+
+
+def _strain_at_nodes(problem: PrismProblem, displacement: Array) -> Array:
+    """Strains at the nodes of every wedge, shape (cells, 15, 3)."""
+    form = problem.form
+    u = fem.Function(form.space)
+    u.x.array[:] = displacement.ravel()
+    cells = np.arange(len(form.wedge), dtype=np.int32)
+    values = at_points(strain(u), vertices_and_midpoints()).eval(form.mesh, cells)
+    return np.asarray(values).reshape(len(cells), NODES, 3)

@@ -1,0 +1,127 @@
+"""The product-space cell problem of one grid: constraints, solutions, and means over slices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.prism.form import PrismForm
+from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.numbering import LevelNumbering
+from alphacut.rve.solver.options import SolverOptions
+from alphacut.stochastic import RadiusMap
+
+CELL_AREA = 4.0
+
+
+@dataclass(frozen=True)
+class SliceStrains:
+    """Mean strains of the slices at the Gauss points of the layers, apart by phase.
+
+    Args:
+        theta: θ of the slices, shape (n,).
+        weights: Weights of the slices, sum 1, shape (n,).
+        strain: ⟨(ε11, ε22, 2 ε12)⟩ over the matrix's and the particle's part of the cell, in the
+            whole cell's area, shape (2, n, 3, fields).
+        fraction: Area fraction of the particle, shape (n,).
+        products: Mean of ε_a ⊗ ε_b over either phase and θ, shape (2, 3, fields, 3, fields).
+    """
+
+    theta: Array
+    weights: Array
+    strain: Array
+    fraction: Array
+    products: Array
+
+    def combined(self, coefficients: Array) -> SliceStrains:
+        """Those of sums of the fields, coefficients (fields, loads)."""
+        products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
+        return SliceStrains(
+            self.theta, self.weights, self.strain @ coefficients, self.fraction, products
+        )
+
+    def stress(self, stiffness: tuple[Array, Array]) -> Array:
+        """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
+        return np.asarray(stiffness[0] @ self.strain[0] + stiffness[1] @ self.strain[1])
+
+    def energy(self, stiffness: tuple[Array, Array]) -> Array:
+        """Mean of σ_a : ε_b over cell and θ, shape (fields, fields), in Pa."""
+        return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), self.products))
+
+
+class PrismProblem:
+    """The product-space problem of one grid; map and phases are set anew for each sample.
+
+    Args:
+        grid: Topology.
+        comm: Communicator; its ranks share the wedges and the levels.
+
+    Attributes:
+        form: Mesh and form.
+        numbering: Reduced unknowns.
+        map: The radius map.
+        matrix: The reduced stiffness.
+    """
+
+    def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
+        self.comm = comm
+        self.form = PrismForm(grid, comm)
+        self.numbering = LevelNumbering(grid, identify(grid.plane), comm)
+        self._local = self.numbering.local_map(self.form.node)
+        self.matrix = self.numbering.matrix(self._local)
+
+    def move(self, radius_map: RadiusMap) -> None:
+        """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
+
+        Raises:
+            FoldedMeshError: An element is inverted.
+            RefusedError: The density of θ is not positive everywhere.
+        """
+        self.map = radius_map
+        self.form.place(radius_map)
+
+    def assemble(self, stiffness: tuple[Array, Array]) -> PETSc.Mat:
+        """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa."""
+        self.form.elastic.set_phases(stiffness)
+        self.matrix.zeroEntries()
+        self.form.elastic.add_stiffness(self.matrix)
+        return self.matrix
+
+    def loads(self, strains: Array) -> list[PETSc.Vec]:
+        """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
+        return [self.numbering.vector(self._local, self.form.elastic.load(one)) for one in strains]
+
+    def solver(self, options: SolverOptions) -> LinearSolver:
+        """The solver of the stiffness as assembled."""
+        return LinearSolver(self.matrix, self.numbering, self.map.distribution, options)
+
+    def field(self, vector: PETSc.Vec) -> Array:
+        """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
+        scatter, whole = PETSc.Scatter.toAll(vector)
+        scatter.scatter(vector, whole)
+        return self.numbering.to_nodes(np.array(whole.array_r), self.form.node)
+
+    def slice_strains(self, fields: list[tuple[Array, Array]]) -> SliceStrains:
+        """Mean strains of fields, each a macroscopic strain (3,) and a fluctuation (nodes, 2)."""
+        form = self.form
+        strain = np.stack([form.strains(u) + uniform for uniform, u in fields], axis=-1)
+        area, share = form.areas(), form.particle()
+        parts = np.stack([area * (1 - share), area * share]) / CELL_AREA  # (2, cells, 3, points)
+        sums = np.einsum("pmsq,msqif->pmsif", parts, strain)
+        means = np.stack([form.by_layer(one) for one in sums])
+        fraction = form.by_layer(parts[1].sum(axis=-1))
+        theta, weights = form.slices()
+        weight = form.of_slices(weights)[None, :, :, None] * parts
+        flat = strain.reshape(-1, 3 * len(fields))
+        products = np.array([flat.T @ (one.reshape(-1, 1) * flat) for one in weight])
+        total = [self.comm.allreduce(one) for one in (means, fraction, products)]
+        shape = (2, 3, len(fields), 3, len(fields))
+        return SliceStrains(
+            theta, weights, total[0].reshape(2, -1, 3, len(fields)), total[1].ravel(),
+            total[2].reshape(shape),
+        )  # fmt: skip

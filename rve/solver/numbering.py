@@ -1,0 +1,108 @@
+"""Unknowns of the product space level by level, and their reduced matrix: K_per = Pᵀ K P.
+
+P only renumbers: every node becomes one pair of unknowns or, on the fixed line, none. So it needs
+no matrix product; PETSc's local-to-global map carries it, and DOLFINx adds element matrices where
+they belong. The order is: the planar unknowns of level 0, those of vertices half-way to level 1,
+those of level 1, and so on. A rank owns whole levels with what lies above each.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.mesh.periodicity import Periodicity
+from alphacut.rve.mesh.prism_grid import PrismGrid
+
+
+class LevelNumbering:
+    """Reduced unknowns, two at each node that is left.
+
+    Args:
+        grid: Topology.
+        periodicity: Unknowns of one level.
+        comm: Communicator.
+
+    Attributes:
+        planar: Unknowns of a level.
+        between: Unknowns half-way between two levels: those of vertices.
+        size: Unknowns in all.
+        levels: Levels of this rank.
+        middles: Half-way levels of this rank.
+        rows: Unknowns of this rank.
+    """
+
+    def __init__(self, grid: PrismGrid, periodicity: Periodicity, comm: MPI.Intracomm) -> None:
+        self.grid, self.periodicity, self.comm = grid, periodicity, comm
+        self.planar, self.between = 2 * periodicity.count, 2 * periodicity.vertices
+        self.stride = self.planar + self.between
+        self.size = grid.layers * self.stride + self.planar
+        own = np.array_split(np.arange(grid.layers + 1), comm.size)
+        first = sum(len(part) for part in own[: comm.rank])
+        self.levels = range(first, first + len(own[comm.rank]))
+        self.middles = range(first, min(self.levels.stop, grid.layers))
+        ends = (min(k * self.stride, self.size) for k in (first, self.levels.stop))
+        self.rows = range(*ends)
+
+    @cached_property
+    def pairs(self) -> Rows:
+        """Pair of unknowns of each node of the grid, −1 on the fixed line, shape (nodes,)."""
+        planar, layers = self.periodicity.unknown, self.grid.layers
+        vertices = planar[: self.grid.plane.vertices]
+        first = np.arange(layers + 1)[:, None] * (self.stride // 2)
+        on = np.where(planar >= 0, planar + first, -1)
+        half = np.where(vertices >= 0, vertices + self.planar // 2 + first[:-1], -1)
+        return np.concatenate([on.ravel(), half.ravel()])
+
+    def local_map(self, nodes: Rows) -> PETSc.LGMap:
+        """Reduced unknowns of DOLFINx's nodes; −1 where dropped."""
+        return PETSc.LGMap().create(
+            self.pairs[nodes].astype(PETSc.IntType), bsize=2, comm=self.comm
+        )
+
+    def matrix(self, local_map: PETSc.LGMap) -> PETSc.Mat:
+        """Matrix of zeros with room for all pairs of unknowns that share a wedge."""
+        pairs = self.pairs[self.grid.cells]
+        kept = pairs >= 0
+        wedge = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[kept]
+        shape = len(pairs), self.size // 2
+        touch = sp.csr_matrix((np.ones(len(wedge), np.int8), (wedge, pairs[kept])), shape)
+        own = touch.T.tocsr()[self.rows.start // 2 : self.rows.stop // 2]
+        pattern = sp.kron((own @ touch).astype(bool), np.ones((2, 2), bool), "csr")
+        pattern.sort_indices()
+        csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
+        sizes = (len(self.rows), self.size)
+        matrix = PETSc.Mat().createAIJ((sizes, sizes), bsize=2, comm=self.comm)
+        matrix.setPreallocationCSR((*csr, np.zeros(pattern.nnz)))
+        matrix.setLGMap(local_map, local_map)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        return matrix
+
+    def vector(self, local_map: PETSc.LGMap, values: Array) -> PETSc.Vec:
+        """Sum Pᵀ f of what every rank's nodes have, shape (nodes · 2,)."""
+        vector = PETSc.Vec().createMPI((len(self.rows), self.size), bsize=2, comm=self.comm)
+        vector.setLGMap(local_map)
+        nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
+        vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
+        vector.assemble()
+        return vector
+
+    def to_nodes(self, values: Array, nodes: Rows) -> Array:
+        """Displacements of nodes, zero on the fixed line, shape (nodes, 2), from all unknowns."""
+        pairs = np.concatenate([values.reshape(-1, 2), np.zeros((1, 2))])  # −1 is the last
+        return np.asarray(pairs[self.pairs[nodes]])
+
+    def by_level(self, values: Array) -> tuple[Array, Array]:
+        """Unknowns on the levels, (layers + 1, planar), and half-way, (layers, between); copies."""
+        below = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
+        top = values[self.grid.layers * self.stride :][None]
+        return np.concatenate([below[:, : self.planar], top]), below[:, self.planar :].copy()
+
+    def joined(self, on: Array, half: Array) -> Array:
+        """The vector from what `by_level` makes of it; of a rank's levels alone, its part."""
+        paired = np.concatenate([on[: len(half)], half], axis=1)
+        return np.concatenate([paired.ravel(), on[len(half) :].ravel()])

@@ -1,0 +1,113 @@
+"""The plane meshes: periodic, on their outline, sound wherever they slide."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
+from alphacut.rve.mesh.outline import Ellipse, area, circle, is_round
+from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.prism_grid import PrismGrid, moved
+from alphacut.rve.mesh.triangulation import reference_radius, triangulate
+from alphacut.stochastic import HermiteMap
+
+
+def flower(angle):
+    """A star with four leaves."""
+    return 1 + 0.15 * np.cos(4 * angle)
+
+
+OUTLINES = [circle, Ellipse(2.0), Ellipse(0.7), flower]
+
+
+def areas(points, triangles):
+    a, b, c = points[triangles[:, :3]].transpose(1, 0, 2)
+    return ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+
+
+@pytest.mark.parametrize("outline", OUTLINES)
+def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline):
+    mesh = triangulate(size=0.2, radius=0.5, outline=outline)
+    signs = np.sign(areas(mesh.points, mesh.triangles))
+    for radius in (0.05, 0.3, 0.65):
+        points = moved(mesh, radius)
+        assert (areas(points, mesh.triangles) * signs > 0).all()
+        x, y = points[mesh.arc].T
+        assert np.hypot(x, y) == pytest.approx(radius * outline(np.arctan2(y, x)), rel=1e-12)
+        sides = abs(mesh.points) > 1 - 1e-12
+        assert points[sides] == pytest.approx(mesh.points[sides], abs=1e-14)
+        inside = abs(areas(points, mesh.triangles)[mesh.inside]).sum()
+        assert inside == pytest.approx(radius**2 * area(outline), rel=0.04)
+
+
+def test_opposite_nodes_are_one_unknown_and_all_corners_none():
+    plane = triangulate(size=0.3, radius=0.6)
+    unknown = identify(plane).unknown
+    keys = {tuple(np.round(p, 7)): u for p, u in zip(plane.points, unknown, strict=True)}
+    for (x, y), u in keys.items():
+        if abs(x) == abs(y) == 1:
+            assert u == -1
+        elif abs(x) == 1:
+            assert u == keys[-x, y]
+        elif abs(y) == 1:
+            assert u == keys[x, -y]
+    inner = [u for (x, y), u in keys.items() if max(abs(x), abs(y)) < 1]
+    assert len(set(inner)) == len(inner)
+
+
+def test_a_node_without_a_partner_is_refused():
+    plane = triangulate(size=0.4, radius=0.5)
+    points = plane.points.copy()
+    side = np.flatnonzero((points[:, 0] == 1) & (abs(points[:, 1]) < 0.9))
+    points[side[0], 1] += 1e-3
+    with pytest.raises(RuntimeError, match="has no partner"):
+        identify.__wrapped__(SimpleNamespace(points=points, vertices=plane.vertices))
+
+
+@pytest.mark.parametrize("outline", OUTLINES)
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_curved_elements_lie_on_the_outline(outline, order):
+    mesh = plane_mesh(0.6, size=0.4, outline=outline)
+    points, cells = curved_nodes(mesh, order)
+    inside, outside = (set(cells[mesh.inside == flag].ravel()) for flag in (True, False))
+    shared = sorted(inside & outside)
+    x, y = points[shared].T
+    assert np.hypot(x, y) == pytest.approx(0.6 * outline(np.arctan2(y, x)), abs=1e-9)
+    edges = sum(np.isin(t, shared).sum() == 2 for t in mesh.triangles[mesh.inside])
+    assert len(shared) == order * edges
+
+
+def test_the_sign_of_z_marks_the_cone():
+    grid = PrismGrid(triangulate(size=0.5, radius=0.0), 2, conforming=False)
+    cone = HermiteMap(0.2, 0, 0.8, 0)
+    points = np.array([[0.49, 0, 0.0], [0.51, 0, 0.0], [0.3, 0, -3], [0.3, 0, 3]])
+    assert grid.sign(points, cone).tolist() == [1, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("outline", "radius"), [(circle, 1.0), (Ellipse(4.0), 0.51), (lambda a: np.cos(a), 0.5)]
+)
+def test_what_does_not_fit_into_the_cell_is_refused(outline, radius):
+    with pytest.raises(RefusedError, match="allowed"):
+        plane_mesh(radius, size=0.3, outline=outline)
+
+
+def test_the_reference_radius_leaves_room_for_the_outline():
+    wide = HermiteMap(0.3, 0, 0.6, 0)
+    assert reference_radius(wide) == 0.45
+    assert reference_radius(HermiteMap(0.6, 0, 0.7, 0), Ellipse(2.0)) == pytest.approx(0.9 / 2**0.5)
+    with pytest.raises(RefusedError, match=r"values in \(0, 0.7071\)"):
+        reference_radius(HermiteMap(0.3, 0, 0.8, 0), Ellipse(2.0))
+
+
+def test_round_is_round_by_any_name():
+    assert is_round(circle)
+    assert is_round(Ellipse(1.0))
+    assert not is_round(flower)
+    assert area(Ellipse(3.0)) == pytest.approx(np.pi, rel=1e-9)
+    with pytest.raises(RefusedError, match=r"aspect of the ellipse is 9"):
+        Ellipse(9.0)

@@ -1,0 +1,127 @@
+"""The solver of the product space: exact where it should be, honest where it stops, orderly."""
+
+import os
+import signal
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+pytest.importorskip("dolfinx")
+
+from alphacut.rve.cell import LOADS, Phase
+from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.triangulation import triangulate
+from alphacut.rve.prism.problem import PrismProblem
+from alphacut.rve.solver import theta_preconditioner as preconditioner
+from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, theta_mass
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+CRISP = HermiteMap(0.5, 0, 0.5, 0)
+PHASES = Phase(20e9).stiffness, Phase(80e9).stiffness
+
+
+@pytest.fixture(scope="module")
+def problem():
+    one = PrismProblem(PrismGrid(triangulate(size=0.5, radius=0.5), 3), MPI.COMM_SELF)
+    one.move(CRISP)
+    one.assemble(PHASES)
+    return one
+
+
+def dense(matrix):
+    starts, columns, values = matrix.getValuesCSR()
+    return sp.csr_matrix((values, columns, starts), matrix.size).toarray()
+
+
+def test_the_reduced_stiffness_is_symmetric_and_definite(problem):
+    matrix = dense(problem.matrix)
+    assert abs(matrix - matrix.T).max() < 1e-12 * abs(matrix).max()
+    assert np.linalg.eigvalsh(matrix)[0] > 1e-6 * abs(matrix).max()
+
+
+def test_the_preconditioner_is_exact_where_nothing_changes_with_theta(problem):
+    inverse = ThetaPreconditioner(problem.matrix, problem.numbering, CRISP.distribution)
+    solution, load = problem.matrix.createVecs()
+    rng = np.random.default_rng()
+    # bubbles have linear triangles only: exact on hats, and on linear triangles
+    solution.array[:] = rng.standard_normal(len(solution.array))
+    problem.matrix.mult(solution, load)
+    answer = load.duplicate()
+    inverse.apply(None, load, answer)
+    assert answer.array == pytest.approx(solution.array, abs=1e-8)
+
+
+def test_the_preconditioner_is_symmetric_and_definite_where_the_radius_changes():
+    one = PrismProblem(PrismGrid(triangulate(size=0.7, radius=0.5), 2), MPI.COMM_SELF)
+    cone = HermiteMap(0.2, 0.3, 0.8, 0.9)
+    one.move(cone)
+    one.assemble(PHASES)
+    context = ThetaPreconditioner(one.matrix, one.numbering, cone.distribution)
+    unit, column = one.matrix.createVecs()
+    inverse = np.empty((len(unit.array), len(unit.array)))
+    for k in range(len(inverse)):
+        unit.array[:] = np.eye(len(inverse))[k]
+        context.apply(None, unit, column)
+        inverse[k] = column.array
+    assert abs(inverse - inverse.T).max() < 1e-12 * abs(inverse).max()
+    values = np.linalg.eigvals(inverse @ dense(one.matrix)).real
+    assert 0.3 < values.min() < 1 < values.max() < 3
+
+
+def test_masses_along_theta_are_those_of_polynomials():
+    law, levels = TruncatedNormal(), np.linspace(-3, 3, 7)
+    mass = theta_mass(law, levels)
+    theta, weights = np.polynomial.legendre.leggauss(60)
+    fine = np.concatenate([levels[k] + (theta + 1) / 2 for k in range(6)])
+    weights = np.tile(weights / 2, 6) * law.pdf(fine)
+    hats = np.array([np.interp(fine, levels, row) for row in np.eye(7)])
+    exact = (hats * weights) @ hats.T
+    assert np.linalg.inv(mass.root @ mass.root) == pytest.approx(exact, abs=2e-4)
+    assert mass.hats == pytest.approx(exact.diagonal(), abs=2e-4)
+
+
+def test_linear_fields_reach_edge_midpoints_by_their_mean(problem):
+    plane = problem.form.grid.plane
+    period = identify(plane)
+    injection = preconditioner._injection(problem.numbering)
+    values = np.random.default_rng().standard_normal((period.vertices, 2))
+    nodes = (injection @ values.ravel()).reshape(-1, 2)
+    values = np.concatenate([values, np.zeros((1, 2))])  # the corner last
+    for ends, unknown in zip(plane.ends, period.unknown[plane.vertices :], strict=True):
+        assert nodes[unknown] == pytest.approx(values[period.unknown[ends]].mean(axis=0))
+
+
+class Interrupted:
+    """A preconditioner during which the user presses Ctrl-C, once."""
+
+    def __init__(self, *_):
+        self.calls = 0
+
+    def apply(self, _pc, residual, result):
+        self.calls += 1
+        if self.calls == 1:
+            os.kill(os.getpid(), signal.SIGINT)
+        result.array[:] = residual.array_r
+
+
+def test_an_interruption_below_petsc_arrives_after_the_solve(problem, monkeypatch):
+    monkeypatch.setattr("alphacut.rve.solver.krylov.ThetaPreconditioner", Interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        options = SolverOptions("theta", {"ksp_rtol": "1e-3", "ksp_max_it": "5000"})
+        solver = LinearSolver(problem.matrix, problem.numbering, CRISP.distribution, options)
+        with pytest.raises(KeyboardInterrupt):
+            solver.solve(problem.loads(LOADS))
+        assert solver.solve(problem.loads(LOADS)).residual < 2e-3
+    finally:
+        assert signal.signal(signal.SIGINT, before) is signal.default_int_handler
+
+
+def test_options_leave_no_trace_in_the_database(problem):
+    problem.solver(SolverOptions("theta", {"ksp_rtol": "1e-6", "level_pc_type": "lu"}))
+    assert not [name for name in PETSc.Options().getAll() if name.startswith("rve_")]
