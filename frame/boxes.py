@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.structures.quantities import Output, units_of
+from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
-
-
-class Kept(Protocol):
-    """Keeps arrays by name, for one search and no other."""
-
-    def load(self, name: str) -> Mapping[str, Array] | None:
-        """What was saved under a name; None if nothing was."""
-
-    def save(self, name: str, found: Mapping[str, Array]) -> None:
-        """Keep arrays under a name, in place of what it had."""
+TOLERANCE = 1e-4
+"""Error wanted unless one is given, in m."""
+SHARE = 1e-3
+"""The same where it is relative, as a share of each output's peak."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +37,10 @@ class Boxes:
         lower: Lower ends, shape (A, d), in SI units.
         upper: Upper ends, shape (A, d).
         modal: Values of membership 1, shape (d,).
+        numbers: Fuzzy numbers whose cuts they are, by name; intervals where there are none.
 
     Raises:
-        ValueError: No parameter, or a level outside [0, 1], or levels not rising.
+        RefusedError: No parameter, or levels that do not rise within [0, 1].
     """
 
     names: tuple[str, ...]
@@ -51,17 +48,33 @@ class Boxes:
     lower: Array
     upper: Array
     modal: Array
+    numbers: Mapping[str, FuzzyNumber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.names:
-            raise ValueError("no uncertain parameter: name at least one")
-        if (
-            not len(self.alpha)
-            or self.alpha.min() < 0
-            or self.alpha.max() > 1
-            or (np.diff(self.alpha) <= 0).any()
-        ):
-            raise ValueError(f"alpha: {[float(a) for a in self.alpha]} must rise within [0, 1]")
+            raise RefusedError("inputs", None, "fuzzy numbers by name, one at least")
+        levels = np.asarray(self.alpha)
+        if not (levels.size and levels[0] >= 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()):
+            raise RefusedError("alpha", levels.tolist(), "levels that rise within [0, 1]")
+
+    @property
+    def inputs(self) -> Mapping[str, FuzzyNumber]:
+        """Fuzzy numbers by name."""
+        ends = zip(self.names, self.lower[0].tolist(), self.upper[0].tolist(), strict=True)
+        return self.numbers or {name: Interval(low, high) for name, low, high in ends}
+
+    def halves(self) -> list[Boxes]:
+        """Two parts, cut across the relatively widest input, each with the levels that reach it."""
+        axis = int((self.radius / np.maximum(np.abs(self.centre), 1e-300)).argmax())
+        parts = []
+        for ends, clipped in (("upper", np.minimum), ("lower", np.maximum)):
+            own = {"lower": self.lower.copy(), "upper": self.upper.copy()}
+            own[ends][:, axis] = clipped(own[ends][:, axis], self.centre[axis])
+            kept = own["lower"][:, axis] <= own["upper"][:, axis]
+            own = {name: x[kept] for name, x in own.items()}
+            modal = np.clip(self.modal, own["lower"][0], own["upper"][0])
+            parts.append(replace(self, alpha=self.alpha[kept], modal=modal, numbers={}, **own))
+        return parts
 
     def distinct(self) -> tuple[Boxes, Array]:
         """The boxes without those that repeat the one below, and which of them each level has.
@@ -106,7 +119,9 @@ class Boxes:
                 jet.second,
                 (r[:, None] * r).reshape(len(r), len(r), *shape),
                 out=None if anew else jet.second,
-            ),
+            )
+            if len(jet.second)
+            else jet.second,
         )
 
     def unit(self, level: int) -> tuple[Array, Array]:
@@ -124,21 +139,13 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
     Raises:
         ValueError: An input is no number, or as `Boxes`.
     """
-    levels = _levels(alpha)
-    numbers = fuzzy_inputs(inputs)
+    require_numbers("alpha", alpha, "[0, 1]")
+    levels, numbers = np.asarray(alpha, float), fuzzy_inputs(inputs)
     cuts = np.array(
         [[number.cut(a) for number in numbers.values()] for a in levels], float
     ).reshape(len(levels), len(numbers), 2)
     modal = np.array([number.modal for number in numbers.values()])
-    return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], modal)
-
-
-def _levels(alpha: Sequence[float]) -> Array:
-    require_numbers("alpha", alpha, "[0, 1]")
-    levels = np.asarray(alpha, float)
-    if not len(levels) or levels.min() < 0 or levels.max() > 1 or (np.diff(levels) <= 0).any():
-        raise ValueError(f"alpha: {levels.tolist()} must rise within [0, 1]")
-    return levels
+    return Boxes(tuple(numbers), levels, cuts[..., 0], cuts[..., 1], modal, numbers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +156,12 @@ class UnitFlow:
         flow: The flow in physical parameters.
         boxes: The boxes; its names must be those of `flow`.
         relative: Whether tolerances are shares of each output's modal peak instead of lengths.
-        kept: Keeps parts of a search of modal intervening variables; None for nothing.
         called: Names of the outputs where they stand in for others; the flow's own if none.
     """
 
     flow: Flow
     boxes: Boxes
     relative: bool = False
-    kept: Kept | None = None
     called: tuple[str, ...] = ()
 
     @property
@@ -168,6 +173,15 @@ class UnitFlow:
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.called or self.flow.outputs
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each output; empty where it is not known."""
+        return units_of(self.outputs)
+
+    def tolerance(self, value: float | None) -> float:
+        """A tolerance, or the usual one: `TOLERANCE`, a share of the peaks where it is relative."""
+        return value or (SHARE if self.relative else TOLERANCE)
 
     @property
     def reference(self) -> int:
@@ -203,3 +217,37 @@ class UnitFlow:
     def taylor(self, unit: Array) -> Jet:
         """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
         return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)), anew=False)
+
+    def envelope(
+        self,
+        bounds: Array,
+        at: Array,
+        error: Array | None = None,
+        *,
+        method: str,
+        nature: Nature,
+        evaluations: int,
+        seconds: float,
+        facts: Mapping[str, float] | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> Envelope:
+        """Envelope from upper bounds of (−output, output), (A, T, m, 2), and their coordinates."""
+        where = self.boxes.to_physical(at)
+        return Envelope(
+            alpha=self.boxes.alpha,
+            time=self.time,
+            outputs=self.outputs,
+            inputs=self.boxes.inputs,
+            lower=-bounds[..., 0],
+            upper=bounds[..., 1],
+            lower_at=where[..., 0, :],
+            upper_at=where[..., 1, :],
+            error=np.zeros(bounds.shape[:-1]) if error is None else error,
+            nature=nature,
+            method=method,
+            units=self.units,
+            evaluations=evaluations,
+            seconds=seconds,
+            facts=facts or {},
+            notes=notes,
+        )

@@ -9,7 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.frame.envelope import error_name
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import as_json, say, write_text
 from alphacut.io.netcdf import read_dataset
@@ -124,7 +123,8 @@ def _by_output(dataset: xarray.Dataset) -> Iterator[tuple[str, str]]:
         columns = {"time [s]": one["time"].values}
         for level in one["alpha"].values:
             for band in (band for band in BANDS if band in one):
-                what = band if band != "error" else error_name(inside="inner_lower" in one)
+                inside = "within the bounds" if "inner_lower" in one else "to be added"
+                what = band if band != "error" else f"error {inside}"
                 title = f"{what} at alpha {level:g} [{unit}]"
                 columns[title] = one[band].sel(alpha=level).values
         if "between" in one:

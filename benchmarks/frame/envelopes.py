@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from alphacut.frame.methods.sampling import sample
 
 from alphacut.frame import Envelope, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.methods.sampling import sample
 from alphacut.fuzzy import General, Reduced, Triangular, levels
 from alphacut.fuzzy.sets.boxes import Domain
 from benchmarks.frame.references.alpha_cut_optimisation import CutOptimisation

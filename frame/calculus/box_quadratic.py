@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
 from itertools import combinations, product
-from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import address, c_library
 from alphacut.frame.calculus.jet import Array
 
-SOURCE = Path(__file__).with_name("box_quadratic.c").read_text(encoding="utf-8")
 FACES_UP_TO = 6
 """Number of parameters up to which all faces of the box are enumerated."""
 
@@ -45,8 +41,6 @@ def local_maximum(
         rounds: Most repetitions.
     """
     x = np.zeros_like(g) if start is None else np.ascontiguousarray(start, float).copy()
-    if _compiled_maximum(g, H, lower, upper, x, rounds):
-        return x
     todo: Array = np.arange(len(g))
     for _ in range(rounds):
         part = (g[todo], H[todo], lower[todo], upper[todo])
@@ -59,20 +53,6 @@ def local_maximum(
         if not len(todo):
             break
     return x
-
-
-def _compiled_maximum(
-    g: Array, H: Array, lower: Array, upper: Array, x: Array, rounds: int = 0
-) -> bool:
-    """Moves `x` uphill, without rounds to the top, by compiled code; False where there is none."""
-    library = c_library(SOURCE)
-    if library is None:
-        return False
-    parts = [np.ascontiguousarray(part, float) for part in (g, H, lower, upper)]
-    counts = (ctypes.c_long(len(x)), ctypes.c_int(x.shape[1]), ctypes.c_int(rounds))
-    if rounds:
-        return bool(library.local_maximum(*counts, *map(address, parts), address(x)))
-    return bool(library.global_maximum(*counts[:2], *map(address, parts), address(x)))
 
 
 def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> None:
@@ -115,8 +95,6 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     if d > FACES_UP_TO:
         return _best_of_starts(g, H, lower, upper)
     best, best_gain = np.zeros_like(g, order="C"), np.zeros(len(g))
-    if _compiled_maximum(g, H, lower, upper, best):
-        return best
     for size in range(d + 1):
         for free in combinations(range(d), size):
             points = _face_points(g, H, lower, upper, free)

@@ -1,7 +1,8 @@
 """Truncated Taylor polynomials of degree 2: first and second derivatives of a model.
 
 A jet is a value with its first and second derivatives with respect to d parameters. With d = 0 it
-is a plain array that costs nothing more, so the same code computes values alone.
+is a plain array that costs nothing more, so the same code computes values alone; without second
+derivatives, whose array then has no entries, it computes gradients alone.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ class Jet:
     Args:
         value: Shape V.
         first: First derivatives, shape (d, *V).
-        second: Second derivatives, shape (d, d, *V), symmetric in the first two axes.
+        second: Second derivatives, shape (d, d, *V), symmetric in the first two axes; (0, 0, *V)
+            where gradients are enough.
     """
 
     value: Array
@@ -34,14 +36,16 @@ class Jet:
     __array_ufunc__ = None  # an array on the left leaves the operation to the jet
 
     @classmethod
-    def constant(cls, value: ArrayLike, directions: int) -> Jet:
-        """A jet without dependence on any of `directions` parameters."""
+    def constant(cls, value: ArrayLike, directions: int, bends: int | None = None) -> Jet:
+        """A jet without dependence on any of `directions` parameters; `bends` is 0 or the same."""
         array = np.asarray(value, float)
-        return cls(
-            array,
-            np.zeros((directions, *array.shape)),
-            np.zeros((directions, directions, *array.shape)),
-        )
+        both = (directions if bends is None else bends,) * 2
+        first = np.zeros((directions, *array.shape))
+        return cls(array, first, np.zeros((*both, *array.shape)))
+
+    def like(self, value: ArrayLike) -> Jet:
+        """A constant with as many derivatives as this jet."""
+        return Jet.constant(value, self.directions, len(self.second))
 
     @property
     def directions(self) -> int:
@@ -109,11 +113,13 @@ class Jet:
 
     def chain(self, f: Array, df: Array, ddf: Array) -> Jet:
         """The jet of f(self) from f, f' and f'' at the value, elementwise."""
+        if not len(self.second):
+            return Jet(f, df * self.first, df * self.second)
         outer = self.first[:, None] * self.first[None, :]
         return Jet(f, df * self.first, df * self.second + ddf * outer)
 
     def _lift(self, other: Jet | ArrayLike) -> Jet:
-        return other if isinstance(other, Jet) else Jet.constant(other, self.directions)
+        return other if isinstance(other, Jet) else self.like(other)
 
 
 def _padded(a: Jet, ndim: int) -> Jet:
@@ -121,12 +127,11 @@ def _padded(a: Jet, ndim: int) -> Jet:
     missing = ndim - a.value.ndim
     if missing <= 0:
         return a
-    ones, d = (1,) * missing, a.directions
-    shape = a.value.shape
+    ones, shape = (1,) * missing, a.value.shape
     return Jet(
         a.value.reshape(ones + shape),
-        a.first.reshape((d, *ones, *shape)),
-        a.second.reshape((d, d, *ones, *shape)),
+        a.first.reshape((a.directions, *ones, *shape)),
+        a.second.reshape((*a.second.shape[:2], *ones, *shape)),
     )
 
 
@@ -136,16 +141,18 @@ def _matched(a: Jet, b: Jet) -> tuple[Jet, Jet]:
 
 def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
     """Leibniz' rule for a product that is linear in both factors."""
-    cross = bilinear(a.first[:, None], b.first[None, :])
-    second = (
-        bilinear(a.second, b.value) + bilinear(a.value, b.second) + cross + cross.swapaxes(0, 1)
-    )
-    return Jet(
-        bilinear(a.value, b.value), bilinear(a.first, b.value) + bilinear(a.value, b.first), second
-    )
+    value, first = bilinear(a.value, b.value), bilinear(a.first, b.value)
+    first, second = first + bilinear(a.value, b.first), np.zeros((0, 0, *value.shape))
+    if len(a.second):
+        cross = bilinear(a.first[:, None], b.first[None, :])
+        second = bilinear(a.second, b.value) + bilinear(a.value, b.second)
+        second = second + cross + cross.swapaxes(0, 1)
+    return Jet(value, first, second)
 
 
-def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> dict[str, Jet]:
+def variables(
+    points: Array, names: Sequence[str], selected: Sequence[str], order: int = 2
+) -> dict[str, Jet]:
     """Independent variables of a Taylor expansion, one jet of shape (S,) per name.
 
     Args:
@@ -153,9 +160,11 @@ def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> d
         names: Names of the columns.
         selected: The names to differentiate by, in the order of the derivatives; empty for values
             alone.
+        order: Highest derivatives, 1 or 2.
     """
     d = len(selected)
-    jets = {name: Jet.constant(points[:, i], d) for i, name in enumerate(names)}
+    bends = d if order > 1 else 0
+    jets = {name: Jet.constant(points[:, i], d, bends) for i, name in enumerate(names)}
     for k, name in enumerate(selected):
         jets[name].first[k] = 1.0
     return jets
@@ -164,9 +173,7 @@ def variables(points: Array, names: Sequence[str], selected: Sequence[str]) -> d
 def stack(rows: Sequence[Sequence[Jet | float]], like: Mapping[str, Jet]) -> Jet:
     """Matrix of shape (S, n, m) from entries of shape (S,) or plain numbers."""
     sample = next(iter(like.values()))
-    size, d = sample.value.size, sample.directions
-    shape = (len(rows), len(rows[0]))
-    out = Jet.constant(np.zeros((size, *shape)), d)
+    out = sample.like(np.zeros((sample.value.size, len(rows), len(rows[0]))))
     for i, row in enumerate(rows):
         for j, entry in enumerate(row):
             if isinstance(entry, Jet):
@@ -184,6 +191,8 @@ def inverse(a: Jet) -> Jet:
     """Inverse of square matrices, V = (..., n, n), by one factorisation."""
     x = np.linalg.inv(a.value)
     first = -x @ a.first @ x
+    if not len(a.second):
+        return Jet(x, first, np.zeros((0, 0, *x.shape)))
     cross = -x @ a.first[:, None] @ first[None, :]
     return Jet(x, first, -x @ a.second @ x + cross + cross.swapaxes(0, 1))
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import FUSED, address, c_library
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 
-SOURCE = Path(__file__).with_name("modal_jet.c").read_text(encoding="utf-8")
 Parts = tuple[Array, Array, Array]
 
 
@@ -26,22 +22,6 @@ def composed(parts: Parts, place: int, waves: Parts, out: Parts) -> None:
         waves: w, w' and w'' at λ_k, each (N, n).
         out: What is added to.
     """
-    if not _compiled(parts, place, waves, out):
-        _by_numpy(parts, place, waves, out)
-
-
-def _compiled(parts: Parts, place: int, waves: Parts, out: Parts) -> bool:
-    library = c_library(SOURCE, FUSED)
-    if library is None:
-        return False
-    (count, d), n = out[1].shape, waves[0].shape[1]
-    sizes = map(ctypes.c_int, (d, n, parts[0].shape[1], place * n))
-    given = [np.ascontiguousarray(x).view(float) for x in (*parts, np.stack(waves))]
-    library.modal_jet(ctypes.c_long(count), *sizes, *map(address, (*given, *out)))
-    return True
-
-
-def _by_numpy(parts: Parts, place: int, waves: Parts, out: Parts) -> None:
     (w, dw, ddw), d = waves, out[1].shape[1]
     n = w.shape[1]
     (own, share, bent), (_, rate, turned) = (
@@ -58,40 +38,10 @@ def _by_numpy(parts: Parts, place: int, waves: Parts, out: Parts) -> None:
     out[2][:, second, first] = out[2][:, first, second]
 
 
-def packed(given: Polynomial) -> Array:
-    """Coefficients of quadratics in planes, real and imaginary, (K, 2, 1 + d + d²)."""
-    d, K = given.index.shape[1], given.coefficients.shape[1]
-    bent = given.curve[:, :, 0].reshape(d * d, K)
-    whole = np.concatenate([given.coefficients[:1], given.slope[:, 0], bent]).T
-    return np.ascontiguousarray(np.stack([whole.real, whole.imag], 1))
-
-
-def quadratics(given: Polynomial, planes: Array, unit: Array) -> tuple[Array, Array]:
-    """Values (N, K) of complex polynomials of degree 2 or less, and their first derivatives.
-
-    Args:
-        given: The polynomials.
-        planes: Their `packed` form.
-        unit: Points, shape (N, d).
-
-    Returns:
-        Values, and first derivatives in planes, shape (N, K, 2, d), for compiled code alone.
-    """
-    library = c_library(SOURCE, FUSED)
-    if library is None:
-        return given.quadratic(unit)[0], np.empty(0)
-    (count, d), K = unit.shape, len(planes)
-    out, first = np.empty((count, K), complex), np.empty((count, K, 2, d))
-    sizes = ctypes.c_long(count), ctypes.c_int(d), ctypes.c_int(K)
-    points = np.ascontiguousarray(unit, float)
-    library.quadratic_values(*sizes, *map(address, (points, planes, out.view(float), first)))
-    return out, first
-
-
 def composed_quadratics(
     unit: Array,
-    rate: tuple[Polynomial, Array, Array],
-    shares: tuple[Sequence[Polynomial], Array],
+    rate: Polynomial,
+    shares: Sequence[Polynomial],
     output: Array,
     waves: Parts,
     out: Parts,
@@ -100,31 +50,22 @@ def composed_quadratics(
 
     Args:
         unit: Points, shape (N, d).
-        rate: λ_k, n polynomials, their `packed` form, and first derivatives as of `quadratics`.
-        shares: C_k of each output, and their `packed` forms, shape (m, n, 2, 1 + d + d²).
+        rate: λ_k, n polynomials.
+        shares: C_k of each output.
         output: Which C_k, shape (N,).
         waves: w, w' and w'' at λ_k, each (N, n).
         out: What is added to.
     """
-    library, (count, d), n = c_library(SOURCE, FUSED), unit.shape, waves[0].shape[1]
-    if library is not None:
-        points, which = (np.ascontiguousarray(x, float) for x in (unit, output))
-        given = (points, rate[1], rate[2], shares[1], which, np.stack(waves).view(float), *out)
-        sizes = ctypes.c_long(count), ctypes.c_int(d), ctypes.c_int(n)
-        if library.quadratic_jet(*sizes, *map(address, given)):
-            return
-    _, slope, bent = rate[0].quadratic(unit)
+    _, slope, bent = rate.quadratic(unit)
     for o in np.unique(output):
         rows = np.flatnonzero(output == o)
         own = waves[0][rows], waves[1][rows], waves[2][rows]
-        found = _quadratics_by_numpy(unit[rows], (slope[rows], bent), shares[0][o], own)
+        found = _quadratics(unit[rows], (slope[rows], bent), shares[o], own)
         for total, part in zip(out, found, strict=True):
             total[rows] += part
 
 
-def _quadratics_by_numpy(
-    unit: Array, slopes: tuple[Array, Array], own: Polynomial, waves: Parts
-) -> Parts:
+def _quadratics(unit: Array, slopes: tuple[Array, Array], own: Polynomial, waves: Parts) -> Parts:
     (slope, bent), (share, first, second), (w, dw, ddw) = slopes, own.quadratic(unit), waves
     f = 2 * (share * w).real.sum(1)
     g = 2 * (first * w[:, None] + slope * (share * dw)[:, None]).real.sum(2)

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement, pairwise
 from math import comb, prod
-from pathlib import Path
 
 import numpy as np
 from scipy.fft import dctn
 from scipy.sparse import csr_array
 
-from alphacut.frame.calculus.c_library import FUSED, address, c_library
 from alphacut.frame.calculus.jet import Array, Jet
 
 Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-SOURCE = Path(__file__).with_name("polynomial.c").read_text(encoding="utf-8")
-WIDE = 6
-"""Columns whose coefficients the compiled sums take together."""
 
 
 def terms(dimension: int, degree: int) -> int:
@@ -92,42 +85,6 @@ def product(real: Array, coefficients: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Coefficients (terms, K), complex or real, and the same in blocks of `WIDE` reals."""
-
-    own: Array
-
-    @cached_property
-    def blocks(self) -> Array:
-        """Shape (blocks, terms, WIDE), with zeros in the last."""
-        flat = np.ascontiguousarray(self.own).view(float)
-        padded = np.pad(flat, ((0, 0), (0, -flat.shape[1] % WIDE)))
-        return np.ascontiguousarray(padded.reshape(len(flat), -1, WIDE).swapaxes(0, 1))
-
-
-def sums(u: Array, index: Index, parts: Sequence[Columns]) -> Array:
-    """Sums of the first monomials at points (S, d) with the coefficients of all parts, (S, ΣK)."""
-    library, (axis, parent, _) = c_library(SOURCE, FUSED), _parents(index.tobytes(), index.shape)
-    if library is None:
-        B = basis(u, index)
-        return np.hstack([product(B[:, : len(part.own)], part.own) for part in parts])
-    widths = [part.own.shape[1] for part in parts]
-    out = np.empty((len(u), sum(widths)), parts[0].own.dtype)
-    points = np.ascontiguousarray(u, float)
-    blocks = [part.blocks for part in parts]  # another thread may replace those that are kept
-    reals, longs = out.itemsize // 8, ctypes.c_long * len(parts)
-    library.monomial_sums(
-        *(ctypes.c_long(len(u)), *map(ctypes.c_int, index.shape[::-1])),
-        *(part.ctypes.data_as(ctypes.c_void_p) for part in (axis, parent)),
-        *(address(points), len(parts), longs(*(len(part.own) for part in parts))),
-        longs(*(reals * width for width in widths)),
-        (ctypes.c_void_p * len(parts))(*(block.ctypes.data for block in blocks)),
-        ctypes.c_void_p(out.ctypes.data),
-    )
-    return out
-
-
-@dataclass(frozen=True, eq=False)
 class Polynomial:
     """A vector of polynomials with its derivatives up to order 2 as polynomials.
 
@@ -179,11 +136,12 @@ class Polynomial:
 
     def __call__(self, u: Array) -> Array:
         """Values at (S, d), shape (S, K)."""
-        return sums(u, self.index, [self._columns])
+        return product(basis(u, self.index), self.coefficients)
 
     def jets(self, u: Array) -> Array:
         """Values, gradients and Hessians (upper triangle) at (S, d), shape (S, q, K)."""
-        both = sums(u, self.index, [self._columns, *self._packed])
+        B, parts = basis(u, self.index), [self.coefficients, *self._packed]
+        both = np.hstack([product(B[:, : len(part)], part) for part in parts])
         return both.reshape(len(u), -1, self.coefficients.shape[1])
 
     def derivatives(self, u: Array) -> tuple[Array, Array, Array]:
@@ -192,17 +150,13 @@ class Polynomial:
         return jets[:, 0], jets[:, 1:after], jets[:, after:]
 
     @cached_property
-    def _columns(self) -> Columns:
-        return Columns(self.coefficients)
-
-    @cached_property
-    def _packed(self) -> list[Columns]:
+    def _packed(self) -> list[Array]:
         """Coefficients of all first and all second derivatives side by side, without zero rows."""
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
         every = (self.slope, self.curve[np.triu_indices(d)])
         counts = (terms(d, max(degree - k, 0)) for k in (1, 2))
         both = zip(every, counts, strict=True)
-        return [Columns(x[:, :n].swapaxes(0, 1).reshape(n, -1)) for x, n in both]
+        return [x[:, :n].swapaxes(0, 1).reshape(n, -1) for x, n in both]
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:

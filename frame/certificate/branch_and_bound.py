@@ -20,8 +20,6 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.frontier import Frontier
-from alphacut.frame.certificate.kernel import examination
-from alphacut.frame.certificate.numpy_kernel import bounds
 from alphacut.frame.certificate.piece import Piece, Problems
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.modal.model import ModalModel
@@ -140,17 +138,16 @@ class Tree:
 
     def examined(self, frontier: Frontier, workers: int) -> Frontier:
         """What is still open after one examination of all boxes of a frontier."""
-        examine = examination()[1]
 
-        def found(part: tuple[slice, slice]) -> tuple[Array, Array]:
-            return examine(self._piece(frontier, *part), self.problems)
+        def found(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
+            return self._piece(frontier, *part).examined(self.problems)
 
         if workers == 1:
             results = list(map(found, frontier.pieces(PIECE)))
         else:
             with ThreadPoolExecutor(workers) as pool:
                 results = list(pool.map(found, frontier.pieces(PIECE)))
-        code, value = (np.concatenate(part) for part in zip(*results, strict=True))
+        code, value, _ = (np.concatenate(part) for part in zip(*results, strict=True))
         higher = np.flatnonzero(value > self.problems.best[frontier.problem] + HIGHER)
         if len(higher):
             self._improve(frontier, higher[np.argsort(value[higher])], value)
@@ -160,8 +157,8 @@ class Tree:
         """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
         whole = self.problems.best + self.problems.gap
         for part in frontier.pieces(PIECE):
-            bound, problem = bounds(self._piece(frontier, *part), self.problems)
-            np.maximum.at(whole, problem, bound)
+            bound = self._piece(frontier, *part).examined(self.problems)[2]
+            np.maximum.at(whole, frontier.problem[part[1]], bound)
         return whole[self.numbers]
 
     def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:

@@ -8,25 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound, Enclosed
-from alphacut.frame.certificate.kernel import examination
 from alphacut.frame.certificate.remainder import Remainder, largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.modal.first_pass import first_optima
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, best_of_pool
-from alphacut.frame.modal.starting_points import trajectories
 
-SAMPLES = 256
-"""Trajectories of the modal model."""
-PHASE = 0.5
-"""Phase of the fastest mode (rad) between nodes at which Newton's method begins with samples."""
 LEFT = 0.02
 """Share of the gap that Newton's method may leave."""
-SHIFTS = (1, 2, 4, 8, 16)
-"""Distances of the nodes that try each other's points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +32,6 @@ class Certificate:
             in its unit.
         boxes: Boxes of parameters looked at.
         scale: Size of each output beside the first, shape (m,).
-        kernel: What examined the boxes: C or NumPy.
     """
 
     bounds: Array
@@ -51,7 +40,6 @@ class Certificate:
     between: Array
     boxes: int
     scale: Array
-    kernel: str
 
     @property
     def gap(self) -> float:
@@ -116,7 +104,6 @@ def certify(
         between * scale,
         sum(part.boxes for part in found),
         scale,
-        examination()[0],
     )
 
 
@@ -131,7 +118,7 @@ def _level(
 ) -> Enclosed:
     """Bounds of one level; what the level inside it attains is attained here too."""
     lower, upper = model.boxes.unit(level)
-    optima = first_optima(model, lower, upper, method.gap)
+    optima = first_optima(model, lower, upper, LEFT * method.gap)
     if within is not None:
         kept = within.value > optima.value
         optima.value[kept], optima.point[kept] = within.value[kept], within.point[kept]
@@ -176,42 +163,3 @@ def _growth(model: ModalModel, margin: Array) -> Array:
     more = np.zeros_like(margin)
     more[1:] = swell * np.maximum(margin[1:], margin[:-1]) - np.minimum(margin[1:], margin[:-1])
     return more
-
-
-def first_optima(model: ModalModel, lower: Array, upper: Array, gap: float) -> Optima:
-    """Good points of all nodes, outputs and sides in the box [lower, upper], by one quick pass.
-
-    Boxes find what it misses.
-
-    Args:
-        model: The modal model.
-        lower: Lower ends, shape (d,).
-        upper: Upper ends.
-        gap: What the bounds may miss, in units of the outputs.
-    """
-    columns, total = 2 * len(model.outputs), len(model.time)
-    optima, grid = _sampled(model, lower, upper), np.arange(columns * total).reshape(total, -1)
-    if not (upper > lower).any():
-        return optima
-    fastest = float(np.abs(model.eigenvalue.coefficients[0]).max())
-    stride = max(1, int(PHASE / (fastest * model.flow.step)))
-    nodes = np.unique(np.append(np.arange(0, total, stride), total - 1))
-    refine(model, optima, grid[nodes].ravel(), lower, upper, LEFT * gap)
-    for shift in SHIFTS:
-        for here, there in ((shift, 0), (0, shift)):
-            count = max(len(nodes) - shift, 0)
-            to, of = (grid[nodes[k : k + count]].ravel() for k in (here, there))
-            optima.offer(model, optima.point[of], to)
-    right = np.searchsorted(nodes, np.arange(total))
-    for near in (right, np.maximum(right - 1, 0)):
-        optima.offer(model, optima.point[grid[nodes[near]].ravel()], grid.ravel())
-    refine(model, optima, grid.ravel(), lower, upper, LEFT * gap)
-    return optima
-
-
-def _sampled(model: ModalModel, lower: Array, upper: Array) -> Optima:
-    """The best points of a sample for every problem."""
-    d, nodes = len(lower), np.arange(len(model.time))
-    unit = np.vstack([np.zeros((1, d)), chebyshev_points(d, SAMPLES)])
-    points = (lower + upper) / 2 + (upper - lower) / 2 * unit
-    return best_of_pool(points, trajectories(model, points), nodes, 1)[0]

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.certificate.piece import FACES
 
+FACES = 16
+"""Codes from here on confine an item to faces, as those of `kernel`."""
 LOWER, UPPER = -1, -2
 """Places of an axis that is confined to an end of the domain."""
 

@@ -1,52 +1,330 @@
-"""The examination of boxes by compiled code, where there is a compiler, or by its NumPy twin."""
+"""Examination of boxes in the branch and bound, compiled by Numba; without it, plain Python.
+
+An item is an output and side (lower or upper bound) at a time node in a box. About the box's centre
+the output, times its side, is f + g·x + x·H·x/2 for |x| ≤ r, up to `rest`. An item is
+
+- left to the neighbouring box, or confined to faces, where the output is monotone along axes;
+- closed, where a bound lies below its target, the best known value plus the gap: the bound of the
+  quadratic, that of modes which turn at rates linear in the inputs, that of a concave function
+  above the quadratic, or of one about the best point near by;
+- else split, along the axis that adds most to what is not known.
+"""
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable
-from functools import cache
-from pathlib import Path
+from math import inf, sqrt
 
 import numpy as np
+from numba import njit
 
-from alphacut.frame.calculus.c_library import FUSED, c_library
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.certificate.numpy_kernel import examine
-from alphacut.frame.certificate.piece import Piece, Problems
+from alphacut.fuzzy.arrays import Array, Rows
 
-SOURCE = Path(__file__).with_name("kernel.c")
-Examine = Callable[[Piece, Problems], tuple[Array, Array]]
-"""Codes (0 closed, 1 + axis split, `FACES` and above confined) and side × output at the centres."""
+FACES = 16
+"""Codes from here on confine an item to faces: plus 3^axis, once for lower and twice for upper."""
+SWEEPS = 8
+NEAR = 2.0
+"""Radii within which the best point counts as near."""
+TURN = 4.0
+"""Radians within which modes are turned."""
+SWELL = 1.7
+"""Largest z for which 1 + z + z² lies above exp(z)."""
 
-
-@cache
-def examination() -> tuple[str, Examine]:
-    """The fastest kernel there is, and its name."""
-    library = c_library(SOURCE.read_text(encoding="utf-8"), FUSED)
-    if library is None:
-        return "NumPy", examine
-    return "C", lambda piece, problems: _compiled(library, piece, problems)
+compiled = njit(cache=True, nogil=True, error_model="numpy")
 
 
-def _compiled(library: ctypes.CDLL, piece: Piece, problems: Problems) -> tuple[Array, Array]:
-    over, forced, free = problems.remainder, piece.forced, piece.forced is None
-    code, value = np.zeros(len(piece.column), np.int32), np.zeros(len(piece.column))
-    (boxes, d), parts = piece.centre.shape, piece.started + (not free)
-    sizes = (d, piece.modes, problems.third.shape[0], parts, piece.started)
-    given = [
-        *((x, np.int64) for x in (piece.row_start, piece.item_start, piece.node)),
-        *((piece.column, np.int32), (piece.jets, complex), (problems.time, float)),
-        *((forced, complex), (problems.third, float), (over.margin, float)),
-        *((piece.centre, float), (piece.radius, float), (piece.edges, np.uint8)),
-        *((x, float) for x in (problems.best, problems.point, problems.jets)),
-        *((x if free else None, float) for x in (*over.rate[2:], *over.share)),
-    ]
-    arrays: list[Array | None] = [
-        None if x is None else np.ascontiguousarray(x, kind) for x, kind in given
-    ]
-    library.examine(
-        *(ctypes.c_long(boxes), ctypes.c_long(len(problems.time)), *map(ctypes.c_int, sizes)),
-        *(None if x is None else ctypes.c_void_p(x.ctypes.data) for x in arrays),
-        *(ctypes.c_double(problems.gap), *(ctypes.c_void_p(x.ctypes.data) for x in (code, value))),
-    )
-    return code, value
+@compiled
+def separable(g: Array, H: Array, r: Array) -> float:
+    """Upper bound of g·x + x·H·x/2 for |x| ≤ r: mixed terms are moved to the diagonal."""
+    total = 0.0
+    for i in range(len(r)):
+        if r[i] <= 0:
+            continue
+        bend, slope = H[i, i], abs(g[i])
+        for j in range(len(r)):
+            if j != i:
+                bend += abs(H[i, j]) * r[j] / r[i]
+        if bend < 0 and slope < -bend * r[i]:
+            total -= slope * slope / (2 * bend)
+        else:
+            total += slope * r[i] + 0.5 * bend * r[i] * r[i]
+    return total
+
+
+@compiled
+def stays_below(
+    g: Array, H: Array, low: Array, high: Array, allowed: float, work: Array, L: Array
+) -> bool:
+    """Whether g·x + x·H·x/2 ≤ allowed for low ≤ x ≤ high is shown by a concave function above.
+
+    That is the same plus Σ s_i (x_i − low_i)(high_i − x_i)/2 (αBB: Adjiman and Floudas), and above
+    it, where it is concave, lies each of its tangents. `work` (3, d) and `L` (d, d) are scratch.
+    """
+    if allowed <= 0:
+        return False
+    d, shift, x, slope = len(g), work[0], work[1], work[2]
+    for i in range(d):
+        width = high[i] - low[i]
+        x[i], shift[i] = max(min(0.0, high[i]), low[i]), 0.0
+        if width > 0:
+            shift[i] = allowed / (d * width * width)
+            if (high[i] <= 0 and g[i] > 0) or (low[i] >= 0 and g[i] < 0):
+                shift[i] += abs(g[i]) / width
+    for i in range(d):  # Cholesky of s − H on the axes with a width
+        for j in range(i + 1):
+            if high[i] <= low[i] or high[j] <= low[j]:
+                L[i, j] = 0.0
+                continue
+            total = -H[i, j] if i != j else shift[i] - H[i, i]
+            for k in range(j):
+                total -= L[i, k] * L[j, k]
+            if i != j:
+                L[i, j] = total / L[j, j]
+            elif total > 1e-12 * (shift[i] + abs(H[i, i])):
+                L[i, i] = sqrt(total)
+            else:
+                return False
+    value = 0.0
+    for i in range(d):
+        curved = 0.0
+        for j in range(d):
+            curved += H[i, j] * x[j]
+        value += (g[i] + curved / 2) * x[i] + shift[i] / 2 * (x[i] - low[i]) * (high[i] - x[i])
+        slope[i] = g[i] + curved + shift[i] / 2 * (low[i] + high[i] - 2 * x[i])
+    for _ in range(SWEEPS):
+        tangent = value
+        for i in range(d):
+            if high[i] > low[i]:
+                tangent += max(slope[i] * (high[i] - x[i]), slope[i] * (low[i] - x[i]))
+        if tangent <= allowed:
+            return True
+        if value > allowed:
+            return False
+        for i in range(d):
+            if high[i] <= low[i]:
+                continue
+            bend = shift[i] - H[i, i]
+            moved = max(min(x[i] + slope[i] / bend, high[i]), low[i]) - x[i]
+            value += moved * (slope[i] - bend * moved / 2)
+            x[i] += moved
+            for j in range(d):
+                slope[j] += H[j, i] * moved
+            slope[i] -= shift[i] * moved
+    return False
+
+
+@compiled
+def along(bound: Array, r: Array, out: Array) -> None:
+    """Tensors of bounds (d^order, K) times radii along all their axes, into `out` (K,)."""
+    d = len(r)
+    out[:] = 0.0
+    for a in range(len(bound)):
+        weight, left, count = 1.0, a, len(bound)
+        while count > 1:
+            weight *= r[left % d]
+            left, count = left // d, count // d
+        for k in range(len(out)):
+            out[k] += weight * bound[a, k]
+
+
+@compiled
+def left_out(reach: float, e: Array, c: Array) -> float:
+    """What C exp((λ − λ₀ − i ω·x) t) exp(i s) leaves out with C = C₀, λ = λ₀ + i ω·x, over |wave|.
+
+    It is a sixth of a bound of the third derivative of their difference, by Leibniz' rule, with
+    bounds along the radii of the derivatives of λ t, `e` (0 … 3, of the real part alone the first),
+    and of C, `c` (0 … 3). Beyond `TURN` it is infinite.
+    """
+    z0, z1 = e[1] + e[2] / 2, e[1] + e[2]
+    if not (reach < TURN and z0 < SWELL):
+        return inf
+    swell, curved = 1 + z0 + z0 * z0, e[2] + z1 * z1
+    p0, p1 = c[1] + c[0] * z0 * swell, c[1] + c[0] * z1
+    p2 = c[2] + 2 * c[1] * z1 + c[0] * curved
+    p3 = c[3] + 3 * c[2] * z1 + 3 * c[1] * curved + c[0] * (e[3] + 3 * e[2] * z1 + z1**3)
+    return (reach**3 * p0 + (3 * reach**2 * p1 + 3 * reach * p2 + p3) * swell) / 6
+
+
+@compiled
+def turned(
+    f: float, g: Array, H: Array, w: Array, t: float, side: float, modes: tuple[Array, ...], o: int
+) -> float:
+    """Bound of a sum of modes A exp(i s) whose phases s = ω·x are linear, less the quadratic's f.
+
+    With |s| ≤ S, Re A exp(i s) exceeds its quadratic Taylor model by at most |Im A| S³/24 + Im A S²
+    s/8 (Chebyshev) + max(Re A, 0) S² s²/24 + |Im A| S⁵/120 + |Re A| S⁶/720. The terms in x are
+    added to `g` and `H`, what is constant is returned.
+    """
+    share, slope, phase, decay, e, c = modes
+    rest, rates = 0.0, np.empty(4)
+    for k in range(len(phase)):
+        re, im = w[2 * k], w[2 * k + 1]
+        x = 2 * side * (share[k, o, 0] * re - share[k, o, 1] * im)
+        y = 2 * side * (share[k, o, 0] * im + share[k, o, 1] * re)
+        S = phase[k] * t
+        rates[1], rates[2], rates[3] = decay[k] * t, e[0, k] * t, e[1, k] * t
+        rest += 2 * sqrt(re * re + im * im) * left_out(S, rates, c[:, k, o])
+        rest += abs(y) * (S**3 / 24 + S**5 / 120) + abs(x) * S**6 / 720
+        tilt, soft = y * S * S * t / 8, max(x, 0.0) * S * S * t * t / 12
+        for i in range(len(g)):
+            g[i] += tilt * slope[k, i]
+            for j in range(len(g)):
+                H[i, j] += soft * slope[k, i] * slope[k, j]
+    return rest
+
+
+@compiled
+def taylor(w: Array, table: Array, J: Array, H: Array) -> None:
+    """Value and gradient, into J, and Hessian of an output, of its waves."""
+    J[:] = 0.0
+    for k in range(len(w)):
+        for a in range(len(J)):
+            J[a] += w[k] * table[k, a]
+    unpacked(J, H)
+
+
+@compiled
+def unpacked(J: Array, H: Array) -> None:
+    """Hessian (d, d) from the upper triangle behind value and gradient."""
+    a = 1 + len(H)
+    for i in range(len(H)):
+        for j in range(i, len(H)):
+            H[i, j] = H[j, i] = J[a]
+            a += 1
+
+
+@compiled
+def examine(
+    frame: tuple[Rows, ...],
+    boxes: tuple[Array, ...],
+    waves: Array,
+    time: Array,
+    remainder: tuple[Array, ...],
+    best: tuple[Array, ...],
+    gap: float,
+    turning: bool,
+) -> tuple[Rows, Array, Array]:
+    """Codes, side × output at the centres, and upper bounds of all items.
+
+    Args:
+        frame: First row of each box, first item of each row, node of each row, column of each item
+            (2 output + 1 for upper bounds).
+        boxes: Centre, radius, which faces lie on the domain's, tables from waves to jets (B, m, K,
+            q), of the free modes' shares (B, n, m, 2) and slopes of their rates (B, d, n, 2).
+        waves: Waves of all modes at the rows, real and imaginary parts, shape (R, K).
+        time: Nodes, shape (T,), in s.
+        remainder: Bounds of third derivatives (T, m, d, d, d), of rounding (T, m, 1 + d), and along
+            the axes of rates, orders 2 and 3, (d², n) and (d³, n), and shares, orders 0 to 3.
+        best: Best values by problem, their points and jets there.
+        gap: What the bounds may lie above the best values by.
+        turning: Whether modes are turned.
+    """
+    row_start, item_start, nodes, column = frame
+    centre, radius, edges, tables, shares, rates = boxes
+    third, margin, rate2, rate3, share0, share1, share2, share3 = remainder
+    values, points, jets = best
+    (d, m), n, q = (centre.shape[1], tables.shape[1]), shares.shape[1], tables.shape[3]
+    code, value = np.zeros(len(column), np.int64), np.zeros(len(column))
+    bound = np.zeros(len(column))
+    J, H, g, S, pull, bent = (
+        np.empty(q), np.empty((d, d)), np.empty(d), np.empty((d, d)), np.empty(d), np.empty(d),
+    )  # fmt: skip
+    low, high, span, work, L = (
+        np.empty(d), np.empty(d), np.empty(d), np.empty((3, d)), np.empty((d, d)),
+    )  # fmt: skip
+    e, c, phase, decay = np.empty((2, n)), np.empty((4, n, m)), np.empty(n), np.empty(n)
+    slope = np.empty((n, d))
+    for b in range(len(centre)):
+        r = radius[b]
+        if turning and (b == 0 or (r != radius[b - 1]).any()):
+            along(rate2, r, e[0])
+            along(rate3, r, e[1])
+            flat = c.reshape(4, n * m)
+            flat[0] = share0
+            along(share1, r, flat[1])
+            along(share2, r, flat[2])
+            along(share3, r, flat[3])
+        for k in range(n):
+            phase[k] = decay[k] = 0.0
+            for i in range(d):
+                slope[k, i] = rates[b, i, k, 1]
+                phase[k] += abs(slope[k, i]) * r[i]
+                decay[k] += abs(rates[b, i, k, 0]) * r[i]
+        modes = (shares[b], slope, phase, decay, e, c)
+        for row in range(row_start[b], row_start[b + 1]):
+            node, before = nodes[row], -1
+            for item in range(item_start[row], item_start[row + 1]):
+                o, side = column[item] // 2, 2.0 * (column[item] % 2) - 1
+                problem = node * 2 * m + column[item]
+                noise, rest = margin[node, o, 0], margin[node, o, 0]
+                if o != before:
+                    taylor(waves[row], tables[b, o], J, H)
+                    before = o
+                for i in range(d):
+                    pull[i] = bent[i] = 0.0
+                    for j in range(d):
+                        bent[i] += abs(H[i, j]) * r[j]
+                        for k in range(d):
+                            pull[i] += third[node, o, i, j, k] * r[j] * r[k]
+                    rest += pull[i] * r[i] / 6
+                f, target = side * J[0], values[problem] + gap
+                faces, place, inner = 0, 1, False
+                for i in range(d):
+                    g[i] = side * J[1 + i]
+                    for j in range(d):
+                        S[i, j] = side * H[i, j]
+                    wander = pull[i] / 2 + margin[node, o, 1 + i]
+                    if r[i] > 0 and abs(g[i]) > bent[i] + wander:
+                        up = 1 if g[i] > 0 else 0
+                        if edges[b, up, i]:
+                            faces += place * (1 + up)
+                        else:
+                            inner = True  # the neighbour holds higher points
+                    place *= 3
+                value[item] = f
+                bound[item] = f + separable(g, S, r) + rest
+                if inner or bound[item] <= target:
+                    continue
+                if turning:
+                    room = target - f - noise
+                    room -= turned(f, g, S, waves[row], time[node], side, modes, o)
+                    for i in range(d):
+                        low[i], high[i] = -r[i], r[i]
+                    if separable(g, S, r) <= room or stays_below(g, S, low, high, room, work, L):
+                        continue
+                    for i in range(d):
+                        g[i] = side * J[1 + i]
+                        for j in range(d):
+                            S[i, j] = side * H[i, j]
+                if faces:
+                    code[item] = FACES + faces
+                    continue
+                for i in range(d):
+                    low[i], high[i] = -r[i], r[i]
+                if stays_below(g, S, low, high, target - f - rest, work, L):
+                    continue
+                near = True
+                for i in range(d):
+                    low[i] = centre[b, i] - r[i] - points[problem, i]
+                    high[i] = centre[b, i] + r[i] - points[problem, i]
+                    near &= max(low[i], -high[i]) <= NEAR * r[i] + 1e-12
+                    span[i] = max(max(abs(low[i]), abs(high[i])), 1e-9)
+                if near:
+                    own = jets[problem]
+                    unpacked(own, S)
+                    for i in range(d):
+                        g[i], bend = side * own[1 + i], 0.0
+                        for j in range(d):
+                            S[i, j] *= side
+                            for k in range(d):
+                                bend += third[node, o, i, j, k] * span[j] * span[k]
+                        S[i, i] += bend / span[i] / 3  # the cubic remainder: Σ bend_i x_i² / 6
+                    room = gap - noise - (side * own[0] - values[problem])
+                    if stays_below(g, S, low, high, room, work, L):
+                        continue
+                most = -1.0
+                for i in range(d):
+                    wander = pull[i] / 2 + margin[node, o, 1 + i]
+                    weight = r[i] * (2 * wander + bent[i] / 2)
+                    if r[i] > 0 and weight > most:
+                        most, code[item] = weight, 1 + i
+    return code, value, bound

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations_with_replacement
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.certificate.remainder import Remainder
-
-FACES = 16
-"""Codes from here on confine an item to faces: plus 3^axis, once for lower and twice for upper."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +32,6 @@ class Problems:
     point: Array
     jets: Array
     gap: float
-
-    @cached_property
-    def third(self) -> Array:
-        """Bounds of third derivatives along triples of rising axes, shape (m, triples, T)."""
-        tensor = self.remainder.tensor
-        axes = np.array(list(combinations_with_replacement(range(tensor.shape[-1]), 3))).T
-        return np.ascontiguousarray(np.moveaxis(tensor[:, :, *axes], 0, -1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +86,56 @@ class Piece:
         return np.stack(found, 1)
 
     @cached_property
-    def row_of_item(self) -> Array:
-        """Row of each item, shape (I,)."""
-        return np.repeat(np.arange(len(self.node)), np.diff(self.item_start))
-
-    @cached_property
     def box_of_row(self) -> Array:
         """Box of each row, shape (R,)."""
         return np.repeat(np.arange(len(self.centre)), np.diff(self.row_start))
+
+    def tables(self) -> Array:
+        """What waves carry into values, gradients and Hessians, shape (B, m, 6 P n, q).
+
+        Along the third axis are all parts, orders of the waves and modes, each with its real and
+        its imaginary part.
+        """
+        rate, C, d = self.rate[..., None, :, None], self.share, self.centre.shape[1]
+        out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
+        out[:, :, 0] = np.moveaxis(C, 0, -1)
+        for i in range(d):
+            out[:, :, 1, ..., 1 + i] = C[0] * rate[1 + i]
+        for a, (row, column) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
+            i, j = int(row), int(column)
+            x, y = rate[1 + i], rate[1 + j]
+            out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
+            out[:, :, 2, ..., a] = C[0] * x * y
+        both = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
+        flat = both.reshape(len(out), -1, *out.shape[-2:])
+        return np.ascontiguousarray(flat.swapaxes(1, 2))
+
+    def examined(self, problems: Problems) -> tuple[Array, Array, Array]:
+        """Codes, side × output at the centres and upper bounds of all items; see `kernel`."""
+        from alphacut.frame.certificate.kernel import examine  # Numba takes time to import
+
+        over, d = problems.remainder, self.centre.shape[1]
+        free = self.share[0, :, 0].swapaxes(1, 2)  # (B, m, n)
+        shares, rates = (
+            _in_planes(x) for x in (free.swapaxes(1, 2), self.rate[1 : 1 + d].swapaxes(0, 1))
+        )
+        flat = [x.reshape(d**order, -1) for order, x in enumerate(over.share)]
+        bounds = (over.tensor, over.margin, over.rate[2].reshape(d * d, -1))
+        bounds += (over.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:])
+        wave = np.ascontiguousarray(self.waves(problems.time)).reshape(len(self.node), -1)
+        found: tuple[Array, Array, Array] = examine(
+            (self.row_start, self.item_start, self.node, self.column),
+            (self.centre, self.radius, self.edges, self.tables(), shares, rates),
+            wave.view(float),
+            problems.time,
+            tuple(np.ascontiguousarray(x, float) for x in bounds),
+            (problems.best, problems.point, problems.jets),
+            problems.gap,
+            self.forced is None,
+        )
+        return found
+
+
+def _in_planes(x: Array) -> Array:
+    """Complex numbers as pairs of reals along a last axis."""
+    return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)

@@ -8,13 +8,13 @@ from functools import singledispatch
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.calculus.jet import Array
 from alphacut.frame.checks.step_error import probes
 from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.linear import Accelerogram, frequencies
+from alphacut.fuzzy.arrays import Array
 
 PARTS, MOST = 4, 64
 """Parts of a step that are looked at in a linear structure; a general one is looked at halfway."""

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from functools import singledispatch
 
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.numbers import below
-from alphacut.frame.checks.corners import signs
-from alphacut.frame.checks.tolerance import LIMIT
+from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.reduced.reduction import ReducedStructure
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.modes import state_matrix
-from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""
@@ -32,8 +28,6 @@ GROWTH = 1e-6
 """Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
-REDUCED = 2.0
-"""Factor on the error of a reduction besides: it is sharper between corners than that of steps."""
 
 
 def probes(cuts: Boxes) -> Array:
@@ -44,11 +38,19 @@ def probes(cuts: Boxes) -> Array:
     return points
 
 
+def signs(d: int, most: int) -> Array:
+    """All corners of [−1, 1]^d, or `most` of them, two opposite ones among them, shape (S, d)."""
+    if 2**d <= most:
+        return corners(-np.ones(d), np.ones(d))
+    drawn = np.random.default_rng(7).choice([-1.0, 1.0], (most - 2, d))
+    return np.vstack([-np.ones(d), np.ones(d), drawn])
+
+
 def step_error(flow: UnitFlow) -> Array:
     """Estimate of the largest time-stepping error so far, from modal values and corners, (T, m).
 
-    Of a linear structure the distance from the exact propagator, of a reduced one from the motion
-    of the full structure; else the distance from half the step, extrapolated by the scheme's order.
+    Of a linear structure the distance from the exact propagator, else the distance from half the
+    step, extrapolated by the scheme's order.
 
     Raises:
         StepError: A scheme has left the motion.
@@ -60,10 +62,8 @@ def step_error(flow: UnitFlow) -> Array:
     peak = np.abs(values).max((0, 1))
     for name, reached, least in zip(flow.outputs, so_far[-1], peak, strict=True):
         if reached > DIVERGED * least > 0:
-            raise StepError(
-                f"step: its error, {reached:.2g}, passes the peak of {name}, {least:.2g}, many"
-                " times; take a smaller step"
-            )
+            what = f"step: its error, {reached:.2g}, passes the peak of {name}, {least:.2g}"
+            raise StepError(what, "take a smaller step")
     return MARGIN * so_far
 
 
@@ -77,10 +77,7 @@ def step_error_at_bounds(found: Envelope, flow: UnitFlow, steps: Array) -> Array
         flow: These trajectories.
         steps: From `step_error`, shape (T, m).
     """
-    linear = isinstance(flow.flow, LinearFlow) and not isinstance(
-        flow.flow.system, ReducedStructure
-    )
-    if exact(flow.flow) or not linear:
+    if exact(flow.flow) or not isinstance(flow.flow, LinearFlow):
         return steps
     at, d = np.stack([found.lower_at, found.upper_at]), len(found.parameters)
     peaks = np.abs([found.lower, found.upper]).argmax(2)[:, :, None, :, None]
@@ -93,28 +90,18 @@ def step_error_at_bounds(found: Envelope, flow: UnitFlow, steps: Array) -> Array
 
 def exact(flow: Flow) -> bool:
     """Whether trajectories have no error but rounding."""
-    if not isinstance(flow, LinearFlow) or isinstance(flow.system, ReducedStructure):
-        return False
-    return isinstance(flow.integrator, Exact)
+    return isinstance(flow, LinearFlow) and isinstance(flow.integrator, Exact)
 
 
 @singledispatch
 def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
-    """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m).
-
-    Those of a reduced structure are at its own `judges`, whose modes are kept.
-    """
+    """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m)."""
     values = flow.values(points)
     return values, np.zeros_like(values)
 
 
 @deviations.register
 def _(flow: LinearFlow, points: Array) -> tuple[Array, Array]:
-    if isinstance(flow.system, ReducedStructure):
-        whole, judges = replace(flow, names=tuple(flow.system.parameters)), flow.system.judges
-        full = np.array([flow.system.full.trajectories(point, flow.time) for point in judges])
-        found = whole.values(np.array([list(point.values()) for point in judges]))
-        return full, REDUCED * np.abs(found - full)
     truth = replace(flow, integrator=Exact()).values(points)
     return truth, np.abs(flow.values(points) - truth)
 
@@ -125,78 +112,28 @@ def _(flow: LagrangianFlow, points: Array) -> tuple[Array, Array]:
     return fine, np.abs(flow.values(points) - fine) * gain / (gain - 1)
 
 
-def with_step_error(found: Envelope, flow: UnitFlow, scheme: str, steps: Array) -> Envelope:
-    """The envelope with the time-stepping error in its facts and errors; certified bounds grow.
+def with_step_error(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
+    """The envelope with the time-stepping error in its errors.
 
     Args:
         found: The envelope of the scheme's trajectories.
         flow: These trajectories.
-        scheme: Name of the scheme.
         steps: From `step_error`, shape (T, m).
     """
-    alike = [
-        Output(name).unit == Output(flow.outputs[flow.reference]).unit for name in flow.outputs
-    ]
-    facts: dict[str, float | str] = {
-        "integrator": scheme,
-        "step_error": float(steps[:, alike].max()),
-        **found.facts,
-    }
-    facts |= _dominance(found, flow, steps.max(0))
-    error = found.error
-    if error is not None and found.inner_lower is None and steps.any():
-        error = error + steps
-        if "estimated_error" in facts:
-            facts["estimated_error"] = float((error / flow.scale).max())
-    if found.inner_lower is not None and found.inner_upper is not None and steps.any():
-        found = replace(
-            found,
-            lower=found.lower - steps,
-            upper=found.upper + steps,
-            inner_lower=found.inner_lower + steps,
-            inner_upper=found.inner_upper - steps,
-        )
-        error = None if error is None else error + 2 * steps
-    return replace(found, error=error, facts=facts)
+    alike = [unit == flow.units[flow.reference] for unit in flow.units]
+    error, basis = found.error + steps, found.basis
+    if steps.any():
+        basis = (*basis, f"{scheme_of(flow.flow)} steps of {flow.time[1]:g} s")
+    facts = {"step_error": float(steps[:, alike].max()), **found.facts}
+    facts["estimated_error"] = float((error / flow.scale).max())
+    return replace(found, error=error, basis=basis, facts=facts)
 
 
-def source(flow: Flow) -> tuple[str, str]:
-    """What makes trajectories inexact, and what lessens that."""
-    if not isinstance(flow, LinearFlow):
-        return "time stepping", "take a smaller step, or a scheme of order 4"
-    if isinstance(flow.integrator, Exact):
-        return "the reduction to few shapes", "narrower supports may lessen it"
-    return "time stepping", "take a smaller step; integrator exact has none"
-
-
-def _dominance(found: Envelope, flow: UnitFlow, steps: Array) -> dict[str, str]:
-    """A fact where time stepping adds more to some output than the search for the bounds."""
-    gain = float(found.facts.get("gain", 0.0))
-    own = gain * flow.scale if found.error is None else found.error.max((0, 1))
-    ratio = np.divide(steps, own, out=np.zeros_like(steps), where=own > 0)
-    worst = int(ratio.argmax())
-    if ratio[worst] <= 1:
-        return {}
-    name, unit = flow.outputs[worst], Output(flow.outputs[worst]).unit.replace("SI", "")
-    what, cure = source(flow.flow)
-    return {
-        "dominant_error": (
-            f"{what}: {steps[worst]:.2g} {unit} of {name} against {own[worst]:.2g} {unit} of"
-            f" the envelope; {cure}"
-        )
-    }
-
-
-def warn_of_steps(found: Envelope, flow: UnitFlow, steps: Array) -> None:
-    """Warn where trajectories are wrong, by `steps` (m,), by more than a hundredth of a peak."""
-    peak = np.maximum(np.abs(found.lower), np.abs(found.upper)).max((0, 1))
-    share = np.divide(steps, peak, out=np.zeros_like(steps), where=peak > 0)
-    worst = int(share.argmax())
-    if share[worst] > LIMIT:
-        of = f"{steps[worst]:.2g}, {100 * share[worst]:.2g} % of the peak of {found.outputs[worst]}"
-        what, cure = source(flow.flow)
-        where = f"step: {found.time[1]:g} s leaves an" if what == "time stepping" else "the"
-        warnings.warn(f"{where} error of {what} of {of}; {cure}", stacklevel=3)
+def scheme_of(flow: Flow) -> str:
+    """Name of the time stepping."""
+    return (
+        flow.integrator.name if isinstance(flow, LinearFlow) else str(getattr(flow, "scheme", ""))
+    )
 
 
 def require_stable(flow: Flow, cuts: Boxes) -> None:
@@ -217,9 +154,10 @@ def require_stable(flow: Flow, cuts: Boxes) -> None:
     worst = int(np.where(calm, growth, 0.0).argmax())
     if calm[worst] and growth[worst] > 1 + GROWTH:
         fastest = float(np.abs(rate[worst]).max())
-        raise ValueError(
-            f"step: {flow.step:g} s gives omega_max h = {fastest * flow.step:.3g}, where the scheme"
-            f" {flow.integrator.name} is unstable; take at most some"
-            f" {below(flow.integrator.stability_limit / fastest)} s, or the integrator exact"
-            " or midpoint"
+        most = flow.integrator.stability_limit / fastest
+        raise RefusedError(
+            "step",
+            f"{flow.step:g} s",
+            f"at most {most:.3g} s for {flow.integrator.name}",
+            "the integrators exact and midpoint are always stable",
         )

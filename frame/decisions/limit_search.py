@@ -13,11 +13,12 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound
 from alphacut.frame.checks.admissible import require_admissible
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.methods.modal import Modal, model_with_error
+from alphacut.frame.methods.proof import model_with_error
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import Optima, best_of_pool, problems
 from alphacut.frame.modal.starting_points import spread_points, trajectories
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 REFINED = 64
 """Motions of a search that are driven to their local extreme."""
@@ -64,13 +65,14 @@ class LimitSearch:
         lower, upper = self.reach(size)
         ends = np.stack([lower, self.nominal]), np.stack([upper, self.nominal])
         boxes = Boxes(self.flow.names, np.array([0.0, 1.0]), *ends, self.nominal)
-        require_admissible(self.flow.system, boxes, self.flow.duration, self.flow.step)
+        require_admissible(self.flow.system, boxes)
         unit = LimitFlow(self.flow, boxes, limits=self.limits)
         before = self.hopeless(size)
-        method = Modal(tolerance=self.gap)
-        model, error, self.reason = model_with_error(
-            self.flow, unit, method, self.gap, unproved=before
-        )
+        try:
+            fitted = model_with_error(self.flow, unit, self.gap, unproved=before)
+        except UnprovedError as error:
+            fitted = model_with_error(self.flow, unit, self.gap, unproved=str(error))
+        model, error, self.reason = fitted
         if self.reason and not before:
             self.failed.append((size, self.gap, self.reason))
         self.model: ModalModel = model.in_units(self.limits)

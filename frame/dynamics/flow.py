@@ -16,6 +16,7 @@ from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.spectral import LARGE, NearlyCriticalError, spectral_trajectory
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, relative_to_ground
+from alphacut.fuzzy.refused import FailedError, RefusedError
 
 
 class Flow(Protocol):
@@ -54,24 +55,18 @@ def nodes(duration: float, step: float) -> Array:
     require_number("step", step, "s")
     require_number("duration", duration, "s")
     if not (np.isfinite(step) and step > 0):
-        raise ValueError(f"step: {step:g} s is not allowed; it must be positive")
+        raise RefusedError("step", f"{step:g} s", "a positive time")
     count = round(duration / step) if np.isfinite(duration) else 0
-    if count < 1 or abs(count * step - duration) > 1e-9 * duration:
-        raise ValueError(
-            f"duration: {duration:g} s is not a positive multiple of the step {step:g} s"
-        )
-    if count > MOST_NODES:
-        raise ValueError(
-            f"duration: {duration:g} s has {count:,} steps of {step:g} s; {MOST_NODES:,} are the"
-            " most: take a longer step"
-        )
+    if not 1 <= count <= MOST_NODES or abs(count * step - duration) > 1e-9 * duration:
+        allowed = f"1 to {MOST_NODES:,} whole steps of {step:g} s"
+        raise RefusedError("duration", f"{duration:g} s", allowed)
     return np.arange(count + 1) * step
 
 
 WITHIN = "keep the parameters where the motion exists, such as positive masses"
 
 
-class StepError(RuntimeError):
+class StepError(FailedError):
     """A step of the integrator did not converge."""
 
 
@@ -109,10 +104,9 @@ class March(ABC):
             self._locate(points, failure)
         if not np.isfinite(found.value).all():
             bad, node = np.argwhere(~np.isfinite(found.value).all(-1))[0]
-            when = f"not finite from t = {self.time[node]:g} s on"
-            raise ValueError(
-                f"trajectory: {when} at {self._named(points[bad])}; {WITHIN}, or take a smaller"
-                " step"
+            when = f"not finite from t = {self.time[node]:g} s on at {self._named(points[bad])}"
+            raise RefusedError(
+                "trajectory", when, "motions that exist", f"{WITHIN}, or a smaller step"
             )
         return found
 
@@ -128,7 +122,7 @@ class March(ABC):
         where = f"at {self._named(points[0])}"
         if isinstance(failure, StepError):
             raise StepError(f"{failure}; it failed {where}") from None
-        raise ValueError(f"trajectory: a matrix is singular {where}; {WITHIN}") from None
+        raise RefusedError("trajectory", f"a singular matrix {where}", "motions that exist", WITHIN)
 
     def _named(self, point: Array) -> str:
         return (

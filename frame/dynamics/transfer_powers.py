@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 from math import isqrt
-from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import FUSED, address, c_library
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.integrators import StepMap, exponential
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import state_matrix
 
-SOURCE = Path(__file__).with_name("linear_march.c").read_text(encoding="utf-8")
 TERMS = 28
 """Terms of exp(A τ) where |λ| τ ≤ 2: the next is 2^28 / 28! = 1e-21."""
 
@@ -44,7 +40,7 @@ def exact_response(
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:
-    """Outputs at `count` nodes, step by step in compiled code, or in blocks of √count steps.
+    """Outputs at `count` nodes, in blocks of √count steps.
 
     Args:
         step_map: One step, x[k+1] = T x[k] + G load[k].
@@ -56,8 +52,6 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, 
     Returns:
         Outputs, V = (S, count, m).
     """
-    if (found := _compiled(step_map, start, rows, load, count)) is not None:
-        return found
     size = isqrt(count - 1) + 1
     blocks = -(-count // size)
     powers = _powers(step_map.transfer, size)
@@ -77,23 +71,6 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, 
         return ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
 
     return out.map(in_time)
-
-
-def _compiled(
-    step_map: StepMap, start: Jet, rows: Jet, load: Array | None, count: int
-) -> Jet | None:
-    """As `trajectory`, step by step; None without a compiler, or without memory."""
-    library, (samples, m, n), d = c_library(SOURCE, FUSED), rows.value.shape, rows.directions
-    if library is None:
-        return None
-    loads = np.zeros((count - 1, 0)) if load is None else np.ascontiguousarray(load, float)
-    jets = (step_map.transfer, step_map.load, start, rows)
-    given = [np.ascontiguousarray(x, float) for j in jets for x in (j.value, j.first, j.second)]
-    made = [np.empty((*(d,) * order, samples, count, m)) for order in range(3)]
-    pointers = [(ctypes.c_void_p * len(x))(*map(address, x)) for x in (given, made)]
-    sizes = (ctypes.c_long(samples), ctypes.c_long(count))
-    shape = map(ctypes.c_int, (n, m, d, loads.shape[1]))
-    return Jet(*made) if library.linear_march(*sizes, *shape, address(loads), *pointers) else None
 
 
 def _forced(step_map: StepMap, rows: Jet, load: Array, size: int, blocks: int) -> tuple[Jet, Jet]:

@@ -70,7 +70,7 @@ def record(
         ValueError: There is no such output, or a value is outside its range.
     """
     cuts = boxes(inputs, (alpha,))
-    require_admissible(model, cuts, duration, step)
+    require_admissible(model, cuts)
     if isinstance(model, LagrangianSystem):
         flow = UnitFlow(LagrangianFlow(model, cuts.names, duration, step), cuts)
     else:

@@ -11,15 +11,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, linear_maximum, local_maximum
-from alphacut.frame.calculus.jet import Array
-from alphacut.frame.envelope import Envelope, signed_envelope
+from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
+from alphacut.frame.methods.independent import SAFETY, beyond, parted
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
 
 
 class FollowerStep(NamedTuple):
@@ -52,6 +55,7 @@ class Followed:
         bounds: Upper bounds of ±output after post-processing, shape (A, T, m, 2), the sides last:
             (−output, output).
         best: Index of the graph that attains each, shape (A, T, m, 2).
+        left: What Taylor models still promise at most, same shape.
         storage: All graphs.
         steps: The record, where it was asked for.
         exhausted: Whether the budget ended the search.
@@ -59,6 +63,7 @@ class Followed:
 
     bounds: Array
     best: Index
+    left: Array
     storage: Storage
     steps: list[FollowerStep] = field(default_factory=list)
     exhausted: bool = False
@@ -76,9 +81,10 @@ class GraphFollower:
         record: Keep every step.
 
     Raises:
-        ValueError: A switch is out of its range.
+        RefusedError: A switch is out of its range.
     """
 
+    name: ClassVar[str] = "graph-follower"
     order: int = 2
     tolerance: float = 1e-4
     budget: int | None = None
@@ -86,34 +92,35 @@ class GraphFollower:
 
     def __post_init__(self) -> None:
         if self.order not in (1, 2):
-            raise ValueError(
-                f"order: {self.order} is not allowed; the Taylor model has degree 1 or 2"
-            )
+            raise RefusedError("order", self.order, "1 and 2, the degrees of a Taylor model")
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
-            raise ValueError(f"tolerance: {self.tolerance:g} is not allowed; it must be positive")
+            raise RefusedError("tolerance", self.tolerance, "a positive number")
         if self.budget is not None and self.budget < 1:
-            raise ValueError(f"budget: {self.budget} is not allowed; it must be at least 1")
+            raise RefusedError("budget", self.budget, "whole numbers from 1 on")
 
     def run(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Envelope:
-        """Envelope of all outputs on all levels."""
+        """Envelope of all outputs on all levels.
+
+        Its error is what the models still promise, and twice what an independent sample finds
+        beyond the bounds. Where neighbouring trajectories part there is none, and the bounds are
+        attained, no more.
+        """
         begun = time.perf_counter()
         followed = self.follow(flow, progress)
-        return self.envelope(flow, followed, time.perf_counter() - begun)
-
-    def envelope(self, flow: UnitFlow, followed: Followed, seconds: float) -> Envelope:
-        """Envelope of what was followed."""
-        facts: dict[str, float | str] = {"order": self.order, "gain": self.tolerance}
-        if followed.exhausted:
-            facts["reason"] = f"stopped at the budget of {self.budget} trajectories"
-        return signed_envelope(
-            flow,
+        missed, count = beyond(flow, followed.bounds)
+        apart = parted(followed.storage.held.models(0, np.s_[:, :, :])[1], followed.bounds[0])
+        error = followed.left.max(-1) + SAFETY * missed[:, None]
+        notes = (f"stopped at the budget of {self.budget} trajectories",) * followed.exhausted
+        return flow.envelope(
             followed.bounds,
             followed.storage.points[followed.best],
-            method="graph-follower",
-            nature="inner",
-            trajectories=len(followed.storage),
-            seconds=seconds,
-            facts=facts,
+            None if apart else error,
+            method=self.name,
+            nature=Nature.ATTAINED if apart else Nature.ESTIMATED,
+            evaluations=len(followed.storage) + count,
+            seconds=time.perf_counter() - begun,
+            facts={"order": self.order, "gain": self.tolerance},
+            notes=notes,
         )
 
     def follow(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Followed:
@@ -122,7 +129,7 @@ class GraphFollower:
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
         levels = len(flow.boxes.alpha)
         shape = (levels, *storage.top.shape)
-        out = Followed(np.empty(shape), np.empty(shape, np.int64), storage)
+        out = Followed(np.empty(shape), np.empty(shape, np.int64), np.zeros(shape), storage)
         for done, level in enumerate(reversed(range(levels))):
             self._sweep(out, level, progress, done / levels)
             # post-processing: the best of all graphs at every node (Fig. 24)
@@ -143,6 +150,7 @@ class GraphFollower:
                 progress(start + node / nodes / levels)
             if self.budget is not None and len(storage) >= self.budget:
                 out.exhausted = True
+                out.left[level] = np.maximum(promise - storage.top, 0.0)
                 return
             guess = storage.best[node].flatten()
             tried, new = self._tried(storage, node, promise, target)
@@ -152,6 +160,8 @@ class GraphFollower:
                 self._ask(storage, ahead, box, promise, target)
             if self.record:
                 _note(out, level, node, guess, tried)
+        limit = self.tolerance * storage.flow.scale[:, None]
+        out.left[level] = np.clip(promise - storage.top, 0.0, limit)
 
     def _tried(
         self, storage: Storage, node: int, promise: Array, target: Array

@@ -25,6 +25,7 @@ def analyse(
     chosen: Array | None = None,
     *,
     states: bool = False,
+    bent: bool = True,
 ) -> Modes:
     """Eigen-analyses with derivatives at unit coordinates (S, d), of the integrator.
 
@@ -34,6 +35,7 @@ def analyse(
         unit: Where to analyse, shape (S, d).
         chosen: Indices of the modes wanted; all when None.
         states: Whether to observe the whole state [q; v] in place of the outputs.
+        bent: Whether to differentiate twice.
 
     Raises:
         ModalError: The structure has no such modes, or the integrator mixes them.
@@ -43,12 +45,11 @@ def analyse(
             "modal: accelerations relative to the ground, ar1 …, are followed by `envelope` alone;"
             " take the absolute ones, a1 …"
         )
-    matrices, rows = evaluate(flow.system, flow.names, boxes.to_physical(unit), derivatives=True)
+    points = boxes.to_physical(unit)
+    matrices, rows = evaluate(flow.system, flow.names, points, derivatives=True, bent=bent)
     if states:
-        rows = Jet.constant(
-            np.broadcast_to(np.eye(rows.value.shape[-1]), (len(unit), *2 * rows.value.shape[-1:])),
-            rows.directions,
-        )
+        size = rows.value.shape[-1]
+        rows = rows.like(np.broadcast_to(np.eye(size), (len(unit), size, size)))
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
     return Modes(

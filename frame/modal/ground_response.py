@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import ceil, exp, lgamma, log
-from pathlib import Path
 
 import numpy as np
 
-from alphacut.frame.calculus.c_library import address, c_library
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.modes import ModalError
 
-SOURCE = Path(__file__).with_name("ground_response.c").read_text(encoding="utf-8")
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
 MOST_STEPS = 40_000  # of a table
@@ -110,78 +104,12 @@ class LoadTable:
 
     def response(self, rate: Array, node: Array) -> Waves:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
-        node = self.every * node
-        compiled = self._compiled(rate, node, 3)
-        if compiled is not None:
-            return compiled[0], compiled[1], compiled[2]
-        powers = self._powers(rate).swapaxes(0, 1)  # (n, N, order)
-        total = np.einsum("kpi,pkix->pkx", powers, self._differentiated[node], optimize=True)
-        for end, later, tau in self._earlier(rate, node):
-            s0, s1, s2 = np.moveaxis(powers[:, later] @ self._differentiated[end], -1, 0).swapaxes(
-                1, 2
-            )
-            wave = np.exp(rate[later] * tau)
-            total[later] += np.stack(
-                [wave * s0, wave * (s1 + tau * s0), wave * (s2 + 2 * tau * s1 + tau * tau * s0)], -1
-            )
-        return total[..., 0], total[..., 1], total[..., 2]
+        from alphacut.frame.modal.window_series import window_series  # Numba takes time to import
 
-    def response_alone(self, rate: Array, node: Array) -> Array:
-        """R without its derivatives."""
-        node = self.every * node
-        compiled = self._compiled(rate, node, 1)
-        if compiled is not None:
-            alone: Array = compiled[0]
-            return alone
-        powers = self._powers(rate).swapaxes(0, 1)
-        total: Array = np.einsum("kpi,pki->pk", powers, self.moment[node])
-        for end, later, tau in self._earlier(rate, node):
-            total[later] += np.exp(rate[later] * tau) * np.einsum(
-                "kpi,ki->pk", powers[:, later], self.moment[end], optimize=True
-            )
-        return total
-
-    def _earlier(self, rate: Array, node: Array) -> Iterator[tuple[int, Array, Array]]:
-        """Earlier windows: their last node, the points concerned, the time since, (N, 1)."""
-        fade = self._fade(rate)
-        for end in self.starts[1:]:
-            since = self.time[node] - self.time[end]
-            later = np.flatnonzero((since > 0) & (since < fade))
-            if len(later):
-                yield end, later, since[later, None]
-
-    @staticmethod
-    def _fade(rate: Array) -> float:
-        """Time (s) after which nothing is left of a window."""
-        return FADED / max(float(-rate.real.max(initial=-np.inf)), 1e-300)
-
-    def _compiled(self, rate: Array, node: Array, orders: int) -> Array | None:
-        """R, and its derivatives for 3 orders, (orders, N, n); None without a compiler."""
-        library = c_library(SOURCE)
-        if library is None:
-            return None
-        out = np.empty((orders, *rate.shape), complex)
-        sizes = (rate.shape[1], self.moment.shape[-1], len(self.starts) - 1, orders)
-        counts = (ctypes.c_long(len(rate)), *map(ctypes.c_int, sizes))
-        lengths = (ctypes.c_double(self.scale), ctypes.c_double(self._fade(rate)))
-        complexes = [np.ascontiguousarray(x) for x in (self.middle, self.moment)]
-        reals = [np.ascontiguousarray(x, float) for x in (self.starts[1:], self.time, node)]
-        given = [x.view(float) for x in complexes] + reals
-        given.append(np.ascontiguousarray(rate).view(float))
-        library.ground_response(*counts, *lengths, *map(address, given), address(out.view(float)))
-        return out
-
-    @cached_property
-    def _differentiated(self) -> Array:
-        """Coefficients of the moments' series and derivatives by λ, (T, n, order, 3)."""
-        out = [self.moment]
-        for _ in range(2):
-            following = np.zeros_like(self.moment)
-            following[..., :-1] = out[-1][..., 1:] * (
-                np.arange(1, self.moment.shape[-1]) / self.scale
-            )
-            out.append(following)
-        return np.stack(out, -1)
+        fade = FADED / max(float(-rate.real.max(initial=-np.inf)), 1e-300)
+        where = (self.middle, self.scale, self.moment, self.starts[1:], self.time, fade)
+        R, slope, curve = window_series(rate, self.every * node, *where)
+        return R, slope, curve
 
     def _powers(self, rate: Array) -> Array:
         """Powers of the scaled deviation, shape (S, n, order)."""
@@ -258,13 +186,6 @@ class LoadTables:
         for table, own in zip(self.tables, self.members, strict=True):
             R[:, own], dR[:, own], ddR[:, own] = table.response(rate[:, own], node)
         return R, dR, ddR
-
-    def response_alone(self, rate: Array, node: Array) -> Array:
-        """As `LoadTable.response_alone`."""
-        R = np.empty_like(rate)
-        for table, own in zip(self.tables, self.members, strict=True):
-            R[:, own] = table.response_alone(rate[:, own], node)
-        return R
 
 
 def decaying(rate: Array, share: Array, step: float, count: int) -> Array:

@@ -16,15 +16,8 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.modal_jet import (
-    Parts,
-    composed,
-    composed_quadratics,
-    packed,
-    quadratics,
-)
+from alphacut.frame.calculus.modal_jet import Parts, composed, composed_quadratics
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.calculus.threads import each
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables, decaying
 
@@ -161,20 +154,12 @@ class ModalModel:
         self, unit: Array, node: Array, output: Array, waves: Waves | None, out: Parts
     ) -> None:
         """Add to `out` as `at`, for degree 2, whose second derivatives are the same everywhere."""
-        rate, shares = self._planes
-        value, slope = quadratics(self.eigenvalue, rate, unit)
         if waves is None:
-            waves = self._waves(value, node)
-        for place, (planes, wave) in enumerate(zip(shares, waves, strict=False)):
+            waves = self._waves(self.eigenvalue.quadratic(unit)[0], node)
+        for place, wave in enumerate(waves):
             if wave is not None:
-                own = [share[place] for share in self.shares], planes
-                composed_quadratics(unit, (self.eigenvalue, rate, slope), own, output, wave, out)
-
-    @cached_property
-    def _planes(self) -> tuple[Array, list[Array]]:
-        """Coefficients of λ_k and of the shares, as `composed_quadratics` takes them."""
-        columns = zip(*self.shares, strict=True)
-        return packed(self.eigenvalue), [np.stack([packed(x) for x in own]) for own in columns]
+                own = [share[place] for share in self.shares]
+                composed_quadratics(unit, self.eigenvalue, own, output, wave, out)
 
     def _taylor(self, parts: Parts, node: Array) -> Parts:
         (count, d), rate = parts[1].shape[:2], parts[0][:, : self.count]
@@ -193,11 +178,8 @@ class ModalModel:
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
         values, order = np.empty(len(unit)), np.argsort(output, kind="stable")
-
-        def piece(rows: Array) -> None:
+        for rows in np.array_split(order, -(-len(order) // PIECE) or 1):
             values[rows] = self._value_at(unit[rows], node[rows], output[rows])
-
-        each(piece, np.array_split(order, -(-len(order) // PIECE) or 1))
         return values
 
     def _value_at(self, unit: Array, node: Array, output: Array) -> Array:
@@ -205,13 +187,7 @@ class ModalModel:
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
             parts = self.of_output[o](unit[rows])
-            for place, wave in enumerate(self.waves_alone(parts[:, :n], node[rows]), 1):
+            for place, wave in enumerate(self._waves(parts[:, :n], node[rows]), 1):
                 if wave is not None:
-                    values[rows] += 2 * (parts[:, place * n :][:, :n] * wave).real.sum(1)
+                    values[rows] += 2 * (parts[:, place * n :][:, :n] * wave[0]).real.sum(1)
         return values
-
-    def waves_alone(self, rate: Array, node: Array) -> list[Array | None]:
-        """As `_waves`, without derivatives."""
-        started = self.coefficient.coefficients.any()
-        free = np.exp(rate * self.time[node][:, None]) if started else None
-        return [free, None if self.load is None else self.load.response_alone(rate, node)]

@@ -6,7 +6,6 @@ import numpy as np
 
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.threads import each
 from alphacut.frame.modal.optima import Optima, Response
 
 PIECE = 6000
@@ -29,7 +28,8 @@ def refine(
     """Newton's method in the box on `which`, until none promises more than `small`."""
     size = min(PIECE * 6 // max(lower.size, 6), max(LEAST, -(-len(which) // 2)))
     pieces = np.array_split(which, -(-len(which) // size) or 1)
-    each(lambda piece: _newton(model, optima, piece, lower, upper, small), pieces)
+    for piece in pieces:
+        _newton(model, optima, piece, lower, upper, small)
 
 
 def _newton(

@@ -8,7 +8,6 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
-from alphacut.frame.calculus.threads import each
 from alphacut.frame.modal.optima import Response
 
 NEAR, DECADES = 8, 8.0
@@ -36,22 +35,9 @@ def spread_points(lower: Array, upper: Array, spread: int) -> Array:
     return points
 
 
-def tensor_points(d: int, most: int) -> Array:
-    """Finest grid of extreme Chebyshev points with at most `most`, shape (k^d, d)."""
-    k = int(most ** (1 / d) + 1e-9)
-    if k < 2:
-        return np.zeros((0, d))
-    axis = -np.cos(np.pi * np.arange(k) / (k - 1))
-    return np.array(np.meshgrid(*[axis] * d, indexing="ij")).reshape(d, -1).T
-
-
 def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
     """Values of the model at points (P, d) and the nodes, all unless given, shape (P, T, m)."""
     wanted = slice(None) if nodes is None else nodes
-    found = np.empty((len(points), len(model.time[wanted]), len(model.outputs)))
-
-    def fill(rows: slice) -> None:
-        found[rows] = model.values(points[rows])[:, wanted]
-
-    each(fill, [slice(first, first + 64) for first in range(0, len(points), 64)])
-    return found
+    return np.concatenate(
+        [model.values(points[k : k + 64])[:, wanted] for k in range(0, len(points), 64)]
+    )

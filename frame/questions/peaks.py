@@ -111,21 +111,16 @@ def within_steps(size: Array, between: Array | None) -> Array:
 
 
 def _natures(envelope: Envelope) -> tuple[Nature, ...]:
-    words = {"inner": Nature.ATTAINED, "guaranteed": Nature.GUARANTEED}
-    nature = words.get(envelope.nature, Nature.ESTIMATED)
-    return (nature,) * len(envelope.outputs)
+    return tuple(map(envelope.nature_of, envelope.outputs))
 
 
 def _error(envelope: Envelope) -> Array:
     """Error by which the stated bounds may be short, shape (A, T, m)."""
-    if envelope.error is None or envelope.nature == "guaranteed":
+    if envelope.nature is Nature.GUARANTEED:
         return np.zeros(envelope.lower.shape)
-    return np.asarray(envelope.error)
+    return envelope.error
 
 
 def _inner(envelope: Envelope) -> Ends:
     """Bounds that are attained, NaN where none is known, shape (A, T, m) each."""
-    if envelope.inner_lower is not None and envelope.inner_upper is not None:
-        return Ends(envelope.inner_lower, envelope.inner_upper)
-    error = _error(envelope)
-    return Ends(envelope.lower + error, envelope.upper - error)
+    return envelope.attained

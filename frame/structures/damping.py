@@ -68,11 +68,11 @@ def square_root(operator: Jet, mass: Array) -> Jet:
         found: Array = X @ ((Y @ right @ X) / total) @ Y
         return found
 
-    first = solved(operator.first)
+    first, value = solved(operator.first), (X * omega[:, None, :]) @ Y
+    if not len(operator.second):
+        return Jet(value, first, np.zeros((0, 0, *value.shape)))
     pair = first[:, None] @ first[None, :]
-    return Jet(
-        (X * omega[:, None, :]) @ Y, first, solved(operator.second - pair - pair.swapaxes(0, 1))
-    )
+    return Jet(value, first, solved(operator.second - pair - pair.swapaxes(0, 1)))
 
 
 def _check(squared: Array, ratios: Array) -> None:

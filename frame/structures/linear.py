@@ -122,7 +122,12 @@ def relative_to_ground(system: LinearSystem) -> list[int]:
 
 
 def evaluate(
-    system: LinearSystem, names: Sequence[str], points: Array, *, derivatives: bool
+    system: LinearSystem,
+    names: Sequence[str],
+    points: Array,
+    *,
+    derivatives: bool,
+    bent: bool = True,
 ) -> tuple[Matrices, Jet]:
     """Matrices and observation rows at parameter sets; others keep modal values.
 
@@ -131,10 +136,11 @@ def evaluate(
         names: Uncertain parameters.
         points: Their values, shape (S, d).
         derivatives: Whether to differentiate by `names`.
+        bent: Whether to differentiate twice.
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
-    p = variables(values, [*names, *fixed], names if derivatives else ())
+    p = variables(values, [*names, *fixed], names if derivatives else (), 1 + bent)
     return system.matrices(p), system.observation(p)
 
 

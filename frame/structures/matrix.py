@@ -223,22 +223,20 @@ class MatrixStructure:
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""
         like = next(iter(p.values()))
-        n, samples, d = self.size, like.value.size, like.directions
+        n, samples = self.size, like.value.size
 
         def lifted(factor: Factor | str | float) -> Jet:
             value = _value(factor, p)
-            return (
-                value if isinstance(value, Jet) else Jet.constant(np.full(samples, float(value)), d)
-            )
+            return value if isinstance(value, Jet) else like.like(np.full(samples, float(value)))
 
         def total(terms: Terms) -> Jet:
-            out = Jet.constant(np.zeros((samples, n, n)), d)
+            out = like.like(np.zeros((samples, n, n)))
             for factor, array in terms:
                 out = out + lifted(factor)[:, None, None] * array
             return out
 
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
-        q0, v0 = (Jet.constant(np.tile(x[None, :, None], (samples, 1, 1)), d) for x in start)
+        q0, v0 = (like.like(np.tile(x[None, :, None], (samples, 1, 1))) for x in start)
         pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
         mass, damping, stiffness = (
             total(terms) for terms in (self.mass, self.damping, self.stiffness)
@@ -255,7 +253,7 @@ class MatrixStructure:
         rows = np.zeros((len(self.observed), 2 * self.size))
         for k, row in enumerate(self.observed.values()):
             rows[k, : len(row)] = row
-        return Jet.constant(np.tile(rows, (like.value.size, 1, 1)), like.directions)
+        return like.like(np.tile(rows, (like.value.size, 1, 1)))
 
 
 def _value(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:

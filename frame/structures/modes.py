@@ -8,6 +8,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
+from alphacut.fuzzy.refused import FailedError
 
 
 def state_matrix(m: Matrices) -> Jet:
@@ -15,10 +16,7 @@ def state_matrix(m: Matrices) -> Jet:
     light = inverse(m.mass)
     lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
     n = m.mass.value.shape[-1]
-    upper = Jet.constant(
-        np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape),
-        lower.directions,
-    )
+    upper = lower.like(np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape))
     return concatenate([upper, lower], -2)
 
 
@@ -26,7 +24,7 @@ DOUBLE = 1e-6
 """Distance of two eigenvalues, as a share of their size, below which they count as one."""
 
 
-class ModalError(RuntimeError):
+class ModalError(FailedError):
     """The structure has no smooth set of oscillating modes over the box."""
 
 
@@ -140,64 +138,16 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
     size = values.shape[-1]
     off = ~np.eye(size, dtype=bool)
     weight = np.where(off, 1 / np.where(off & (gap != 0), gap, 1.0), 0.0)
-    G1, G2 = Y @ A.first @ X, Y @ A.second @ X
+    G1, eye = Y @ A.first @ X, np.broadcast_to(np.eye(size), X.shape)
     slope = np.einsum("...kk->...k", G1)
     Z1 = G1 * weight
+    if not len(A.second):
+        none = np.zeros((0, 0, *X.shape))
+        right = X @ Jet(eye, Z1, none)
+        return Jet(values, slope, none[..., 0]), right, inverse(right)
+    G2 = Y @ A.second @ X
     pair = G1[:, None] @ Z1[None, :] - Z1[:, None] * slope[None, :, :, None, :]
     second = G2 + pair + pair.swapaxes(0, 1)
     Z2 = second * weight
-    eye = np.broadcast_to(np.eye(size), Z1.shape[1:])
     right = X @ Jet(eye, Z1, Z2)
     return Jet(values, slope, np.einsum("...kk->...k", second)), right, inverse(right)
-
-
-COUPLED = 1e-11
-"""Largest entry that couples two undamped modes through the damping, over the largest that does
-not, taken for round-off.
-"""
-
-
-@dataclass(frozen=True, eq=False)
-class ClassicalModes:
-    """Outputs Re Σ_k C_k w_k(t), w_k = exp(λ_k t) or its convolution with the load.
-
-    Args:
-        rate: λ_k with Im λ_k > 0, shape (S, n), in 1/s.
-        start: C_k of the initial state, shape (S, n, m).
-        load: C_k of the ground's acceleration, shape (S, n, m).
-    """
-
-    rate: Array
-    start: Array
-    load: Array
-
-
-def classical_modes(matrices: Matrices, rows: Jet) -> ClassicalModes | None:
-    """Modes at S parameter sets, values alone; None where damping couples them.
-
-    Args:
-        matrices: The structure.
-        rows: Observation rows, V = (S, m, 2n).
-    """
-    M, D, K = matrices.mass.value, matrices.damping.value, matrices.stiffness.value
-    below = np.linalg.inv(np.linalg.cholesky(M))
-    above = below.swapaxes(-1, -2)
-    squared, U = np.linalg.eigh(below @ K @ above)
-    shape = above @ U  # Φ with Φᵀ M Φ = I
-    damping = shape.swapaxes(-1, -2) @ D @ shape
-    own = np.einsum("skk->sk", damping)
-    coupled = np.abs(damping - own[:, None] * np.eye(own.shape[-1])).max()
-    oscillation = squared - own**2 / 4
-    if coupled > COUPLED * np.abs(own).max() or not (oscillation > 1e-6 * np.abs(squared)).all():
-        return None
-    fall, turn = -own / 2, np.sqrt(oscillation)
-    rate = fall + 1j * turn
-    n = squared.shape[-1]
-    seen = ((rows.value[..., :n] @ shape) + (rows.value[..., n:] @ shape) * rate[:, None]).swapaxes(
-        -1, -2
-    )
-    onto = shape.swapaxes(-1, -2) @ M
-    x, v = (onto @ matrices.q0.value)[..., 0], (onto @ matrices.v0.value)[..., 0]
-    start = seen * (x - 1j * (v - fall * x) / turn)[..., None]
-    load = seen * (1j * (onto @ matrices.rigid)[..., 0] / turn)[..., None]  # −Γ_k Im(w_k) / ω_k
-    return ClassicalModes(rate, start, load)

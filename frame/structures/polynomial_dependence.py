@@ -15,6 +15,7 @@ import numpy as np
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.refused import FailedError
 
 Box = Mapping[str, tuple[float, float]]
 ROUND_OFF = 1e-17
@@ -23,7 +24,7 @@ that everything is computed in.
 """
 
 
-class UnprovedError(RuntimeError):
+class UnprovedError(FailedError):
     """A property that a proof needs does not hold, or is not known to hold."""
 
 

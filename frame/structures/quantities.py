@@ -101,3 +101,8 @@ OF_STOREY_FRAME = {
 def of_storey_frame(name: str) -> Parameter:
     """A parameter of a storey frame by its name; without unit and range where it is no such."""
     return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_0)?$", "", name), ()))
+
+
+def units_of(outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """SI unit of each output; empty where it is not known."""
+    return tuple(unit if (unit := Output(name).unit) != "SI" else "" for name in outputs)

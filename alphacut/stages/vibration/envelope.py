@@ -50,7 +50,7 @@ def compute(
     if task.certify is not None:
         given["workers"] = workers
     with in_words():
-        return frame.envelope(wanted.model, progress=progress or False, kept=kept, **given)
+        return frame.envelope(wanted.model, progress=progress or False, **given)
 
 
 def arguments(wanted: Structure, task: EnvelopeTask) -> Document:
@@ -60,11 +60,18 @@ def arguments(wanted: Structure, task: EnvelopeTask) -> Document:
         "alpha": task.alpha,
         "duration": task.duration,
         "step": task.step,
-        "method": task.method,
+        "method": named(task),
         "integrator": task.integrator,
         "relative": task.relative and task.certify is None,
         **method_options(task),
     }
+
+
+def named(task: EnvelopeTask) -> str:
+    """The method's name in the library."""
+    if task.method != "modal":
+        return task.method
+    return "proof" if task.certify is not None else "search"
 
 
 @contextmanager
@@ -87,10 +94,10 @@ def in_words() -> Iterator[None]:
 
 def method_options(task: EnvelopeTask) -> Document:
     """Those of the task's options that its method has."""
-    taken = options_of(task.method)
+    taken = options_of(named(task))
     offered = {"order": task.order, "tolerance": task.resolution, "exclude": task.exclude}
     if task.certify is not None:
-        return {"tolerance": task.tolerance, "certify": task.certify}
+        return {"gap": task.certify}
     return {name: value for name, value in offered.items() if name in taken}
 
 

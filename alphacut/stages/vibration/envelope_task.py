@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from alphacut.case.case import Case
 from alphacut.case.checks import forces_only
-from alphacut.frame.methods.modal import FINE
 
+FINE = 8
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 SHARE = 1e-3  # the tolerance where no output is a displacement: of their peaks
 
@@ -55,7 +55,9 @@ class EnvelopeTask:
     @property
     def scheme(self) -> str:
         """Time stepping of a linear structure: integrator, or the method's own."""
-        return self.integrator or ("exact" if self.method in ("auto", "modal") else "midpoint")
+        return self.integrator or (
+            "exact" if self.method in ("auto", "modal", "proof", "search") else "midpoint"
+        )
 
 
 def task_of(

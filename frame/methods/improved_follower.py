@@ -10,25 +10,29 @@ are for; the points spread at the start look for basins independently of any mod
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
-from alphacut.frame.checks.corners import taken_in
-from alphacut.frame.envelope import Envelope, signed_envelope
+from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.held_models import HeldModels, models_at
-from alphacut.fuzzy.progress_bar import Progress
+from alphacut.frame.methods.independent import SAFETY, beyond, parted
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
 
 APART = 100_003
 """Points of the sequence between those that two seeds spread."""
 
 
 @dataclass(frozen=True)
-class BatchFollower:
+class ImprovedFollower:
     """The method and its switches.
 
     Args:
@@ -37,68 +41,62 @@ class BatchFollower:
         spread: Graphs on a spread of points per level that start the search.
         batch: Graphs computed together.
         reach: Trust region of a Taylor model, as a share of the half width of the box.
-        order: Degree κ of the Taylor models, which must be 2.
         contests: How often, when no model promises more, those of neighbouring nodes are asked
             where the optimum jumps in between.
         seed: Which points are spread.
 
     Raises:
-        ValueError: A switch is out of its range.
+        RefusedError: A switch is out of its range.
     """
 
+    name: ClassVar[str] = "improved-graph-follower"
     tolerance: float = 7e-5
     budget: int = 5000
     spread: int = 64
     batch: int = 32
     reach: float = 0.6
-    order: int = 2
-    contests: int = 0
+    contests: int = 1
     seed: int = 0
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
-            raise ValueError(f"tolerance: {self.tolerance:g} is not allowed; it must be positive")
-        if self.order != 2:
-            raise ValueError(
-                f"order: {self.order} is not allowed; the Graph Follower in rounds needs Taylor"
-                " models of degree 2"
-            )
+            raise RefusedError("tolerance", self.tolerance, "a positive number")
         if min(self.budget, self.spread, self.batch) < 1 or not 0 < self.reach <= 2:
-            raise ValueError(
-                f"budget {self.budget}, spread {self.spread}, batch {self.batch}, reach"
-                f" {self.reach:g}: out of range"
-            )
+            given = (self.budget, self.spread, self.batch, self.reach)
+            raise RefusedError("budget, spread, batch, reach", given, "counts; a reach in (0, 2]")
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope, corrected by what the last models still promise.
+        """Envelope of two passes from different points, corrected by what their models promise.
 
-        The error is twice what these models promise, below the tolerance, or above it where the
-        budget ended the search, and by how much the corners of the boxes pass the bounds, which
-        then take them in. The fact "corners" counts these, which need no derivatives.
+        The error is twice what the models still promise and what an independent sample finds
+        beyond the bounds, and twice what one pass found beyond the other. Where neighbouring
+        trajectories part there is none, and the bounds are attained, no more.
         """
-        begun = time.perf_counter()
-        found = self.pursue(flow, progress=progress)
-        bounds, where, missed, corners = taken_in(
-            flow, found.bounds + found.correction, found.where
+        begun, other = time.perf_counter(), replace(self, seed=self.seed + 1)
+        first = self.pursue(flow, progress=share(progress, 0.0, 0.5))
+        second = other.pursue(flow, progress=share(progress, 0.5, 1.0))
+        better = second.bounds > first.bounds
+        bounds = np.where(better, second.bounds, first.bounds)
+        where = np.where(better[..., None], second.where, first.where)
+        promised = np.maximum(first.correction, second.correction) + np.maximum(
+            first.open_gain, second.open_gain
         )
-        promised = np.maximum(found.correction, found.open_gain).max(-1)
-        error = SAFETY * (promised + self.tolerance / 2 * flow.scale) + missed[:, None]
-        facts: dict[str, float | str] = {"gain": self.tolerance, "order": 2, "corners": corners}
-        if found.open_gain.any():
-            facts["reason"] = (
-                f"stopped at the budget of {self.budget} trajectories; models promise"
-                f" {found.open_gain.max():.2g} more"
-            )
-        return signed_envelope(
-            flow,
+        apart = around(np.abs(second.bounds - first.bounds).max(-1))
+        missed, count = beyond(flow, bounds)
+        small = self.tolerance / 2 * flow.scale
+        error = SAFETY * (promised.max(-1) + small + apart + missed[:, None])
+        parts = parted(first.held.models(0, np.s_[:, :, :])[1], bounds[0])
+        notes = (f"stopped at the budget of {self.budget} trajectories",)
+        return flow.envelope(
             bounds,
             where,
-            method="improved-graph-follower",
-            nature="searched",
-            error=error,
-            facts=facts,
-            trajectories=len(found.points),
+            None if parts else error,
+            method=self.name,
+            nature=Nature.ATTAINED if parts else Nature.ESTIMATED,
+            evaluations=len(first.points) + len(second.points) + count,
             seconds=time.perf_counter() - begun,
+            facts={"gain": self.tolerance, "order": 2},
+            notes=notes * bool(first.open_gain.any() or second.open_gain.any()),
         )
 
     def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
@@ -180,10 +178,10 @@ class Pursuit:
         low, at = np.full(shape, -np.inf), np.zeros((*shape, d))
         many, where = np.zeros((levels, *shape)), np.zeros((levels, *shape, d))
         grids = (low, at, low.copy(), at.copy(), many, where, many.copy(), many.copy())
-        held = HeldModels.empty((0,) * (levels > 1) + (-1, 1) * beside, shape, d)
+        held = HeldModels.empty((0,) + (-1, 1) * beside, shape, d)
         return cls(flow, np.zeros((0, d)), *grids, held)
 
-    def enter(self, lower: Array, upper: Array, method: BatchFollower) -> None:
+    def enter(self, lower: Array, upper: Array, method: ImprovedFollower) -> None:
         """Start a level; attained values stay, models are asked anew in the wider box."""
         self.lower, self.upper = lower, upper
         self.tolerance, self.reach = method.tolerance, method.reach
@@ -250,7 +248,7 @@ class Pursuit:
         x = maximise(g, H, low, high)
         return value + gain(g, H, x), points + x
 
-    def proposals(self, method: BatchFollower, count: int) -> Array:
+    def proposals(self, method: ImprovedFollower, count: int) -> Array:
         """Most promising points of every window of time, apart from others, (≤ count, d)."""
         chosen: list[Array] = []
         for window in np.array_split(
@@ -272,10 +270,16 @@ class Pursuit:
         return np.array(chosen)[:count].reshape(-1, len(self.lower))
 
 
+def around(apart: Array) -> Array:
+    """Largest of values (A, T, m) at the nodes near by, and a tenth of the largest of all."""
+    from scipy.ndimage import maximum_filter1d
+
+    near = maximum_filter1d(apart, 2 * (apart.shape[1] // 40) + 1, axis=1)
+    return np.asarray(np.maximum(near, 0.1 * apart.max(1, keepdims=True)))
+
+
 JUMP = 0.05
 """Share of the box's width from which on optima of neighbouring nodes lie in different basins."""
-SAFETY = 2.0
-"""Factor on what the last models promise: the next ones promise again."""
 MOST = 64e6
 """Most numbers of Taylor models computed at a time: 512 MB."""
 TRIES = 40

@@ -1,0 +1,46 @@
+"""What followers may have missed, by trajectories that share nothing with their search."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
+from alphacut.fuzzy.arrays import Array
+
+SAMPLES = 64
+"""Points of a kind on each level."""
+SAFETY = 2.0
+"""Factor on what they find beyond the bounds, and on what models still promise."""
+PARTED = 8.0
+"""Slope along a half width of the box, as a share of the output's range, from which on neighbouring
+trajectories part."""
+
+
+def beyond(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
+    """How far a sample of each level leaves the bounds (A, T, m, 2), shape (A, m), and its size."""
+    found, count = np.zeros((len(bounds), len(flow.outputs))), 0
+    for level, bound in enumerate(bounds):
+        lower, upper = flow.boxes.unit(level)
+        points = (lower + upper) / 2 + (upper - lower) / 2 * sample(len(lower), level)
+        count += len(points)
+        for chunk in np.array_split(points, -(-len(points) // 32)):
+            values = flow.values(chunk)
+            off = np.maximum(values.max(0) - bound[..., 1], -values.min(0) - bound[..., 0])
+            found[level] = np.maximum(found[level], off.max(0))
+    return found, count
+
+
+def sample(d: int, level: int) -> Array:
+    """Points of [−1, 1]^d where extremes may lie: inside, on faces and edges, at corners."""
+    first = [100_003 * (level + 1) + k * SAMPLES for k in range(3)]
+    inside, wide, ends = (chebyshev_points(d, SAMPLES, skip=skip) for skip in first)
+    ends = np.sign(ends) if 2**d > SAMPLES else corners(-np.ones(d), np.ones(d))
+    return np.concatenate([inside, np.clip(2 * wide, -1, 1), ends])
+
+
+def parted(slopes: Array, bounds: Array) -> bool:
+    """Whether trajectories part: slopes (T, m, 2, d) beside the range of the bounds (T, m, 2)."""
+    turn = np.abs(slopes).max((0, 2, 3))
+    width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
+    return bool((turn > PARTED * width).any())

@@ -1,0 +1,75 @@
+"""Envelope of a sample of each box: points of a Sobol sequence, denser towards the faces."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.envelope import Envelope
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
+
+MOST = 16e6
+"""Most numbers of trajectories at a time: 128 MB."""
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Attained bounds of so many trajectories on each level, from a seed.
+
+    Raises:
+        RefusedError: No trajectory is asked for.
+    """
+
+    name: ClassVar[str] = "quasi-monte-carlo"
+    samples: int = 1024
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.samples < 1:
+            raise RefusedError("samples", self.samples, "whole numbers from 1 on")
+
+    def points(self, lower: Array, upper: Array) -> Array:
+        """Points of a box [lower, upper], shape (samples, d)."""
+        from scipy.stats import qmc
+
+        unit = qmc.Sobol(len(lower), rng=np.random.default_rng(self.seed)).random(self.samples)
+        return np.asarray((lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit))
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of all outputs on all levels."""
+        begun, levels = time.perf_counter(), len(flow.boxes.alpha)
+        shape = (levels, len(flow.time), len(flow.outputs), 2)
+        bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
+        at_once = int(np.clip(MOST / (shape[1] * shape[2]), 1, 256))
+        for done, level in enumerate(reversed(range(levels))):
+            if level + 1 < levels:
+                bounds[level], at[level] = bounds[level + 1], at[level + 1]
+            points = self.points(*flow.boxes.unit(level))
+            for chunk in np.array_split(points, -(-len(points) // at_once)):
+                take(flow.values(chunk), chunk, bounds[level], at[level])
+            if progress:
+                progress((done + 1) / levels)
+        return flow.envelope(
+            bounds,
+            at,
+            method=self.name,
+            nature=Nature.ATTAINED,
+            evaluations=levels * self.samples,
+            seconds=time.perf_counter() - begun,
+        )
+
+
+def take(values: Array, points: Array, bounds: Array, at: Array) -> None:
+    """Keep the best of trajectories (S, T, m) at `points` (S, d) in (T, m, 2) and (T, m, 2, d)."""
+    signed = np.stack([-values, values], -1)
+    best = signed.argmax(0)
+    top = np.take_along_axis(signed, best[None], 0)[0]
+    better = top > bounds
+    bounds[better], at[better] = top[better], points[best][better]

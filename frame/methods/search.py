@@ -1,0 +1,220 @@
+"""Search: estimated bounds of linear structures with any number of fuzzy inputs.
+
+1. The polynomials of the modes' eigenvalues and shares that `Proof` uses; with more inputs than six
+   they are quadratics, whose error does not matter: they only lead.
+2. First pass: a sample of the box starts Newton's method for every bound (node, output, side) on
+   the polynomials; what is best at one node is tried at the nodes around.
+3. Exact motions: Newton's method goes on from there with values and gradients of eigen-analyses at
+   the points themselves, so that every bound is attained. The curvature is that of the polynomials,
+   corrected by what the gradients show.
+4. Independent passes: for bounds drawn anew, fresh points, none of them from a pass before, start
+   Newton's method on exact motions. What they find beyond the bounds is taken over, and tried at
+   the nodes around. Passes go on until two after each other gain too little.
+5. Levels are treated from the narrowest box to the widest; what one attains the next attains too.
+
+The error of a bound is what Newton's method still promises, and `UNSEEN` times the gain of the last
+two passes: of its output as a whole, and of the bounds near by where those gained more.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.modal.exact_response import ExactResponse
+from alphacut.frame.modal.first_pass import exchange, first_optima
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.optima import Optima, best_of_few, best_of_pool
+from alphacut.frame.modal.starting_points import fresh_points, trajectories
+from alphacut.frame.structures.linear import frequencies, round_off
+from alphacut.frame.structures.modes import ModalError
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
+
+SMALL = 0.1
+"""Share of the wanted error that Newton's method may leave."""
+QUIET = 0.25
+"""Share of the wanted error that the last two passes may gain."""
+UNSEEN = 4.0
+"""Factor on what they gained."""
+FRESH = 1024
+"""Fresh points of a pass."""
+VALUES = 16e6
+"""Most numbers of their trajectories: 128 MB."""
+DRAWN = 2048
+"""Bounds that the first pass draws; each further one draws twice as many."""
+FEW = (1, 8)
+"""Fresh points out of which the best starts, beside the best of all: the best of many lies too
+often at a corner."""
+ROUNDS = 6
+"""Rounds in which neighbours are tried, at most."""
+ROUGH = 0.3
+"""Error of the polynomials, as a share of an output's peak, above which they have no curvature."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """The method and its options.
+
+    Args:
+        tolerance: Error wanted, in m, or in the unit of the first output where none is a
+            displacement; 1e-4 unless given.
+        budget: Most eigen-analyses that the polynomials are fitted to.
+        passes: Most independent passes.
+        seed: Of all that is drawn.
+
+    Raises:
+        RefusedError: A value is not positive.
+    """
+
+    name: ClassVar[str] = "search"
+    tolerance: float | None = None
+    budget: int = 280
+    passes: int = 8
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for key in ("tolerance", "budget", "passes"):
+            value = getattr(self, key)
+            if value is not None and not value > 0:
+                raise RefusedError(key, value, "a positive number")
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Estimated envelope of all outputs on all levels.
+
+        Raises:
+            ModalError: The structure has no oscillating modes over the box, or is not linear.
+        """
+        begun, tolerance = time.perf_counter(), flow.tolerance(self.tolerance)
+        if not isinstance(flow.flow, LinearFlow):
+            raise ModalError("search: the system is not linear; take the Graph Follower")
+        model = fit_modes(
+            flow.flow, flow.boxes, tolerance=tolerance / 10, budget=self.budget, scale=flow.scale
+        )
+        exact = _exact(model, flow)
+        levels, found = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
+        for done, level in enumerate(reversed(range(levels))):
+            tick = share(progress, done / levels, (done + 1) / levels)
+            within = found[-1][0] if found else None
+            found.append(self._level(exact, *flow.boxes.unit(level), tolerance, within, tick))
+        shape = (levels, len(flow.time), len(flow.outputs), 2)
+        scale = flow.scale[:, None]
+        bounds = np.stack([optima.value for optima, _ in found[::-1]]).reshape(shape) * scale
+        at = np.stack([optima.point for optima, _ in found[::-1]]).reshape(*shape, -1)
+        missed = np.stack([error for _, error in found[::-1]]).reshape(shape) * scale
+        error = np.maximum(missed.max(-1), _rounding(model, np.abs(bounds).max((0, 1, 3))))
+        facts = {
+            "degree": model.degree,
+            "model_error": float((model.error / flow.scale).max()),
+            "search_error": float((missed / scale).max()),
+        }
+        cost = {"evaluations": model.analyses, "seconds": time.perf_counter() - begun}
+        return flow.envelope(
+            bounds, at, error, method=self.name, nature=Nature.ESTIMATED, facts=facts, **cost
+        )
+
+    def _level(
+        self,
+        exact: ExactResponse,
+        lower: Array,
+        upper: Array,
+        tolerance: float,
+        within: Optima | None,
+        tick: Progress,
+    ) -> tuple[Optima, Array]:
+        """Optima in a box, and what they may miss, shape (N,)."""
+        optima = first_optima(exact.model, lower, upper, SMALL * tolerance)
+        every, grid = np.arange(len(optima.value)), _grid(exact, optima)
+        optima.value[:] = -np.inf
+        optima.offer(exact, optima.point.copy(), every)
+        if within is not None:
+            optima.offer(exact, within.point, every)
+        tick(0.2)
+        if not (upper > lower).any():
+            return optima, np.zeros(len(every))
+        box = lower, upper, SMALL * tolerance
+        refine(exact, optima, every, *box)
+        _follow(exact, optima, grid, box)
+        tick(0.5)
+        gains = list[Array]()
+        for count in range(self.passes):
+            before = optima.value.copy()
+            rng = np.random.default_rng((self.seed, count, len(every)))
+            self._pass(exact, optima, box, DRAWN * 2**count, rng)
+            gains.append((optima.value - before).reshape(len(grid), -1))
+            tick(0.5 + 0.5 * (1 - 0.6 ** (count + 1)))
+            if count and max(gain.max() for gain in gains[-2:]) <= QUIET * tolerance:
+                break
+        return optima, optima.left + _missed(gains, exact, QUIET * tolerance).ravel()
+
+    def _pass(
+        self,
+        exact: ExactResponse,
+        optima: Optima,
+        box: tuple[Array, Array, float],
+        count: int,
+        rng: np.random.Generator,
+    ) -> None:
+        """Solve `count` bounds anew from fresh points, and follow what is better."""
+        grid, m = _grid(exact, optima), len(exact.outputs)
+        size = int(np.clip(VALUES / (len(grid) * m), 64, FRESH))
+        pool = fresh_points(rng, *box[:2], size)
+        nodes = np.sort(rng.permutation(len(grid))[: max(1, count // (2 * m))])
+        values = trajectories(exact.model, pool, nodes)
+        rivals = [best_of_pool(pool, values, nodes, 1)[0]]
+        rivals += [best_of_few(pool, values, nodes, few, rng) for few in FEW]
+        improved = np.zeros(len(optima.value), bool)
+        for rival in rivals:
+            own = np.arange(len(rival.value))
+            rival.value[:] = -np.inf
+            rival.offer(exact, rival.point.copy(), own)
+            refine(exact, rival, own, *box)
+            improved[optima.offer(exact, rival.point, grid[nodes].ravel())] = True
+        if improved.any():
+            _follow(exact, optima, grid, box)
+
+
+def _exact(model: ModalModel, flow: UnitFlow) -> ExactResponse:
+    peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
+    return ExactResponse.of(model, flow.scale, bent=not (model.error.max(0) > ROUGH * peak).any())
+
+
+def _grid(exact: ExactResponse, optima: Optima) -> Rows:
+    """Numbers of all bounds, node by node."""
+    return np.arange(len(optima.value)).reshape(len(exact.time), -1)
+
+
+def _follow(
+    exact: ExactResponse, optima: Optima, grid: Rows, box: tuple[Array, Array, float]
+) -> None:
+    """Try at every node what is best near by, and refine it, until nothing improves."""
+    for _ in range(ROUNDS):
+        better = exchange(exact, optima, grid)
+        if not len(better):
+            return
+        refine(exact, optima, better, *box)
+
+
+def _missed(gains: list[Array], exact: ExactResponse, quiet: float) -> Array:
+    """What bounds may miss by the gains (T, 2 m) of the last passes, each as if of all bounds."""
+    last = np.max(gains[-2:], axis=0)
+    by_output = last.reshape(len(last), len(exact.outputs), 2).max((0, 2))
+    return np.asarray(UNSEEN * np.maximum(quiet, np.repeat(by_output, 2)) + 0 * last)
+
+
+def _rounding(model: ModalModel, peak: Array) -> Array:
+    """Least error of trajectories in doubles, given their peaks (m,), shape (T, m)."""
+    rates = np.abs(model.eigenvalue.coefficients[0])
+    largest = max(rates.max(), frequencies(model.flow.system).max())
+    late: Array = 64 * np.finfo(float).eps + round_off(largest**2, rates.min(), model.time)
+    return late[:, None] * peak

@@ -1,0 +1,56 @@
+"""Sums of a load table's series over its windows, compiled by Numba."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from alphacut.fuzzy.arrays import Array, Rows
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def window_series(
+    rate: Array,
+    node: Rows,
+    middle: Array,
+    scale: float,
+    moment: Array,
+    ends: Rows,
+    time: Array,
+    fade: float,
+) -> Array:
+    """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N, n), complex.
+
+    Args:
+        rate: λ, shape (N, n), complex.
+        node: Node of each point, shape (N,).
+        middle: λ about which the series are, shape (n,), complex.
+        scale: Unit of the series' variable, in 1/s.
+        moment: Coefficients at the nodes, shape (T, n, order), complex.
+        ends: Last node of each window but the last, rising.
+        time: Nodes, shape (T,), in s.
+        fade: Time after which nothing is left of a window, in s.
+    """
+    out = np.zeros((3, *rate.shape), np.complex128)
+    order = moment.shape[2]
+    for p in range(len(rate)):
+        for k in range(rate.shape[1]):
+            x = (rate[p, k] - middle[k]) / scale
+            for w in range(-1, len(ends)):
+                end = node[p] if w < 0 else ends[w]
+                tau = time[node[p]] - time[end]
+                if w >= 0 and tau <= 0:
+                    break
+                if tau >= fade:
+                    continue
+                f, g, h = 0j, 0j, 0j  # Horner's scheme, twice differentiated
+                for i in range(order - 1, -1, -1):
+                    h = h * x + g
+                    g = g * x + f
+                    f = f * x + moment[end, k, i]
+                g, h = g / scale, 2 * h / scale**2
+                wave = np.exp(rate[p, k] * tau)
+                out[0, p, k] += wave * f
+                out[1, p, k] += wave * (g + tau * f)
+                out[2, p, k] += wave * (h + 2 * tau * g + tau * tau * f)
+    return out
