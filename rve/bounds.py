@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:

@@ -1,16 +1,18 @@
-"""Result of every model of the cell: the homogenised stress over θ."""
+"""Result of every model of the cell: the homogenised stress over θ, and the constants from it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, shear_modulus
 from alphacut.rve.cell import STRAIN, Cell, square_moduli, square_voigt, with_ratio_errors
-from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,16 +21,13 @@ if TYPE_CHECKING:
 def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
     """Young's modulus (Pa) and Poisson's ratio by the paper's convention, eq. 16.
 
-    A square array is not isotropic: this E is the paper's convention, not a property in every
-        direction.
-
     Args:
         s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa.
         s12: Mean homogenised σ12 under ε12 = 0.01, in Pa.
     """
-    shear, bulk = s12 / STRAIN, s11 / STRAIN  # A and B of eq. 16 solved for its two unknowns
-    nu = (1 - shear / bulk) / 2
-    return shear * (1 + nu), nu
+    moduli = np.array([s11, np.nan, s12 / 2]) / STRAIN
+    young, poisson = plane_constants(moduli, AXES)
+    return float(young), float(poisson)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +39,8 @@ class StressCurve:
         weights: Quadrature weights with f_Θ inside, shape (n,), sum 1.
         s11: σ11 under load 1 at the nodes, shape (n,), in Pa.
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
-        stiffness: The whole planar stiffness at the nodes, Voigt order (11, 22, 12 with 2 ε12),
-            shape (n, 3, 3), in Pa, if known.
+        stiffness: The whole stiffness at the nodes if known, in Voigt order, in Pa: of the plane
+            (11, 22, 12 with 2 ε12), shape (n, 3, 3), or of space, (n, 6, 6).
         error: Declared relative errors of s11 and s12 at the nodes, shape (n, 2), if estimated.
     """
 
@@ -64,18 +63,18 @@ class Homogenised:
 
     Args:
         curve: Homogenised stress over θ.
-        method: Name of the model: prism, slices, table, series or image.
+        method: Name of the model: prism, slices or series.
         solver: Name of the linear solver and its options, or "none".
         unknowns: Unknowns of one linear system after elimination of constraints.
         iterations: Iterations of the linear solver, one number per load.
         seconds: Wall time by stage: mesh, assemble, setup, solve, total, jit.
-        errors: Declared relative errors of the mean moduli by source (space, theta, table): of
-            C11 + C12, C11 − C12, C33 and, where it is known by itself, the ratio of the last two,
-            shape (3,) or (4,), nan for a modulus that was not computed; empty where none were
-            estimated.
+        errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
+            C11 − C12, C33 and, where it is known by itself, the ratio of the last two, shape (3,)
+            or (4,), nan for a modulus that was not computed; empty where none were estimated.
         reason: Why this model and resolution were taken.
         checks: Certificate: name of each property to its measured violation, within its bound.
         cell: What was homogenised.
+        average: What E and ν are of, a name in `anisotropy.AVERAGES`.
     """
 
     curve: StressCurve
@@ -88,7 +87,25 @@ class Homogenised:
     reason: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
     cell: Cell | None = None
-    convention: ClassVar[str] = "eq. 16"
+    average: str = AXES
+
+    def averaged(self, average: str) -> Homogenised:
+        """The same cell with E and ν of another average.
+
+        Raises:
+            RefusedError: There is none of this name, or it needs a plane stiffness not computed.
+        """
+        if average not in AVERAGES:
+            raise RefusedError("average", average, " or ".join(AVERAGES))
+        if average != AXES and self.stiffness is None:
+            cure = "let the model make the whole plane stiffness"
+            raise RefusedError("average", average, f"{AXES} without C11 − C12", cure)
+        return replace(self, average=average)
+
+    @property
+    def convention(self) -> str:
+        """What E and ν are of, in words."""
+        return AVERAGES[self.average]
 
     def __repr__(self) -> str:
         """E and ν with the declared error, the model and its cost."""
@@ -98,29 +115,8 @@ class Homogenised:
             f" relative error of E {self.estimated_error:.2g}, by {self.method}, {cost:.2g} s)"
         )
 
-    def _repr_html_(self) -> str:
-        """The same as a table, for notebooks."""
-        from html import escape
-
-        rows = {
-            f"E of {self.convention}": f"{self.modulus:.7g} Pa",
-            f"ν of {self.convention}": f"{self.poisson:.5g}",
-            "declared relative error of E": f"{self.estimated_error:.2g}",
-            "model": self.method,
-            "why": self.reason,
-        }
-        cells = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items() if v)
-        return f"<table>{cells}</table>"
-
     def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the homogenised stress over θ (Fig. 16).
-
-        Args:
-            axes: Where to draw; a new figure if not given.
-
-        Returns:
-            The axes drawn on.
-        """
+        """Draw the homogenised stress over θ (Fig. 16), on new axes if none are passed."""
         if axes is None:
             from matplotlib import pyplot
 
@@ -132,28 +128,47 @@ class Homogenised:
         return axes
 
     @property
+    def stiffness(self) -> Array | None:
+        """Mean stiffness under f_Θ in the order of the curve's, in Pa, or None."""
+        curve = self.curve
+        if curve.stiffness is None:
+            return None
+        return np.tensordot(curve.weights, curve.stiffness, axes=1)
+
+    @property
+    def moduli(self) -> Array:
+        """Mean C11 + C12, C11 − C12 (nan where not computed) and C33, shape (3,), in Pa."""
+        if self.stiffness is not None:
+            return square_moduli(self.stiffness)
+        s11, s12 = self.curve.mean
+        return np.array([s11, np.nan, s12 / 2]) / STRAIN
+
+    def constants_of(self, moduli: Array) -> Array:
+        """E in Pa and ν from the three moduli, shape (2,)."""
+        return plane_constants(moduli, self.average)
+
+    def shear_of(self, moduli: Array) -> float:
+        """Shear modulus of the average from the three moduli, in Pa."""
+        return float(shear_modulus(moduli, self.average))
+
+    @property
     def modulus(self) -> float:
-        """Effective Young's modulus of eq. 16, in Pa."""
-        return effective_modulus(*self.curve.mean)[0]
+        """Young's modulus E of the average, in Pa."""
+        return float(self.constants_of(self.moduli)[0])
 
     @property
     def poisson(self) -> float:
-        """Effective Poisson's ratio of eq. 16."""
-        return effective_modulus(*self.curve.mean)[1]
+        """Poisson's ratio ν of the average."""
+        return float(self.constants_of(self.moduli)[1])
 
     @property
-    def stiffness(self) -> Array | None:
-        """Mean planar stiffness under f_Θ, Voigt order, shape (3, 3), in Pa, or None."""
-        curve = self.curve
-        return (
-            None
-            if curve.stiffness is None
-            else np.tensordot(curve.weights, curve.stiffness, axes=1)
-        )
+    def shear(self) -> float:
+        """Shear modulus of the average, in Pa: G_T of fibres."""
+        return self.shear_of(self.moduli)
 
     @property
     def modulus_errors(self) -> Array:
-        """Declared relative errors of the mean C11 + C12, C11 − C12 and C33, shape (3,).
+        """Declared relative errors of the three mean moduli, shape (3,).
 
         All sources together; nan where unknown.
         """
@@ -169,9 +184,19 @@ class Homogenised:
         """Declared relative errors of the three moduli and of the ratio, shape (4,)."""
         if not self.errors:
             return np.full(4, np.nan)
-        found = np.prod([1 + error for error in self.errors.values()], axis=0) - 1
-        propagated = with_ratio_errors(found[:3])
-        return np.minimum(found, propagated) if found.size == 4 else propagated
+        errors = np.prod([1 + error for error in self.errors.values()], axis=0) - 1
+        propagated = with_ratio_errors(errors[:3])
+        return np.minimum(errors, propagated) if errors.size == 4 else propagated
+
+    def error_of(self, function: Callable[[Array], Array | float]) -> Array:
+        """Declared absolute error of a function of the three moduli, of its shape.
+
+        A modulus that was not computed must not matter to the function.
+        """
+        return spread(function, self.moduli, self._known_errors(self.modulus_errors))
+
+    def _known_errors(self, errors: Array) -> Array:
+        return np.where(np.isnan(self.moduli), 0.0, errors)
 
     @property
     def estimated_error(self) -> float:
@@ -181,9 +206,14 @@ class Homogenised:
     @property
     def error(self) -> dict[str, float]:
         """Declared relative error of E by source; their sum is `estimated_error`."""
-        shares = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
+        shares = {name: self._error_of_modulus(part[:3]) for name, part in self.errors.items()}
         scale = self.estimated_error / (sum(shares.values()) or 1.0)
         return {name: scale * share for name, share in shares.items()}
+
+    @property
+    def poisson_error(self) -> float:
+        """Declared absolute error of ν; nan where none was made."""
+        return float(self.error_of(lambda moduli: self.constants_of(moduli)[1]))
 
     @property
     def largest_error(self) -> float:
@@ -196,21 +226,24 @@ class Homogenised:
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
 
     @property
-    def poisson_error(self) -> float:
-        """Declared absolute error of ν; nan where none was made."""
-        means, errors = np.array(self.curve.mean), self.modulus_errors[[0, 2]]
-        return float(spread(lambda s: effective_modulus(*s)[1], means, errors))
+    def shear_ratio(self) -> tuple[float, float]:
+        """Shear modulus along the diagonals over that along the axes, and its declared error.
+
+        Both moduli come from one discretisation and err alike, so that the ratio is surer than
+        they.
+        """
+        ratio = float(self.moduli[1] / (2 * self.moduli[2]))
+        return ratio, abs(ratio) * self.ratio_error
 
     def _error_of_modulus(self, errors: Array) -> float:
         """Relative error of E from those of the moduli."""
         modulus = self.modulus
-        means = np.array(self.curve.mean)
 
-        def ratio(stresses: Array) -> Array:
-            other = effective_modulus(*stresses)[0]
+        def ratio(moduli: Array) -> Array:
+            other = float(self.constants_of(moduli)[0])
             return np.array([other / modulus, modulus / other if other > 0 else np.inf])
 
-        return float(spread(ratio, means, errors[[0, 2]]).max())
+        return float(spread(ratio, self.moduli, self._known_errors(errors)).max())
 
 
 def spread(function: Callable[[Array], Array | float], values: Array, errors: Array) -> Array:
@@ -234,18 +267,13 @@ def spread(function: Callable[[Array], Array | float], values: Array, errors: Ar
     return np.asarray(np.max(changes, axis=0))
 
 
-def relative(value: float, reference: float) -> float:
-    """|value − reference| / |reference|."""
-    return float(np.abs(value - reference) / np.abs(reference))
-
-
 def error_of_means(result: Homogenised) -> Array:
     """Absolute errors of E (Pa), ν and the mean stresses s11 and s12 (Pa), shape (4,).
 
     They are nan where none were made.
     """
-    stresses = spread(np.asarray, np.array(result.curve.mean), result.modulus_errors[[0, 2]])
-    return np.array([result.estimated_error * result.modulus, result.poisson_error, *stresses])
+    s11, _, s12 = np.abs([result.curve.mean[0], 0.0, result.curve.mean[1]]) * result.modulus_errors
+    return np.array([result.estimated_error * result.modulus, result.poisson_error, s11, s12])
 
 
 def error_of_stiffness(result: Homogenised, function: Callable[[Array], Array | float]) -> Array:
@@ -261,11 +289,9 @@ def error_of_stiffness(result: Homogenised, function: Callable[[Array], Array | 
     Returns:
         Of the function's shape, nan where no error was made.
     """
-    stiffness = np.asarray(result.stiffness)
-    moduli = square_moduli(stiffness)
 
     def of_moduli(values: Array) -> Array:
         return np.asarray(function(square_voigt(*values)))
 
-    uneven = abs(np.asarray(function(stiffness)) - of_moduli(moduli))
-    return np.asarray(uneven + spread(of_moduli, moduli, result.modulus_errors))
+    uneven = abs(np.asarray(function(np.asarray(result.stiffness))) - of_moduli(result.moduli))
+    return np.asarray(uneven + result.error_of(of_moduli))

@@ -11,7 +11,7 @@ from alphacut.io.problem import Problem
 
 SOURCES = tuple(f"cell.{name}" for name in PICTURES)
 OF_PARTICLE = ("cell.particles", "cell.matrix_", "cell.inclusion_", "radius.", "mesh.", "response.")
-OF_SAMPLES = tuple(f"modulus.{key}" for key in ("method", "plan", "tolerance", "average"))
+OF_SAMPLES = tuple(f"modulus.{key}" for key in ("method", "plan", "tolerance"))
 
 
 def phase_count(given: Picture) -> int:

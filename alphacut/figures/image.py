@@ -1,4 +1,4 @@
-"""An image, the error of its fields pixel by pixel, and the proved bounds of E."""
+"""An image and the proved bounds of its E."""
 
 from __future__ import annotations
 
@@ -14,33 +14,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SMALLEST = 1e-6  # error drawn, over the largest
-
 
 def image(found: xarray.Dataset) -> Figure:
-    """Phases, constitutive error, α-cuts of E."""
-    drawn, first = figure(height=5.0)
+    """Phases and α-cuts of E."""
+    drawn, first = figure(height=3.0)
     first.remove()
-    grid = drawn.add_gridspec(2, 2, height_ratios=(1, 0.7), hspace=0.25)
-    phases(drawn.add_subplot(grid[0, 0]), found)
-    errors(drawn.add_subplot(grid[0, 1]), found)
-    cuts(drawn.add_subplot(grid[1, :]), found)
+    grid = drawn.add_gridspec(1, 2)
+    phases(drawn.add_subplot(grid[0]), found)
+    cuts(drawn.add_subplot(grid[1]), found)
     return drawn
 
 
 def phases(axes: Axes, found: xarray.Dataset) -> None:
     """The number of each pixel's phase as grey."""
     plane(axes, "phases").imshow(found["phase"].values, origin="lower", cmap="Greys_r")
-
-
-def errors(axes: Axes, found: xarray.Dataset) -> None:
-    """The logarithm of the constitutive error over its largest value."""
-    import matplotlib.pyplot as plt
-
-    values = found["gap"].values
-    values = np.log10(np.maximum(values / values.max(), SMALLEST))
-    shown = plane(axes, "error of the fields, log10").imshow(values, origin="lower", cmap="magma")
-    plt.colorbar(shown, ax=axes, shrink=0.8)
 
 
 def plane(axes: Axes, title: str) -> Axes:

@@ -9,8 +9,6 @@ from alphacut.figures.captions import core, in_words, widest
 from alphacut.io.files import Document
 from alphacut.io.units import fixed
 from alphacut.report.tables import code, paragraphs, section, sentence, table
-from alphacut.rve.anisotropy import shear_ratio_in_words
-from alphacut.stages.image.document import interval
 from alphacut.stages.material import response
 
 
@@ -130,15 +128,9 @@ def image(found: Document, drawn: Markup) -> Markup:
         cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], cuts["nature"], strict=True
     )
     rows = [(f"{a:g}", fixed(low, 4), fixed(high, 4), nature) for a, low, high, nature in ends]
-    turned = (found["directions_E_GPa"][end] for end in ("least", "greatest"))
-    grains, least, greatest = map(interval, (found["grains_E_GPa"], *turned))
-    level = f"over the inputs at α = {cuts['alpha'][-1]:g}"
     words = paragraphs(
         "Plane strain: every section of the material is the image, as with fibres; E is that of an"
-        " isotropic solid with its plane bulk and shear moduli, not E_T across the fibres. If the"
-        f" particles are grains, the Hashin–Shtrikman interval of E is {grains} {level}."
-        f" The plane-strain Young's modulus of the softest direction lies in {least}, of the"
-        f" stiffest in {greatest} {level}.",
+        " isotropic solid with its plane bulk and shear moduli, not E_T across the fibres.",
     )
     widths = [
         (row["source"], f"{row['width_GPa']:.3g}", f"{row['share']:.1%}", row["cure"])
@@ -157,7 +149,8 @@ def image(found: Document, drawn: Markup) -> Markup:
 def isotropy(found: Document) -> str:
     """Sentence on the array's anisotropy; empty where it was not computed."""
     ratio = found.get("shear_ratio")
-    return "" if ratio is None else sentence(shear_ratio_in_words(float(ratio), meaning(found)))
+    words = "shear modulus along the diagonals over that along the axes"
+    return "" if ratio is None else sentence(f"{words}: {float(ratio):.3f}")
 
 
 def stress(found: Document, drawn: Markup) -> Markup:

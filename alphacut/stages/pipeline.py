@@ -7,7 +7,6 @@ from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from shutil import rmtree
 from typing import TYPE_CHECKING
 
 from alphacut.case.case import Case
@@ -147,18 +146,16 @@ class Chain:
     def image(self) -> xarray.Dataset:
         """The proved bounds of the image's modulus, in image.nc."""
         picture = self.case.picture
-        inputs = {"case": picture, "alpha": self.case.modulus.alpha}
+        wanted = self.case.modulus
+        inputs = {"case": picture, "alpha": wanted.alpha, "average": wanted.average}
         files = self.case.digests(picture)
         key = fingerprint({**inputs, "files": files}, ("stochastic", "rve", "fuzzy"))
 
         def compute(path: Path) -> None:
-            kept = self.file("image.partial")
-            if self.fresh:
-                rmtree(kept, ignore_errors=True)
             with progress("Image", quiet=self.quiet) as tick:
                 study = study_of(self.case)
-                found = bounds.compute(study, progress=tick, kept=kept)
-            document.write(found, path, attributes(self.case.text_of_file, key), kept)
+                found = bounds.compute(study, progress=tick)
+            document.write(found, path, attributes(self.case.text_of_file, key))
 
         return self.stored("image.nc", key, compute)
 

@@ -7,14 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError
+from alphacut.rve.anisotropy import AXES, shear_modulus
 from alphacut.rve.cell import square_moduli
 from alphacut.rve.image.fields.energy import SAFETY, UNIT
-from alphacut.stochastic.theta.truncated_normal import Array
+
+Ends = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessBounds:
     """Lower ≤ C ≤ upper as quadratic forms of the mean strain.
+
+    The moduli C11 + C12, C11 − C12 and C33 of the square part are such forms, so that those of the
+    ends bound them, and with them whatever rises in each of the three.
 
     Args:
         lower: Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa.
@@ -30,77 +37,75 @@ class StiffnessBounds:
         return float(eigh(self.upper, self.lower, eigvals_only=True)[-1] - 1)
 
     @property
-    def bulk(self) -> tuple[float, float]:
-        """Bounds of B = (C11 + C22)/2 + C12, in Pa, the energy of equal strains."""
-        return _form(self.lower, EQUAL), _form(self.upper, EQUAL)
+    def bulk(self) -> Ends:
+        """Bounds of the plane-strain bulk modulus K_T = (C11 + C12)/2, in Pa."""
+        low, high = (float(square_moduli(end)[0]) / 2 for end in (self.lower, self.upper))
+        return low - 2 * self._rounding, high + 2 * self._rounding
 
-    @property
-    def shear(self) -> tuple[float, float]:
-        """Bounds of A = 2 C1212, in Pa."""
-        return 2 * float(self.lower[2, 2]), 2 * float(self.upper[2, 2])
-
-    @property
-    def modulus(self) -> tuple[float, float]:
-        """Bounds of Young's modulus of eq. 16, E = 3 A/2 − A²/(2 B), in Pa.
-
-        E rises with B, and with A as far as A = 3/2 B.
-        """
-        (softest, stiffest), (least, most) = self.shear, self.bulk
-        low = min(_young(softest, least), _young(stiffest, least))
-        high = _young(float(np.clip(1.5 * most, softest, stiffest)), most)
-        slack = 16 * UNIT * stiffest * (1.5 + stiffest / (2 * least))
+    def shear(self, average: str = AXES) -> Ends:
+        """Bounds of the shear modulus G_T of an average, in Pa."""
+        ends = (square_moduli(end) for end in (self.lower, self.upper))
+        low, high = (float(shear_modulus(moduli, average)) for moduli in ends)
+        slack = 0.0 if average == AXES else 4 * self._rounding
         return low - slack, high + slack
 
-    def require_rising(self, cure: str) -> None:
-        """Raise ValueError where E may fall with A, for what rests on E rising with both."""
-        if not (steepest := self.shear[1] / self.bulk[0]) < 1.5:
-            what = f"A, twice the shear modulus, may be {steepest:.3g} times the bulk modulus B"
-            raise ValueError(f"{what}, and from 1.5 times on E of eq. 16 falls as A rises: {cure}")
+    def young(self, average: str = AXES) -> Ends:
+        """Bounds of Young's modulus of an average, E = 3 G − G²/K, in Pa.
 
-    @property
-    def relative_error(self) -> Array:
-        """Errors of C11 + C12, C11 − C12 and C33 of the middle of the bounds, shape (3,).
-
-        Each is a quadratic form: the true one lies from middle/(1 + error) to middle·(1 + error).
+        E rises with K, and with G as far as G = 3/2 K.
         """
-        lower, upper = square_moduli(self.lower), square_moduli(self.upper)
-        return np.asarray((lower + upper) / 2 / lower - 1)
+        (softest, stiffest), (least, most) = self.shear(average), self.bulk
+        turn = float(np.clip(1.5 * most, softest, stiffest))
+        low = min(
+            _young(shear, least) - _young_rounding(shear, least) for shear in (softest, stiffest)
+        )
+        return low, _young(turn, most) + _young_rounding(turn, most)
+
+    def poisson(self, average: str = AXES) -> Ends:
+        """Bounds of Poisson's ratio of an average, ν = (1 − G/K)/2."""
+        (softest, stiffest), (least, most) = self.shear(average), self.bulk
+        low, high = stiffest / least, softest / most
+        return (1 - low) / 2 - UNIT * (1 + low), (1 - high) / 2 + UNIT * (1 + high)
 
     def contains(self, stiffness: Array) -> bool:
         """True if a symmetric stiffness, shape (3, 3), lies between the bounds."""
-        return bool(
-            np.linalg.eigvalsh(stiffness - self.lower)[0] >= 0
-            and np.linalg.eigvalsh(self.upper - stiffness)[0] >= 0
-        )
+        ends = stiffness - self.lower, self.upper - stiffness
+        return all(bool(np.linalg.eigvalsh(end)[0] >= 0) for end in ends)
+
+    @property
+    def _rounding(self) -> float:
+        return UNIT * float(np.abs(self.upper).max())
 
 
-EQUAL = np.array([1.0, 1.0, 0.0])
+def _young(shear: float, bulk: float) -> float:
+    return 3 * shear - shear * shear / bulk
 
 
-def _young(a: float, b: float) -> float:
-    return 1.5 * a - a * a / (2 * b)
-
-
-def _form(stiffness: Array, strain: Array) -> float:
-    return float(strain @ stiffness @ strain) / 2
+def _young_rounding(shear: float, bulk: float) -> float:
+    return 2 * UNIT * (3 * shear + shear * shear / bulk)
 
 
 def inverse_below(matrix: Array) -> Array:
-    """Matrix below the inverse of every symmetric matrix up to the given one, shape (…, 3, 3).
+    """Matrix below the inverse of every symmetric matrix up to the one passed, shape (…, 3, 3).
 
     With X the computed inverse and R = I − X·matrix, the true one differs from X by at most
     ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
+
+    Raises:
+        FailedError: The matrix is singular to rounding.
     """
     inverse = np.linalg.inv(matrix)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2
-    size = len(matrix[0]) if matrix.ndim == 2 else matrix.shape[-1]
-    residual = np.abs(np.eye(size) - inverse @ matrix) + (size + 2) * UNIT * (
-        np.abs(inverse) @ np.abs(matrix) + np.eye(size)
-    )
-    gap = residual.sum(axis=-1).max(axis=-1)
+    gap = residual_above(inverse, matrix).sum(axis=-1).max(axis=-1)
     if not np.all(gap < 0.5):
-        raise ValueError(
-            "a bound of the compliance is singular to rounding; lower the contrast of the phases"
-        )
+        what = "a bound of the compliance is singular to rounding"
+        raise FailedError(what, "lower the contrast of the phases")
     error = SAFETY * gap / (1 - gap) * np.abs(inverse).sum(axis=-1).max(axis=-1)
-    return np.asarray(inverse - error[..., None, None] * np.eye(size))
+    return np.asarray(inverse - error[..., None, None] * np.eye(matrix.shape[-1]))
+
+
+def residual_above(inverse: Array, matrix: Array) -> Array:
+    """Bound of the magnitudes of I − inverse·matrix, whatever the order of the sums."""
+    size = matrix.shape[-1]
+    rest = np.abs(np.eye(size) - inverse @ matrix)
+    return np.asarray(rest + size * SAFETY * UNIT * (np.abs(inverse) @ np.abs(matrix)))

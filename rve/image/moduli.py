@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
 LEAST, GREATEST = 1e-60, 1e60  # Pa; products of four moduli must be numbers
-SOFTEST = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a given E
+SOFTEST = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a fixed E
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class PlaneModuli:
         shear: Shear modulus G, in Pa, of the same range.
 
     Raises:
-        ValueError: A modulus lies outside its range.
+        RefusedError: A modulus lies outside its range.
     """
 
     bulk: float
@@ -32,26 +32,20 @@ class PlaneModuli:
     def __post_init__(self) -> None:
         for name, value in (("plane-strain bulk", self.bulk), ("shear", self.shear)):
             if not LEAST < value < GREATEST:
-                raise ValueError(
-                    f"the {name} modulus of a phase is {value:g} Pa; it must lie inside"
-                    f" ({LEAST:g}, {GREATEST:g}) Pa"
-                )
+                allowed = f"values in ({LEAST:g}, {GREATEST:g}) Pa"
+                raise RefusedError(f"{name} modulus of a phase", f"{value:g} Pa", allowed)
 
     @classmethod
     def of_young(cls, modulus: float, poisson: float) -> PlaneModuli:
         """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5)."""
         if not -1 < poisson < 0.5:
-            raise ValueError(
-                f"Poisson's ratio of a phase is {poisson:g}; it must lie inside (-1, 0.5)"
-            )
+            raise RefusedError("Poisson's ratio of a phase", poisson, "values in (-1, 0.5)")
         return cls.of_bulk(modulus / (3 * (1 - 2 * poisson)), modulus / (2 * (1 + poisson)))
 
     @classmethod
     def of_bulk(cls, bulk: float, shear: float) -> PlaneModuli:
-        """From the bulk modulus K of three dimensions and the shear modulus, in Pa."""
-        if not bulk > 0:
-            raise ValueError(f"the bulk modulus of a phase is {bulk:g} Pa; it must be positive")
-        return cls(bulk + shear / 3, shear)
+        """From the bulk modulus K of three dimensions, positive, and the shear modulus, in Pa."""
+        return cls(bulk + shear / 3 if bulk > 0 else bulk, shear)
 
     @property
     def stiffness(self) -> Array:
@@ -71,7 +65,7 @@ class ModuliInterval:
             fuzzy Poisson's ratio).
 
     Raises:
-        ValueError: The ends are the wrong way round.
+        RefusedError: The ends are the wrong way round.
     """
 
     lower: PlaneModuli
@@ -80,7 +74,7 @@ class ModuliInterval:
 
     def __post_init__(self) -> None:
         if not (self.lower.bulk <= self.upper.bulk and self.lower.shear <= self.upper.shear):
-            raise ValueError("the interval of a phase's moduli runs backwards")
+            raise RefusedError("upper moduli of a phase", self.upper, f"{self.lower} or more")
 
     @classmethod
     def crisp(cls, moduli: PlaneModuli) -> ModuliInterval:
@@ -98,35 +92,3 @@ class ModuliInterval:
         )
         upper = PlaneModuli(max(bulks), PlaneModuli.of_young(stiff, low).shear)
         return cls(lower, upper, attained=low == high)
-
-
-def grain_modulus(
-    fractions: Sequence[float], softest: Sequence[PlaneModuli], stiffest: Sequence[PlaneModuli]
-) -> tuple[float, float]:
-    """Bounds of Young's modulus of an isotropic solid of grains, in Pa.
-
-    An image read as plane strain is the section of a prismatic material: fibres. If its particles
-    are grains, this interval bounds what the solid can be (Hashin and Shtrikman 1963; Walpole 1966
-    where the phases have no order).
-
-    Args:
-        fractions: Share of each phase, sum 1.
-        softest: Least moduli of each phase.
-        stiffest: Greatest moduli of each phase.
-    """
-    ends = []
-    for phases, pick in ((softest, min), (stiffest, max)):
-        pairs = [(p.bulk - p.shear / 3, p.shear) for p in phases]
-        bulk, shear = pick(k for k, _ in pairs), pick(g for _, g in pairs)
-        about_bulk = 4 / 3 * shear
-        about_shear = shear * (9 * bulk + 8 * shear) / (6 * (bulk + 2 * shear))
-        k, g = (
-            1 / sum(f / (value + around) for f, value in zip(fractions, values, strict=True))
-            - around
-            for values, around in (
-                ([k for k, _ in pairs], about_bulk),
-                ([g for _, g in pairs], about_shear),
-            )
-        )
-        ends.append(9 * k * g / (3 * k + g))
-    return ends[0], ends[1]

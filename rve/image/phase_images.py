@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.moduli import ModuliInterval
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 @dataclass(frozen=True)

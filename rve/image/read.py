@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
-PLANE_MODES = {"1": 1, "L": 8, "I;16": 16, "I;16B": 16, "I;16L": 16, "I": 32, "F": 32}
+PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 BYTES_PER_PIXEL = 1400  # of both sides together, measured at 1024 × 1024
-EIGHT_BITS = 255
 
 
 def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
@@ -24,20 +24,16 @@ def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
         square: Refuse a file that says that its pixels are not square.
 
     Raises:
-        ValueError: The file is no plane grey image, holds no numbers, or is too large for memory.
+        RefusedError: The file is no plane grey image, holds no numbers, or is too large for memory.
     """
     values = _array(path) if path.suffix == ".npy" else _picture(path, division, square)
-    if values.ndim != 2 or min(values.shape) < 2:
-        raise ValueError(
-            f"{path.name} has the shape {values.shape}; it takes one plane of 2 × 2 pixels or more"
-        )
+    if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
+        what = f"{values.dtype} of shape {values.shape}"
+        raise RefusedError(path.name, what, "one plane of 2 × 2 numbers or more")
     require_memory(values.shape[0], values.shape[1], division)
-    if values.dtype.kind not in "buif":
-        raise ValueError(f"{path.name} holds {values.dtype}; it takes numbers")
     if not np.isfinite(values).all():
-        raise ValueError(
-            f"{path.name} holds {int((~np.isfinite(values)).sum())} values that are not finite"
-        )
+        count = int((~np.isfinite(values)).sum())
+        raise RefusedError(path.name, f"with {count} values that are not finite", "numbers")
     return np.ascontiguousarray(values[::-1])
 
 
@@ -46,7 +42,7 @@ def _array(path: Path) -> Array:
         # mapped: one too large for memory must come as far as the question of how large it is
         return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
     except (ValueError, EOFError) as error:
-        raise ValueError(f"{path.name} cannot be read as a NumPy array: {error}") from error
+        raise RefusedError(path.name, f"unreadable ({error})", "a NumPy array") from error
 
 
 def _picture(path: Path, division: int, square: bool) -> Array:
@@ -61,45 +57,34 @@ def _picture(path: Path, division: int, square: bool) -> Array:
             require_memory(picture.height, picture.width, division)
             return np.asarray(picture)
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise ValueError(f"{path.name} cannot be read as an image: {error}") from error
+        raise RefusedError(path.name, f"unreadable ({error})", "an image") from error
 
 
 def _require_plane(path: Path, mode: str, frames: int) -> None:
-    """Refuse palettes, several channels, several pages."""
-    if mode == "P":
-        raise ValueError(
-            f"{path.name} has a palette: its numbers are colours, not grey values; "
-            "save it as a grey image"
-        )
-    if mode not in PLANE_MODES:
-        raise ValueError(
-            f"{path.name} has several channels ({mode}); save the one that tells the phases as grey"
-        )
-    if frames > 1:
-        raise ValueError(f"{path.name} has {frames} pages; save the one that is meant")
+    """Refuses palettes, several channels, several pages."""
+    if mode not in PLANE_MODES or frames > 1:
+        what = f"of mode {mode} with {frames} pages"
+        raise RefusedError(path.name, what, "one page of grey values", "save the one that is meant")
 
 
 def _require_square(path: Path, resolution: tuple[float, float] | None) -> None:
     if resolution and abs(float(resolution[0]) / float(resolution[1]) - 1) > 0.01:
-        raise ValueError(
-            f"{path.name} says that its pixels are not square, {float(resolution[0]):g} by "
-            f"{float(resolution[1]):g} per inch; give cell.pixel = [width, height]"
-        )
+        what = f"of pixels {float(resolution[0]):g} by {float(resolution[1]):g} per inch"
+        raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
 
 
 def require_memory(rows: int, columns: int, division: int) -> None:
-    """Refuse an image whose solution cannot fit into this machine's memory.
+    """Refuses an image whose solution cannot fit into this machine's memory.
 
     Raises:
-        ValueError: It says how much is needed, and how large a window would fit.
+        RefusedError: It says how much is needed, and how large a piece would fit.
     """
     needed, have = memory(rows, columns, division)
     if needed > have:
         side = int((have / BYTES_PER_PIXEL / division**2) ** 0.5)
-        raise ValueError(
-            f"{rows} × {columns} pixels divided by {division} need about {needed / 1e9:.0f} GB of "
-            f"memory, this machine has {have / 1e9:.0f}; crop a window of {side} × {side} pixels"
-        )
+        what = f"{rows} × {columns} pixels divided by {division}, about {needed / 1e9:.0f} GB"
+        allowed = f"up to {have / 1e9:.0f} GB of memory"
+        raise RefusedError("image", what, allowed, f"crop a piece of {side} × {side} pixels")
 
 
 def memory(rows: int, columns: int, division: int) -> tuple[int, int]:
@@ -109,29 +94,21 @@ def memory(rows: int, columns: int, division: int) -> tuple[int, int]:
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:
-    """Refuse thresholds that leave a phase without a pixel, whatever their value in the interval.
+    """Refuses thresholds that leave a phase without a pixel, whatever their value in the interval.
 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Least and greatest value of each.
 
     Raises:
-        ValueError: A threshold lies outside the grey values, a phase is empty, or the threshold is
-            one of 8 bits for 16.
+        RefusedError: A threshold lies outside the grey values, or a phase is empty.
     """
     low, high = float(grey.min()), float(grey.max())
-    told = f"the grey values lie from {low:g} to {high:g}"
-    if low == high:
-        raise ValueError(f"the image has one grey value, {low:g}, so one phase")
     for least, greatest in thresholds:
         if not (low < least and greatest <= high):
             span = f"{least:g}" if least == greatest else f"[{least:g}, {greatest:g}]"
-            raise ValueError(f"the threshold {span} is outside: {told}")
-    top = thresholds[-1][1]
-    if grey.dtype == np.uint16 and top <= EIGHT_BITS < high:
-        raise ValueError(f"the threshold {top:g} is one of 8 bits, the image has 16: {told}")
+            raise RefusedError("threshold", span, f"grey values of the image, {low:g} to {high:g}")
     for (_, before), (after, _) in pairwise(thresholds):
         if not ((grey >= before) & (grey < after)).any():
-            why = told if before < after else "they must rise, their supports apart"
-            pair = f"{before:g} and {after:g}"
-            raise ValueError(f"no pixel lies between the thresholds {pair}: {why}")
+            what = f"{before:g} and {after:g}"
+            raise RefusedError("threshold", what, "rising values with pixels between them")

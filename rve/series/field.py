@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_sums
 from alphacut.rve.series.multipoles import LOADS, MOST_HARMONICS, Contrast, family, multipoles
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.stochastic.theta.truncated_normal import Array
 
 Complex = NDArray[np.complex128]
 _TERMS = 60  # of the Taylor series of the far images; each is at most 0.48 of the one before

@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.special import gammaln, zeta
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
 
 AREA = 4.0
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice

@@ -11,6 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.stiffness import square_stiffness
@@ -18,7 +19,6 @@ from alphacut.rve.settings import require_accuracy, require_parts, require_point
 from alphacut.rve.slices.curve import certified, mean_errors, with_errors
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 @dataclass(frozen=True)

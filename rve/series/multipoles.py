@@ -28,9 +28,9 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.special import gammaln
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_images, lattice_sums
-from alphacut.stochastic.theta.truncated_normal import Array
 
 MOST_HARMONICS = 160  # per potential and load; reaches r = 0.999
 LOADS = ("hydrostatic", "deviator", "shear")

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.bounds import harmonic_about
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.cubic import cubic_voigt
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def bulk_and_shear(phase: Phase) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
 
 MODULI = ("K", "(C11-C12)/2", "C44")
 
@@ -53,11 +53,3 @@ def young_along(moduli: Array) -> Array:
     bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
     along = [9 * bulk * g / (3 * bulk + g) for g in (deviator, shear)]
     return np.stack(along, axis=-1)
-
-
-def cubic_constants(moduli: Array) -> Array:
-    """E1 … E3, ν12, ν13, ν23, G12, G13, G23 from K, (C11 − C12)/2 and C44, shape (9,)."""
-    bulk, deviator, shear = moduli
-    young = 9 * bulk * deviator / (3 * bulk + deviator)
-    poisson = (3 * bulk - 2 * deviator) / (6 * bulk + 2 * deviator)
-    return np.repeat([young, poisson, shear], 3)

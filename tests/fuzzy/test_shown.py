@@ -40,7 +40,6 @@ from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.tables import html_table
 from alphacut.rve.image.bounds import StiffnessBounds
-from alphacut.rve.image.random_threshold import ThresholdResponse
 from alphacut.rve.result import Homogenised, StressCurve
 
 X = {"x": Triangular(0, 1, 2), "y": Interval(1, 2)}
@@ -197,7 +196,7 @@ def test_results_with_arrays_are_compared_and_hashed_as_objects():
     assert len({found, again}) == 2
     for kind in (FuzzyResult, Values, RandomResponse, IntervalResponse):
         assert kind.__eq__ is object.__eq__
-    for kind in (Envelope, Homogenised, StressCurve, StiffnessBounds, ThresholdResponse):
+    for kind in (Envelope, Homogenised, StressCurve, StiffnessBounds):
         assert kind.__eq__ is object.__eq__
 
 

@@ -166,10 +166,10 @@ class Modulus(Section):
     average: Annotated[
         Literal["axes", "isotropic"],
         Key(
-            "what E of cylinders is of: axes, the paper's eq. 16 with the shear along the axes of"
-            " the square array, or the isotropic average of the whole plane stiffness"
+            "what E of cylinders and images is of: the isotropic average of the whole plane"
+            " stiffness, or axes, the paper's eq. 16 with the shear along the axes"
         ),
-    ] = "axes"
+    ] = "isotropic"
     value: Annotated[
         FuzzyNumber | None, positive("a known modulus instead of a computed one", "Pa")
     ] = None

@@ -52,6 +52,8 @@ class Picture(Section):
     shear: Annotated[
         tuple[FuzzyNumber, ...] | None, positive("shear modulus of each phase, beside bulk", "Pa")
     ] = None
+    smooth: Annotated[bool, Key("take the noise of the image away before it is segmented")] = False
+    level: Annotated[bool, Key("take the drift of its light away before it is segmented")] = False
     division: Annotated[
         int | None,
         Key(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -13,9 +12,8 @@ import numpy as np
 from alphacut.io.files import say
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick
-from alphacut.rve.image.gap import constitutive_gap
-from alphacut.rve.image.model import ImageCut, ImageModel, reduced_to_pixels
-from alphacut.rve.image.moduli import grain_modulus
+from alphacut.rve.image.model import ImageCut, ImageModel
+from alphacut.rve.image.solve import ImageSolution
 from alphacut.stages.image.study import ImageStudy, Level
 from alphacut.stages.material.cell import GPA, POSITIVE
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -73,7 +71,7 @@ class FuzzyImage:
 
     study: ImageStudy
     model: ImageModel
-    crisp: ImageCut
+    crisp: ImageSolution
     cuts: tuple[ImageCut, ...]
     contributions: tuple[Contribution, ...]
     seconds: float
@@ -87,25 +85,6 @@ class FuzzyImage:
     def phase(self) -> Array:
         """Number of each pixel's phase at the modal values, shape (rows, columns)."""
         return np.asarray(np.add(*self.study.ranges(None)) / 2)
-
-    @property
-    def grains(self) -> tuple[float, float]:
-        """Hashin–Shtrikman interval of E of grains, over the inputs at the highest level, in Pa."""
-        study, level = self.study, self.study.alpha[-1]
-        counts = [np.bincount(x.ravel(), minlength=len(study.pairs)) for x in study.ranges(level)]
-        shares = [list(count / count.sum()) for count in counts]
-        low, high = (
-            [grain_modulus(f, m, m)[end] for m in study.corners(level, end) for f in shares]
-            for end in (0, 1)
-        )
-        return min(low), max(high)
-
-    @property
-    def gap(self) -> Array:
-        """Constitutive error of each pixel under strain (1, 1, 1), shape (rows, columns), Pa."""
-        assert self.crisp.solution is not None
-        pixels = constitutive_gap(self.crisp.solution, np.array([1.0, 1.0, 1.0]))
-        return reduced_to_pixels(pixels, self.model.parts)
 
 
 def solutions(study: ImageStudy) -> tuple[int, float]:
@@ -140,30 +119,26 @@ class Told:
         self.tick(max(self.share, min(self.seconds / self.first / self.work, 0.99)))
 
 
-def compute(
-    study: ImageStudy, *, progress: Tick | None = None, kept: Path | None = None
-) -> FuzzyImage:
+def compute(study: ImageStudy, *, progress: Tick | None = None) -> FuzzyImage:
     """Bounds at every level, and what widens them.
-
-    Fields that are found stay in the folder `kept`, if any, for the same study begun again.
 
     Raises:
         BadInput: The image cannot give what the case asks for.
     """
     try:
-        return _computed(study, progress, kept)
+        return _computed(study, progress)
     except ValueError as error:
         raise BadInput.of("cell", str(error)) from None
 
 
-def _computed(study: ImageStudy, progress: Tick | None, kept: Path | None) -> FuzzyImage:
+def _computed(study: ImageStudy, progress: Tick | None) -> FuzzyImage:
     modal, (count, work) = study.images(None, None), solutions(study)
     told = Told(progress or (lambda share: None), work)
     pixels = f"image of {modal.bulk[0].size} pixels: {count} pairs of solutions"
     several = progress is not None and count > 1
     if several and modal.bulk[0].size * work > MANY:
         say(f"{pixels}, or more where pixels are divided: this may take minutes")
-    watched = replace(study.model.solver, watch=told.still, kept=kept)
+    watched = replace(study.model.solver, watch=told.still)
     start = replace(study.model, solver=watched)
     model, crisp = start.refined(modal)
     told.done(1 / work)
@@ -178,9 +153,10 @@ def _computed(study: ImageStudy, progress: Tick | None, kept: Path | None) -> Fu
         (cut,) = model.cuts([study.images(threshold, phases)], (modal, crisp))
         return cut.modulus[1] - cut.modulus[0]
 
-    rows = contributions(study, crisp.modulus[1] - crisp.modulus[0], width)
-    if not (low := cuts[0].modulus[0] / GPA) > 0:
-        what = f"E has no bound above {low:.3g} GPa, and no structure takes that"
+    low, high = crisp.bounds.young(model.average)
+    rows = contributions(study, high - low, width)
+    if not (least := cuts[0].modulus[0] / GPA) > 0:
+        what = f"E has no bound above {least:.3g} GPa, and no structure takes that"
         say(f"warning: cell: {what}: {POSITIVE}")
     told.done(1.0)
     return FuzzyImage(study, model, crisp, cuts, rows, told.seconds)

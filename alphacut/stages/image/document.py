@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +12,9 @@ from alphacut.io.files import Document, as_json
 from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import versions
 from alphacut.io.units import fixed
-from alphacut.rve.image.directions import directions
-from alphacut.rve.image.model import ImageCut
+from alphacut.rve.anisotropy import AVERAGES
 from alphacut.stages.image.bounds import CURES, FuzzyImage
-from alphacut.stages.image.phases import BEYOND, IF, phase_lines
+from alphacut.stages.image.phases import BEYOND, NATURE, phase_lines
 from alphacut.stages.material.cell import GPA
 
 if TYPE_CHECKING:
@@ -27,37 +25,31 @@ def document(found: FuzzyImage) -> Document:
     """The result as it is printed with ``--json``; moduli in GPa."""
     cut, alpha = found.top, found.study.alpha
     bounds = cut.bounds
-    low, high = bounds.bulk
-    turned = directions(bounds)
+    average = found.model.average
     return {
         "lower_GPa": bounds.lower / GPA,
         "upper_GPa": bounds.upper / GPA,
         "width": bounds.width,
         "E_GPa": pair(cut.modulus),
-        "nature": cut.nature + IF,
+        "average": average,
+        "nature": NATURE,
         "iterations": max(c.iterations for c in (found.crisp, *found.cuts)),
         "seconds": found.seconds,
-        "nu": poisson(cut),
-        "plane_strain_bulk_GPa": pair((low / 2, high / 2)),
+        "nu": dict(zip(("lower", "upper"), cut.poisson, strict=True)),
+        "G_T_GPa": pair(bounds.shear(average)),
+        "plane_strain_bulk_GPa": pair(bounds.bulk),
         "cuts": {
             "alpha": alpha,
             "E_GPa": {
                 "lower": [c.modulus[0] / GPA for c in found.cuts],
                 "upper": [c.modulus[1] / GPA for c in found.cuts],
             },
-            "nature": [c.nature + IF for c in found.cuts],
+            "nature": [NATURE for _ in found.cuts],
         },
         "error_table": error_table(found),
         "fractions": found.study.fractions,
         "phases": phase_lines(found.study),
         "boundary": BEYOND,
-        "grains_E_GPa": pair(found.grains),
-        "directions_E_GPa": {"least": pair(turned.least), "greatest": pair(turned.greatest)},
-        "isotropic": {
-            "plane_strain_bulk_GPa": turned.isotropic[0] / GPA,
-            "shear_GPa": turned.isotropic[1] / GPA,
-            "distance": turned.distance,
-        },
         "division": found.model.parts,
         "versions": versions(),
     }
@@ -82,19 +74,13 @@ def error_table(found: FuzzyImage) -> list[Document]:
     ]
 
 
-def poisson(cut: ImageCut) -> dict[str, float]:
-    """Bounds of ν of eq. 16, (1 − A/B)/2, by those of A and B."""
-    shear, bulk = cut.bounds.shear, cut.bounds.bulk
-    return {"lower": (1 - shear[1] / bulk[0]) / 2, "upper": (1 - shear[0] / bulk[1]) / 2}
-
-
 def pair(ends: tuple[float, float]) -> dict[str, float]:
     """An interval of moduli in GPa."""
     return {"lower": ends[0] / GPA, "upper": ends[1] / GPA}
 
 
 def dataset(found: FuzzyImage) -> xarray.Dataset:
-    """α-cuts of E and of the stiffness, the picture of the phases and of the error."""
+    """α-cuts of E and of the stiffness, the picture of the phases."""
     import xarray
 
     plane = ("y", "x")
@@ -102,19 +88,14 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
         "E": (
             ("alpha", "bound"),
             np.array([cut.modulus for cut in found.cuts]),
-            {"units": "Pa", "long_name": "effective Young's modulus, eq. 16"},
+            {"units": "Pa", "long_name": f"Young's modulus, {AVERAGES[found.model.average]}"},
         ),
         "stiffness": (
             ("alpha", "bound", "row", "column"),
             np.array([[c.bounds.lower, c.bounds.upper] for c in found.cuts]),
-            {"units": "Pa", "long_name": "bounds of the plane-strain stiffness, or of tiles' mean"},
+            {"units": "Pa", "long_name": "bounds of the plane-strain stiffness"},
         ),
         "phase": (plane, found.phase.astype(np.float32), {"long_name": "number of the phase"}),
-        "gap": (
-            plane,
-            found.gap.astype(np.float32),
-            {"units": "Pa", "long_name": "constitutive error of the two fields, modal inputs"},
-        ),
     }
     coordinates = {
         "alpha": list(found.study.alpha),
@@ -127,7 +108,6 @@ def dataset(found: FuzzyImage) -> xarray.Dataset:
     )
 
 
-def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int], kept: Path) -> None:
-    """Write ``image.nc``, whole or not at all, and remove the folder of what was kept for it."""
+def write(found: FuzzyImage, path: Path, attributes: dict[str, str | int]) -> None:
+    """Write ``image.nc``, whole or not at all."""
     write_dataset(dataset(found), path, attributes | {"document": as_json(document(found))})
-    rmtree(kept, ignore_errors=True)

@@ -8,8 +8,8 @@ from alphacut.case.sections.picture import Picture
 from alphacut.io.units import engineering
 from alphacut.stages.image.study import ImageStudy
 
-BEYOND = "the image repeats itself"
-IF = ", if the image repeats itself"
+BEYOND = "proved of the image as segmented, if it repeats itself"
+NATURE = "guaranteed"
 
 
 def phase_names(given: Picture, count: int) -> tuple[str, ...]:

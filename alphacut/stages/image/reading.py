@@ -9,13 +9,14 @@ import numpy as np
 from alphacut.case.case import Case
 from alphacut.case.sections.picture import Picture
 from alphacut.fuzzy import Crisp
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.io.problem import BadInput, Problem
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.phase_images import threshold_ranges
 from alphacut.stages.image.phases import phase_names
-from alphacut.stages.image.study import ImageStudy, Ranges, cut_at
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stages.image.study import ImageStudy, Level, Ranges, cut_at
+from alphacut.stochastic.segmentation import segmented
 
 ACCURACY = 1e-5  # relative energy that the solver may leave; a width asked for takes less
 
@@ -35,7 +36,7 @@ def study_of(case: Case) -> ImageStudy:
             tuple(zip(first, second, strict=True)),
             given.modulus is not None,
             case.modulus.alpha,
-            _model(given, parted.aspect),
+            _model(given, parted.aspect, case.modulus.average),
             parted.fuzzy,
             phase_names(given, len(first)),
         )
@@ -58,13 +59,14 @@ class Parted:
     fuzzy: bool = False
 
 
-def _model(given: Picture, aspect: float) -> ImageModel:
+def _model(given: Picture, aspect: float, average: str) -> ImageModel:
     accuracy = ACCURACY if given.width is None else min(ACCURACY, given.width / 100)
     return ImageModel(
         aspect,
         division=given.division,
         solver=ConjugateGradient(accuracy),
         width=given.width,
+        average=average,
     )
 
 
@@ -82,11 +84,19 @@ def _image(case: Case, file: str) -> Parted:
     thresholds = given.threshold or ()
     uncertain = [number for number in thresholds if not isinstance(number, Crisp)]
     require_phases(grey, tuple(number.cut(0.0) for number in thresholds))
-    return Parted(
-        lambda level: threshold_ranges(grey, [cut_at(number, level) for number in thresholds]),
-        aspect,
-        bool(uncertain),
-    )
+    judged = segmented(grey, [t.modal for t in thresholds], smooth=given.smooth, level=given.level)
+    judged.require()
+    moved = [new - t.modal for new, t in zip(judged.thresholds, thresholds, strict=True)]
+
+    def ranges(level: Level) -> tuple[Rows, Rows]:
+        """What noise and light leave open, unless the thresholds are stated as fuzzy."""
+        if level is not None and not uncertain:
+            return judged.ranges()
+        cuts = (cut_at(number, level) for number in thresholds)
+        pairs = [(low + by, high + by) for (low, high), by in zip(cuts, moved, strict=True)]
+        return threshold_ranges(judged.grey, pairs)
+
+    return Parted(ranges, aspect, bool(uncertain) or judged.open > 0)
 
 
 def _labelled(grey: Array, labels: tuple[float, ...]) -> Array:

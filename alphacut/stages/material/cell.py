@@ -14,7 +14,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import versions
-from alphacut.rve.anisotropy import directional_shear, directional_young, ratio_of
+from alphacut.rve.anisotropy import directional_shear, directional_young
 from alphacut.rve.cell import Phase
 from alphacut.rve.result import Homogenised, error_of_means, error_of_stiffness
 from alphacut.rve.spheres.result import HomogenisedSpheres
@@ -182,14 +182,14 @@ def anisotropy(
 ) -> tuple[float, float] | None:
     """Shear ratio of a cell and its declared error, by the series whatever model gives E.
 
-    None where the series refuses. See `rve.anisotropy.ratio_of`.
+    None where the series refuses. See `Homogenised.shear_ratio`.
     """
     from alphacut.rve.series.model import SeriesModel
     from alphacut.rve.spheres.series.model import SphereSeriesModel
 
     series = SphereSeriesModel if particles == "spheres" else SeriesModel
     try:
-        return ratio_of(series(accuracy=1e-4).solve(radius, matrix, [inclusion])[0])
+        return series(accuracy=1e-4).solve(radius, matrix, [inclusion])[0].shear_ratio
     except (RuntimeError, ValueError):
         return None
 
@@ -207,7 +207,7 @@ def directions(result: Homogenised) -> Document | None:
         "angle_deg": DIRECTIONS,
         "young_GPa": young / GPA,
         "shear_GPa": shear / GPA,
-        "shear_ratio": ratio_of(result)[0],
+        "shear_ratio": result.shear_ratio[0],
     }
 
 
@@ -238,7 +238,7 @@ def declared_errors(result: Homogenised) -> Document | None:
     if result.stiffness is not None:
         young, shear = error_of_stiffness(result, _over_directions) / GPA
         found["stiffness_GPa"] = error_of_stiffness(result, np.asarray) / GPA
-        ratio = ratio_of(result)[1]
+        ratio = result.shear_ratio[1]
         found["directions"] = {"young_GPa": young, "shear_GPa": shear, "shear_ratio": ratio}
     return found
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from alphacut.io.problem import BadInput, Problem, missing
-from alphacut.rve.anisotropy import AveragedPlane, averaged
 from alphacut.rve.cell import Phase
+from alphacut.rve.result import Homogenised
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.stages.material.cell import CellChoice, CellModel
@@ -29,13 +29,15 @@ class AveragedModel:
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
-    ) -> list[AveragedPlane]:
+    ) -> list[Homogenised]:
         """One result for each inclusion material.
 
         Raises:
             ValueError: The model makes no whole plane stiffness.
         """
-        return [averaged(one) for one in self.model.solve(radius_map, matrix, inclusions)]
+        return [
+            one.averaged("isotropic") for one in self.model.solve(radius_map, matrix, inclusions)
+        ]
 
 
 def cell_model(choice: CellChoice) -> CellModel:

@@ -6,7 +6,6 @@ import numpy as np
 
 from alphacut.io.files import Document
 from alphacut.io.units import fixed
-from alphacut.rve.anisotropy import ratio_of
 from alphacut.rve.cell import STRAIN
 from alphacut.rve.spheres.cubic import cubic_voigt, hill_average, young_along
 from alphacut.rve.spheres.result import HomogenisedSpheres
@@ -23,7 +22,7 @@ def moduli(result: HomogenisedSpheres) -> Document:
         "K_GPa": bulk,
         "G_GPa": [shear, deviator],
         "C_GPa": np.asarray(result.stiffness) / GPA,
-        "shear_ratio": ratio_of(result)[0],
+        "shear_ratio": result.shear_ratio[0],
     }
 
 
@@ -46,7 +45,7 @@ def declared_errors(result: HomogenisedSpheres) -> Document | None:
         "K_GPa": bulk,
         "G_GPa": [shear, deviator],
         "C_GPa": result.error_of(lambda values: cubic_voigt(*values)) / GPA,
-        "shear_ratio": ratio_of(result)[1],
+        "shear_ratio": result.shear_ratio[1],
         "curve": None,
     }
 

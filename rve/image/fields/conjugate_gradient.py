@@ -1,4 +1,4 @@
-"""Preconditioned conjugate gradients on many systems, stopped by a bound of the energy to gain.
+"""Preconditioned conjugate gradients on several loads, stopped by a bound of the energy to gain.
 
 Fields lack at most (residual · preconditioned residual) / λ, where λ is a lower bound of the
 spectrum of the preconditioned operator, here from the materials. The lengths of the steps sharpen
@@ -10,76 +10,125 @@ field comes out; stopping early only widens them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
-from alphacut.rve.image.fields.solver import ConvergenceError, Solution, Solver
-from alphacut.rve.image.fields.system import System, inner
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError, RefusedError
 
 LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
+LEAST_ACCURATE = 0.1
+
+
+class Linear(Protocol):
+    """A symmetric linear map of fields, shape (loads, unknowns, rows, columns)."""
+
+    def apply(self, fields: Array, /) -> Array:
+        """The image of the fields."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Fields with operator(fields) = load.
+
+    Args:
+        operator: Positive on fields that matter.
+        preconditioner: Inverse of the operator of one constant material.
+        load: Right-hand sides, shape (loads, unknowns, rows, columns).
+        scale: Energy that an accuracy refers to, shape (loads,).
+        least: Energy of any field over the one that it has in the constant material, at least.
+        start: First guess, of the load's shape; None: zero.
+    """
+
+    operator: Linear
+    preconditioner: Linear
+    load: Array
+    scale: Array
+    least: float
+    start: Array | None = None
+
+    def begin(self) -> tuple[Array, Array]:
+        """First fields and their residuals, arrays to work in."""
+        if self.start is None:
+            return np.zeros_like(self.load), self.load.copy()
+        return self.start.copy(), self.load - self.operator.apply(self.start)
 
 
 @dataclass(frozen=True)
-class ConjugateGradient(Solver):
+class ConjugateGradient:
     """The solver's stopping rule.
 
     Args:
-        accuracy: Energy that the fields may lack, relative, in (0, 0.1].
+        accuracy: Energy that the fields may lack, relative to the system's scale, in (0, 0.1]; a
+            bound of the stiffness is then within three times that of the one of solved fields.
         iterations: Exact number of iterations instead, or None; fields are then not converged and
             not meant to be.
+        watch: Called before every iteration; what it raises ends it.
 
     Raises:
-        ValueError: A value lies outside its range.
+        RefusedError: A value lies outside its range.
     """
 
+    accuracy: float = 3e-6
     iterations: int | None = None
-    threads: ClassVar[int] = 2
+    watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        if not 0 < self.accuracy <= LEAST_ACCURATE:
+            raise RefusedError("accuracy of the energy", self.accuracy, "(0, 0.1]")
         if self.iterations is not None and self.iterations < 0:
-            raise ValueError(f"{self.iterations} iterations are asked for; take 0 or more")
+            raise RefusedError("iterations", self.iterations, "0 or more")
 
-    def solve(self, system: System) -> Solution:
-        """Fields that lack no more than the accuracy says; the system's load is overwritten.
+    def coarser(self, factor: float) -> ConjugateGradient:
+        """The same rule with less accuracy, for a start."""
+        return replace(self, accuracy=min(LEAST_ACCURATE, factor * self.accuracy))
+
+    def solve(self, system: System) -> tuple[Array, int]:
+        """Fields that lack no more than the accuracy says, and the iterations.
 
         Raises:
-            ConvergenceError: `LIMIT` iterations are not enough.
+            FailedError: `LIMIT` iterations are not enough.
         """
         fields, residual = system.begin()
         direction = system.preconditioner.apply(residual)
-        product, least = inner(residual, direction), system.least[:, None]
-        reach = np.broadcast_to(1 / least, product.shape)  # energy lacking over product, at most
+        product = inner(residual, direction)
+        reach = np.full(product.shape, 1 / system.least)  # energy lacking over product, at most
         allowed = self.accuracy * system.scale
         limit = LIMIT if self.iterations is None else self.iterations
         for number in range(limit):
             self.watch()
             if self.iterations is None and np.all(reach * product <= allowed):
-                return Solution(fields, number)
+                return fields, number
             image = system.operator.apply(direction)
             length = _ratio(product, inner(direction, image))
-            _add(fields, length, direction)
-            _add(residual, -length, image)
+            fields += _each(length) * direction
+            residual -= _each(length) * image
             image = system.preconditioner.apply(residual)
             product, before = inner(residual, image), product
             change = _ratio(product, before)
-            reach = _radau(reach - length, change, least)
-            direction *= change[..., None, None, None]
+            reach = _radau(reach - length, change, system.least)
+            direction *= _each(change)
             direction += image
         if self.iterations is None:
             lacking = float((reach * product / system.scale).max())
-            raise ConvergenceError(
-                f"the image's fields have not converged in {LIMIT} iterations (up to {lacking:.1e}"
-                f" of the energy left, {self.accuracy:.1e} asked for); lower the contrast of the"
-                " phases or ask for less accuracy"
+            raise FailedError(
+                f"the image's fields lack up to {lacking:.1e} of the energy after {LIMIT}"
+                f" iterations, {self.accuracy:.1e} is allowed",
+                "lower the contrast of the phases or allow more",
             )
-        return Solution(fields, limit)
+        return fields, limit
 
 
-def _radau(excess: Array, change: Array, least: Array) -> Array:
+def inner(first: Array, second: Array) -> Array:
+    """Inner products of fields, shape (loads,)."""
+    count = len(first)
+    return np.einsum("bn,bn->b", first.reshape(count, -1), second.reshape(count, -1))
+
+
+def _radau(excess: Array, change: Array, least: float) -> Array:
     """Next energy lacking over product, at most, from the last less the length of the step.
 
     Without rounding the excess is positive, and the result up to 1/least.
@@ -88,10 +137,9 @@ def _radau(excess: Array, change: Array, least: Array) -> Array:
     return np.where(excess > 0, sharper, 1 / least)
 
 
-def _add(target: Array, factors: Array, term: Array) -> None:
-    """Add a multiple of each system's field in place."""
-    for place in np.ndindex(*factors.shape):
-        target[place] += factors[place] * term[place]
+def _each(factors: Array) -> Array:
+    """Factors of the loads, to multiply fields with."""
+    return factors[:, None, None, None]
 
 
 def _ratio(above: Array, below: Array) -> Array:

@@ -5,54 +5,47 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import polynomial
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
-from alphacut.rve.image.fields.operator import blocks, shifted
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.rve.image.fields.grid import blocks, gathered
 
 
 def divided(image: Array, parts: int) -> Array:
-    """Each pixel of an image, shape (…, rows, columns), as parts × parts equal ones."""
+    """Each pixel of an image, shape (rows, columns), as parts × parts equal ones."""
     return np.repeat(np.repeat(image, parts, axis=-2), parts, axis=-1)
 
 
 def prolonged(element: Element, fields: Array, parts: int) -> Array:
-    """The same fields, (tiles, loads, types, rows, columns), as unknowns of the parts."""
-    tiles, loads, types, rows, columns = fields.shape
-    result = np.empty((tiles, loads, types, rows * parts, columns * parts))
-    matrices = {
-        (row, column): evaluation(element, row, column, parts)
-        for row, column in np.ndindex(parts, parts)
-    }
-    for block, lines in blocks(fields.shape):
-        local = np.empty((len(element.local_types), *fields[block, :, 0, lines].shape))
-        for k, (kind, shift) in enumerate(zip(element.local_types, element.shifts, strict=True)):
-            for here, there in shifted(lines, shift, fields.shape):
-                local[k][(..., *here)] = fields[block, :, kind][(..., *there)]
+    """The same fields, (loads, unknowns, rows, columns), as unknowns of the parts."""
+    loads, count, rows, columns = fields.shape
+    result = np.empty((loads, count, rows * parts, columns * parts))
+    matrices = {place: evaluation(element, *place, parts) for place in np.ndindex(parts, parts)}
+    for lines in blocks(fields.shape):
+        local = gathered(element, fields, lines)
         for (y, x), matrix in matrices.items():
-            values = (matrix @ local.reshape(len(local), -1)).reshape(types, *local.shape[1:])
+            values = (matrix @ local.reshape(len(local), -1)).reshape(count, *local.shape[1:])
             place = slice(lines.start * parts + y, lines.stop * parts, parts)
-            result[block, :, :, place, x::parts] = np.moveaxis(values, 0, 2)
+            result[:, :, place, x::parts] = np.moveaxis(values, 0, 1)
     return result
 
 
 def evaluation(element: Element, row: int, column: int, parts: int) -> Array:
-    """From a pixel's unknowns to those of the part (row, column) of it, shape (types, n)."""
-    components = len(element.local_types) // len(element.line) ** 2
+    """From a pixel's unknowns to those of the part (row, column) of it, shape (unknowns, n)."""
     size = len(element.line) ** 2
-    matrix = np.zeros((element.types, components * size))
-    for kind, (component, y, x, order_y, order_x) in enumerate(element.functionals):
-        along_y = _values(element, (row + y) / parts, order_y)
-        along_x = _values(element, (column + x) / parts, order_x)
-        scale = float(parts) ** (element.order - order_y - order_x)  # lengths are in pixels
-        matrix[kind, component * size : (component + 1) * size] = scale * np.kron(along_y, along_x)
+    matrix = np.zeros((len(element.unknowns), len(element.local)))
+    for kind, unknown in enumerate(element.unknowns):
+        (y, x), slopes = unknown.place, unknown.slopes
+        along_y = _values(element, (row + y) / parts, slopes[0])
+        along_x = _values(element, (column + x) / parts, slopes[1])
+        own = slice(unknown.component * size, (unknown.component + 1) * size)
+        # lengths are in pixels
+        matrix[kind, own] = float(parts) ** (element.order - sum(slopes)) * np.kron(
+            along_y, along_x
+        )
     return matrix
 
 
 def _values(element: Element, place: float, order: int) -> Array:
     """Derivatives of the basis functions of a line at a place in [0, 1]."""
-    return np.array(
-        [
-            polynomial.polyval(place, polynomial.polyder(f, order) if order else np.array(f))
-            for f in element.line
-        ]
-    )
+    lines = (polynomial.polyder(f, order) if order else np.array(f) for f in element.line)
+    return np.array([polynomial.polyval(place, line) for line in lines])

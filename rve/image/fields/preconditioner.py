@@ -13,21 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.rve.image.fields.reference import Reference
 
 Complex = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FourierPreconditioner:
     """Inverse of the constant-coefficient operator on a periodic grid.
 
     Args:
-        inverse: Real blocks at wave numbers 0 … half of those along y, shape (half, types, types,
-            waves along x).
-        phases: Unit factors of the types, along y with shape (types, rows), along x with shape
-            (types, waves along x).
+        inverse: Real blocks at wave numbers 0 … half of those along y, shape (half, unknowns,
+            unknowns, waves along x).
+        phases: Unit factors of the unknowns, along y with shape (unknowns, rows), along x with
+            shape (unknowns, waves along x).
         shape: Rows and columns of the grid.
     """
 
@@ -37,76 +38,66 @@ class FourierPreconditioner:
 
     @classmethod
     def of(
-        cls, element: Element, bulk: float, shear: float, shape: tuple[int, int]
+        cls, element: Element, constant: Reference, shape: tuple[int, int]
     ) -> FourierPreconditioner:
-        """The preconditioner for a material of coefficients `bulk` and `shear`."""
+        """The preconditioner for a constant material."""
         ky, kx = 2 * np.pi * np.fft.fftfreq(shape[0]), 2 * np.pi * np.fft.rfftfreq(shape[1])
-        half = np.abs(ky[: shape[0] // 2 + 1])
-        blocks = np.moveaxis(symbol(element, bulk, shear, half, kx), (0, 1), (-2, -1))
-        inverse = np.empty((len(half), element.types, element.types, len(kx)))
-        for row, block in enumerate(blocks):
+        half, count = np.abs(ky[: shape[0] // 2 + 1]), len(element.unknowns)
+        inverse = np.empty((len(half), count, count, len(kx)))
+        for row, block in enumerate(symbol(element, constant, half, kx)):
             inverse[row] = np.moveaxis(_inverted(block, row == 0), 0, -1)
         return cls(inverse, phase_factors(element, ky, kx), shape)
 
     def apply(self, fields: Array) -> Array:
-        """The inverse on fields of shape (…, types, rows, columns)."""
+        """The inverse on fields of shape (loads, unknowns, rows, columns)."""
         spectrum = fft.rfft2(fields)
-        flat = spectrum.reshape(-1, *spectrum.shape[-3:])
         along_y, along_x = self.phases
         for row in range(self.shape[0]):
             factor = along_y[:, row, None] * along_x
-            turned = flat[..., row, :] * factor.conj()
+            turned = spectrum[..., row, :] * factor.conj()
             parts = np.stack([turned.real, turned.imag])
             result = np.einsum("abf,cnbf->cnaf", self.inverse[min(row, self.shape[0] - row)], parts)
             turned.real, turned.imag = result
-            np.multiply(turned, factor, out=flat[..., row, :])
+            np.multiply(turned, factor, out=spectrum[..., row, :])
         return np.asarray(fft.irfft2(spectrum, s=self.shape, overwrite_x=True))
 
 
 def _inverted(blocks: Array, first: bool) -> Array:
-    """Symmetric inverses of blocks, shape (waves, types, types); uniform fields cause nothing."""
+    """Symmetric inverses of blocks, (waves, unknowns, unknowns); uniform fields cause nothing."""
     inverse = np.empty_like(blocks)
-    inverse[0] = (
-        np.linalg.pinv(blocks[0], rcond=1e-10, hermitian=True)
-        if first
-        else np.linalg.inv(blocks[0])
-    )
+    uniform = np.linalg.pinv(blocks[:1], rcond=1e-10, hermitian=True)
+    inverse[:1] = uniform if first else np.linalg.inv(blocks[:1])
     inverse[1:] = np.linalg.inv(blocks[1:])
     return np.asarray(inverse + np.swapaxes(inverse, 1, 2)) / 2
 
 
-def symbol(element: Element, bulk: float, shear: float, ky: Array, kx: Array) -> Array:
-    """Real symmetric blocks of the constant operator, shape (types, types, len(ky), len(kx))."""
-    modes, rows = element.modes, element.bulk_rows
-    matrix = bulk * modes[:rows].T @ modes[:rows] + shear * modes[rows:].T @ modes[rows:]
-    steps = np.arange(-2, 3) / 2
-    table = np.zeros((element.types, element.types, 5, 5))
-    for j, a in enumerate(element.local_types):
-        for k, b in enumerate(element.local_types):
-            y, x = np.rint(2 * (element.positions[k] - element.positions[j])).astype(int) + 2
-            table[a, b, y, x] += matrix[j, k]
+def symbol(element: Element, constant: Reference, ky: Array, kx: Array) -> Array:
+    """Real symmetric blocks of the operator, shape (len(ky), len(kx), unknowns, unknowns)."""
+    trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
+    matrix = constant.trace * trace + constant.deviator * deviator
+    count, steps = len(element.unknowns), np.arange(-2, 3) / 2
+    table = np.zeros((count, count, 5, 5))  # by the distance of two unknowns in half pixels
+    places = [np.add(element.unknowns[kind].place, shift) for kind, *shift in element.local]
+    for j, k in np.ndindex(matrix.shape):
+        y, x = np.rint(2 * (places[k] - places[j])).astype(int) + 2
+        table[element.local[j][0], element.local[k][0], y, x] += matrix[j, k]
     waves_y, waves_x = np.exp(1j * np.outer(ky, steps)), np.exp(1j * np.outer(steps, kx))
-    result = np.empty((element.types, element.types, len(ky), len(kx)))
-    for a, b in np.ndindex(element.types, element.types):
-        factor = (-1j if element.odd[a] else 1) * (1j if element.odd[b] else 1)
-        result[a, b] = (factor * (waves_y @ table[a, b] @ waves_x)).real
-    return result
+    turn = np.array([1j if unknown.odd else 1 for unknown in element.unknowns])
+    factor = (turn.conj()[:, None] * turn)[..., None, None]
+    return np.moveaxis((factor * (waves_y @ table @ waves_x)).real, (0, 1), (-2, -1))
 
 
 def phase_factors(element: Element, ky: Array, kx: Array) -> tuple[Complex, Complex]:
-    """Factors of the types along y and along x: the wave at the place in the pixel.
+    """Factors of the unknowns along y and along x: the wave at the place in the pixel.
 
-    The block at −ky is the one at ky with the signs of those types changed that change sign under a
-    reflection of y.
+    The block at −ky is the one at ky with the signs of those unknowns changed that change sign
+    under a reflection of y.
     """
-    along_y = np.empty((element.types, len(ky)), complex)
-    along_x = np.empty((element.types, len(kx)), complex)
-    for kind, (component, y, x, order_y, _) in enumerate(element.functionals):
-        reflected = (component + order_y) % 2 == 1
-        along_y[kind] = (
-            np.exp(1j * ky * y)
-            * (1j if element.odd[kind] else 1)
-            * np.where((ky < 0) & reflected, -1, 1)
-        )
-        along_x[kind] = np.exp(1j * kx * x)
-    return along_y, along_x
+    along_y, along_x = [], []
+    for unknown in element.unknowns:
+        (y, x), (slope, _) = unknown.place, unknown.slopes
+        reflected = (unknown.component + slope) % 2 == 1
+        sign = np.where((ky < 0) & reflected, -1, 1)
+        along_y.append(np.exp(1j * ky * y) * (1j if unknown.odd else 1) * sign)
+        along_x.append(np.exp(1j * kx * x))
+    return np.array(along_y), np.array(along_x)

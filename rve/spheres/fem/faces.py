@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.interruption import uninterrupted
-from alphacut.stochastic.theta.truncated_normal import Array
 
 with uninterrupted():
     from dolfinx import fem

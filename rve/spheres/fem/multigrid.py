@@ -8,10 +8,10 @@ quadratic ones too, its stiffness is Galerkin's.
 
 from __future__ import annotations
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.solver.krylov import ConvergenceError
 from alphacut.rve.solver.options import PREFIX
-from alphacut.stochastic.theta.truncated_normal import Array
 
 SOLVER = "cg, multigrid quadratic–linear–gamg"
 _MOST = 200

@@ -8,10 +8,10 @@ import gmsh
 import numpy as np
 from mpi4py import MPI
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.mesh.curved import TouchingError
 from alphacut.rve.settings import require_mesh_size, require_radius
-from alphacut.stochastic.theta.truncated_normal import Array
 
 with uninterrupted():
     try:

@@ -22,12 +22,12 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.fem.faces import LOADS, Faces, Load, on_faces
 from alphacut.rve.spheres.fem.multigrid import TwoSpaces
 from alphacut.rve.spheres.fem.octant import MATRIX, SPHERE, octant
-from alphacut.stochastic.theta.truncated_normal import Array
 
 RTOL = 1e-7  # of the residual; what is left of the energy is of the order of its square
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 def shear_modulus(phase: Phase) -> float:

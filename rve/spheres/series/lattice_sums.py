@@ -17,7 +17,7 @@ from functools import cache
 import numpy as np
 from scipy.special import gammaincc, gammaln
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
 
 _DIRECT = 40  # from this degree on, points beyond √11 are below round-off
 _REACH = 4  # of Ewald's sums: exp(−π 17) is the first term left out

@@ -8,6 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.settings import require_accuracy, require_parts, require_points
 from alphacut.rve.slices.theta_rule import settle_rule
@@ -15,7 +16,6 @@ from alphacut.rve.spheres.cubic import cubic_moduli
 from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 from alphacut.stochastic import RadiusMap
-from alphacut.stochastic.theta.truncated_normal import Array
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ from itertools import pairwise
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
 from alphacut.rve.spheres.cubic import cubic_voigt
 from alphacut.rve.spheres.series.interface import scattering, shear_modulus
 from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
-from alphacut.stochastic.theta.truncated_normal import Array
 
 MOST_DEGREES = 64  # reaches 1e-8 at r = 0.985
 _DEGREES = np.array([4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, MOST_DEGREES])

@@ -25,8 +25,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import gammaln
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.spheres.series.lattice_sums import lattice_sums
-from alphacut.stochastic.theta.truncated_normal import Array
 
 VOLUME = 8.0  # of the cell of side 2
 

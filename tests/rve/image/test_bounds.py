@@ -5,11 +5,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.anisotropy import AVERAGES
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.energy import energy
-from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, UNIT_LOADS, solve_side
-from alphacut.rve.image.fields.solver import ConvergenceError
+from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
+from alphacut.rve.image.fields.element import airy_element, displacement_element
+from alphacut.rve.image.fields.energy import energies
+from alphacut.rve.image.fields.grid import Operator
+from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
+from alphacut.rve.image.fields.reference import Reference
+from alphacut.rve.image.fields.side import (
+    DISPLACEMENT,
+    SOLVED_LOADS,
+    STRESS,
+    UNIT_LOADS,
+    least_energy,
+    solve_side,
+)
 from alphacut.rve.image.moduli import PlaneModuli
 from alphacut.rve.image.solve import solve_image
 
@@ -52,7 +64,7 @@ def random_phases(rng):
     return tuple(tuple(np.exp(rng.uniform(0, np.log(100), 2))) for _ in range(2))
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_laminates_are_inside_and_the_bounds_meet_on_them(seed):
     rng = np.random.default_rng(seed)
     columns, rows = rng.integers(2, 40, 2)
@@ -67,7 +79,7 @@ def test_laminates_are_inside_and_the_bounds_meet_on_them(seed):
     assert turned.contains(exact[np.ix_([1, 0, 2], [1, 0, 2])])
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_mixtures_of_equal_shear_moduli_are_inside(seed):
     rng = np.random.default_rng(seed)
     (first, shear), (second, _) = random_phases(rng)
@@ -78,7 +90,7 @@ def test_mixtures_of_equal_shear_moduli_are_inside(seed):
     assert result.contains(stiffness(bulk, shear))
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(5))
 def test_chequerboards_of_one_bulk_modulus_keep_their_product_of_shear_moduli(seed):
     """Adding a constant to 1/(K + G/3) and taking it from 1/G makes the phases incompressible.
 
@@ -94,26 +106,28 @@ def test_chequerboards_of_one_bulk_modulus_keep_their_product_of_shear_moduli(se
     ]
     exact = (1 / first + 1 / bulk) * (1 / second + 1 / bulk)
     assert products[0] <= exact <= products[1]
-    assert all(form[0] <= 2 * bulk <= form[1] for form in [result.bulk])
+    assert result.bulk[0] <= bulk <= result.bulk[1]
 
 
 @pytest.mark.parametrize("side", [DISPLACEMENT, STRESS], ids=lambda side: side.name)
 @pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-2, 10.0])
 def test_a_perturbed_field_still_bounds(side, size):
     rng = np.random.default_rng(3)
-    bulk, shear = (a[None] for a in image_of(discs(24, rng), ((40.0, 25.0), (7.0, 3.0))))
+    bulk, shear = image_of(discs(24, rng), ((40.0, 25.0), (7.0, 3.0)))
     best = solve_side(side, bulk, shear, solver=TIGHT)
     noise = size * rng.normal(size=best.fields.shape)
-    element = side.element(1.0)
-    trial = energy(
-        element,
-        *side.coefficients(bulk, shear),
-        best.fields + noise,
-        element.mean_modes(UNIT_LOADS),
-    )
-    gap = np.linalg.eigvalsh(trial.upper[0] - best.energy.value[0] + 1e-11 * np.eye(3))
+    trial = energies_of(side, bulk, shear, best.fields + noise)
+    least = best.energy.value.sum(axis=0)
+    gap = np.linalg.eigvalsh(trial.upper - least + 1e-11 * np.eye(3))
     assert gap[0] >= 0
-    assert size < 1e-3 or gap[0] > 1e-4 * np.abs(best.energy.value).max()
+    assert size < 1e-3 or gap[0] > 1e-4 * np.abs(least).max()
+
+
+def energies_of(side, bulk, shear, fields):
+    """Energies of fields under the unit loads."""
+    element = side.element(1.0)
+    weights = list(zip(element.parts, side.coefficients(bulk, shear), strict=True))
+    return energies(element, fields, element.mean_modes(UNIT_LOADS), weights)
 
 
 def test_two_iterations_bound_more_widely_and_enclose():
@@ -173,62 +187,59 @@ def test_a_turned_image_has_the_turned_stiffness():
 def test_a_homogeneous_image_is_exact():
     bulk, shear = np.full((6, 9), 3.0), np.full((6, 9), 2.0)
     result = solve_image(bulk, shear)
-    assert result.upper.iterations == 0
+    assert result.iterations == 0
     assert result.bounds.contains(stiffness(3.0, 2.0))
     assert result.bounds.width < 1e-13
 
 
 def test_the_rounding_bound_covers_the_difference_to_a_sum_in_long_double():
     rng = np.random.default_rng(9)
-    bulk, shear = (a[None] for a in image_of(discs(16, rng), ((40.0, 25.0), (7.0, 3.0))))
+    bulk, shear = image_of(discs(16, rng), ((40.0, 25.0), (7.0, 3.0)))
     for side in (DISPLACEMENT, STRESS):
-        element = side.element(1.0)
-        fields = 1e3 * rng.normal(size=(1, 3, element.types, 16, 16))
-        found = energy(element, bulk, shear, fields, element.mean_modes(UNIT_LOADS))
-        exact = long_energy(element, bulk[0], shear[0], fields[0])
-        error = np.abs(found.value[0] - exact)
-        assert (error <= found.rounding[0]).all()
-        assert found.rounding[0].max() < 1e-12 * np.abs(exact).max()
+        fields = 1e3 * rng.normal(size=(3, len(side.element(1.0).unknowns), 16, 16))
+        result = energies_of(side, bulk, shear, fields)
+        exact = long_energies(side.element(1.0), side.coefficients(bulk, shear), fields)
+        error = np.abs(result.value - exact)
+        assert (error <= result.rounding).all()
+        assert result.rounding.max() < 1e-12 * np.abs(exact).max()
 
 
-def long_energy(element, bulk, shear, fields):
-    """The mean energies in extended precision, with rolled arrays and no anchors."""
-    modes = element.modes.astype(np.longdouble)
+def long_energies(element, coefficients, fields):
+    """The mean energies of trace and deviator in extended precision, without anchors."""
     local = [
-        np.roll(fields[:, kind], (-y, -x), axis=(1, 2))
-        for kind, (y, x) in zip(element.local_types, element.shifts, strict=True)
+        np.roll(fields[:, kind], (-up, -right), axis=(1, 2)) for kind, up, right in element.local
     ]
-    values = np.einsum("rn,nlyx->rlyx", modes, np.array(local, dtype=np.longdouble))
+    values = np.einsum(
+        "rn,nlyx->rlyx", *(np.array(x, np.longdouble) for x in (element.modes, local))
+    )
     values += element.mean_modes(UNIT_LOADS)[:, :, None, None]
-    rows = element.bulk_rows
-    sums = [
-        np.einsum("yx,rjyx,rkyx->jk", c.astype(np.longdouble), v, v)
-        for c, v in ((bulk, values[:rows]), (shear, values[rows:]))
-    ]
-    return sum(sums) / bulk.size
+    pairs = zip(element.parts, coefficients, strict=True)
+    return np.array(
+        [np.einsum("yx,rjyx,rkyx->jk", c, values[p], values[p]) / c.size for p, c in pairs]
+    )
 
 
-def test_the_modulus_of_eq_16_of_an_isotropic_material():
-    young, poisson = 20.0, 0.3
-    moduli = PlaneModuli.of_young(young, poisson)
+@pytest.mark.parametrize("average", AVERAGES)
+def test_e_and_nu_of_an_isotropic_material_are_its_own(average):
+    moduli = PlaneModuli.of_young(20.0, 0.3)
     exact = stiffness(moduli.bulk, moduli.shear)
-    low, high = StiffnessBounds(exact, exact).modulus
-    assert low <= young * (1 + 1e-14)
-    assert high >= young * (1 - 1e-14)
-    assert high - low < 1e-12
+    bounds = StiffnessBounds(exact, exact)
+    for (low, high), value in ((bounds.young(average), 20.0), (bounds.poisson(average), 0.3)):
+        assert low <= value * (1 + 1e-14)
+        assert high >= value * (1 - 1e-14)
+        assert high - low < 1e-12
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_modulus_is_inside_its_bounds_where_it_falls_with_a(seed):
+def test_the_modulus_is_inside_its_bounds_where_it_falls_with_the_shear_modulus(seed):
     rng = np.random.default_rng(seed)
-    bulk, shear = np.sort(10 ** rng.uniform(-1, 1, (2, 2)))  # A/B from 0.01 to 100
+    bulk, shear = np.sort(10 ** rng.uniform(-1, 1, (2, 2)))  # G/K from 0.01 to 100
     bounds = StiffnessBounds(stiffness(bulk[0], shear[0]), stiffness(bulk[1], shear[1]))
-    (a0, a1), (b0, b1) = bounds.shear, bounds.bulk
-    a, b = (x[..., None] for x in np.meshgrid(np.linspace(a0, a1, 400), np.linspace(b0, b1, 40)))
-    inside = 1.5 * a - a * a / (2 * b)
-    low, high = bounds.modulus
+    g, k = np.meshgrid(np.linspace(*shear, 400), np.linspace(*bulk, 40))
+    inside = 3 * g - g * g / k
+    low, high = bounds.young()
     assert low <= inside.min() <= low + 1e-9 * abs(low) + 1e-12
-    assert inside.max() <= high <= inside.max() + 1e-4 * (a1 + a1**2 / b0)
+    assert inside.max() <= high <= inside.max() + 1e-4 * (shear[1] + shear[1] ** 2 / bulk[0])
 
 
 def test_the_inverse_is_below_in_every_direction():
@@ -244,14 +255,94 @@ def test_the_inverse_is_below_in_every_direction():
 def test_too_few_iterations_raise(monkeypatch):
     monkeypatch.setattr("alphacut.rve.image.fields.conjugate_gradient.LIMIT", 3)
     bulk, shear = image_of(discs(16, np.random.default_rng(0)), ((40.0, 25.0), (7.0, 3.0)))
-    with pytest.raises(ConvergenceError, match="have not converged in 3 iterations"):
+    with pytest.raises(FailedError, match="after 3 iterations"):
         solve_image(bulk, shear, solver=TIGHT)
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [({"accuracy": 0}, "accuracy of the energy is 0"), ({"iterations": -1}, "-1 iterations")],
-)
-def test_bad_stopping_rules_are_refused(options, told):
-    with pytest.raises(ValueError, match=told):
+@pytest.mark.parametrize("options", [{"accuracy": 0}, {"iterations": -1}])
+def test_bad_stopping_rules_are_refused(options):
+    with pytest.raises(RefusedError) as error:
         ConjugateGradient(**options)
+    assert error.value.value == next(iter(options.values()))
+
+
+# when the solver stops: the energy that is left, and the bound of it
+
+
+def random_moduli(rng, shape, span=1e3):
+    """Two phases whose moduli differ by up to `span`, each on a random share of the pixels."""
+    phases = np.exp(rng.uniform(0, np.log(span), (2, 2)))
+    mask = rng.random(shape) < rng.uniform(0.1, 0.9)
+    mask.flat[:2] = True, False
+    return tuple(np.where(mask, *pair) for pair in phases)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-5])
+def test_bounds_are_as_close_to_those_of_solved_fields_as_the_accuracy(seed, accuracy):
+    rng = np.random.default_rng([seed, 1])
+    moduli = random_moduli(rng, rng.integers(2, 24, 2))
+    solved = solve_image(*moduli, solver=ConjugateGradient(1e-12)).bounds
+    near = solve_image(*moduli, solver=ConjugateGradient(accuracy)).bounds
+    pairs = ((near.upper, solved.upper), (solved.lower, near.lower))
+    excess = max(np.linalg.eigvals(np.linalg.solve(b, a)).real.max() - 1 for a, b in pairs)
+    assert excess < 3 * accuracy + 1e-9
+
+
+ELEMENTS = [displacement_element(0.7), airy_element(0.7)]
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_system_lacks_more_energy_than_its_accuracy(element, seed):
+    """With bulk moduli nearly equal the first steps gain nearly nothing: a pause, not the end."""
+    rng = np.random.default_rng([seed, 517])
+    mask = np.kron(rng.random((5, 5)) < 0.2, np.ones((4, 4))) > 0
+    mask[:4, :4] = True
+    system = system_of(element, np.where(mask, 1.4785, 1.4780), np.where(mask, 92.2, 1.78))
+    solved, _ = ConjugateGradient(1e-14).solve(system)
+    shares = []
+    for accuracy in 10.0 ** np.arange(-8, 0):
+        wrong = ConjugateGradient(accuracy).solve(system)[0] - solved
+        lacking = inner(wrong, system.operator.apply(wrong))
+        shares.append((lacking / system.scale / accuracy).max())
+    assert max(shares) <= 1 + 1e-5
+    assert max(shares) > 0.02  # so no work is wasted
+
+
+def system_of(element, trace, deviator):
+    """The system of three loads on periodic fields."""
+    constant = Reference.between(trace, deviator, exchange=element.order == 2)
+    inverse = FourierPreconditioner.of(element, constant, trace.shape)
+    operator, modes = Operator(element, trace, deviator), element.mean_modes(SOLVED_LOADS)
+    scale = least_energy(element, trace, deviator, modes)
+    least = constant.least(trace, deviator)
+    return System(operator, inverse, operator.load(modes), scale, least)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
+@pytest.mark.parametrize("seed", range(3))
+def test_no_field_has_less_energy_than_the_constant_material_says(element, seed):
+    """All ratios of a small image, as eigenvalues; uniform fields have none."""
+    trace, deviator = random_moduli(np.random.default_rng(seed), (5, 6), span=100)
+    system = system_of(element, trace, deviator)
+    size = len(element.unknowns) * trace.size
+    units = np.eye(size).reshape(size, -1, 5, 6)
+    maps = (m.apply(units).reshape(size, size) for m in (system.preconditioner, system.operator))
+    ratios = np.linalg.eigvals(np.linalg.multi_dot([x.T for x in maps])).real
+    ratios = ratios[np.abs(ratios) > 1e-6 * system.least]
+    assert system.least <= ratios.min() < 3 * system.least
+
+
+def test_what_a_watch_raises_ends_both_sides_at_once():
+    calls = []
+
+    def watch():
+        calls.append(1)
+        if len(calls) == 6:
+            raise KeyboardInterrupt
+
+    shear = np.random.default_rng(1).uniform(1, 100, (24, 24))
+    with pytest.raises((KeyboardInterrupt, InterruptedError)):
+        solve_image(3 * shear, shear, solver=ConjugateGradient(1e-12, watch=watch))
+    assert 6 <= len(calls) < 20

@@ -1,124 +1,155 @@
-"""Guaranteed cuts: fuzzy threshold, fuzzy phases, phases without order."""
+"""Guaranteed cuts: fuzzy threshold, fuzzy phases, phases without order; reading of images."""
 
 import numpy as np
 import pytest
 
-from alphacut.rve.image.cuts import ENCLOSED, TWO_CORNERS, ImageBox, each_cut, nested
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.image.model import ImageModel, nested, usual_division
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
+from alphacut.rve.image.read import read_grey, require_memory, require_phases
 from alphacut.rve.image.solve import solve_image
 
-FINE = ConjugateGradient(1e-9)
+ALPHA = (0.0, 0.5, 1.0)
 
 
-def noise(size, seed):
-    """Smooth periodic noise with values in [0, 1], shape (size, size)."""
+def smooth(size, seed):
+    """Smooth periodic grey values in [0, 1], shape (size, size)."""
     rng = np.random.default_rng(seed)
-    waves = np.hypot(
-        *np.meshgrid(np.fft.fftfreq(size) * size, np.fft.rfftfreq(size) * size, indexing="ij")
-    )
-    values = np.fft.irfft2(
-        np.fft.rfft2(rng.normal(size=(size, size))) * np.exp(-((waves / 5) ** 2)), s=(size, size)
-    )
+    waves = np.fft.fftfreq(size) * size
+    damping = np.exp(-((np.hypot(waves[:, None], waves[: size // 2 + 1]) / 5) ** 2))
+    values = np.fft.irfft2(np.fft.rfft2(rng.normal(size=(size, size))) * damping, s=(size, size))
     return (values - values.min()) / np.ptp(values)
 
 
-def box(alpha, ordered=True):
-    """Cut of a fuzzy threshold and of fuzzy K, G of both phases."""
-    slack = 1 - alpha
+def phases(alpha, ordered=True):
+    """Intervals of K and G of both phases at a level."""
     matrix, particle = ((10.0, 5.0), (40.0, 25.0)) if ordered else ((10.0, 25.0), (40.0, 5.0))
-    phases = [
-        ModuliInterval(
-            *(PlaneModuli.of_bulk(k * (1 + s * slack), g * (1 + s * slack)) for s in (-0.1, 0.1))
-        )
-        for k, g in (matrix, particle)
-    ]
-    return ImageBox([(0.5 - 0.05 * slack, 0.5 + 0.05 * slack)], phases)
+    ends = [1 + s * (1 - alpha) for s in (-0.1, 0.1)]
+    pairs = (matrix, particle)
+    return [ModuliInterval(*(PlaneModuli.of_bulk(k * e, g * e) for e in ends)) for k, g in pairs]
 
 
-def sample(cut, rng, grey):
+def images(grey, alpha, ordered=True):
+    slack = 0.05 * (1 - alpha)
+    ranges = threshold_ranges(grey, [(0.5 - slack, 0.5 + slack)])
+    return moduli_images(*ranges, phases(alpha, ordered))
+
+
+def sample(rng, grey, alpha, ordered):
     """Bounds of one image from inside a cut."""
-    ends = np.array(cut.thresholds[0])
-    mask = grey >= rng.uniform(*ends)
+    slack = 0.05 * (1 - alpha)
+    mask = grey >= rng.uniform(0.5 - slack, 0.5 + slack)
     moduli = []
-    for phase in cut.phases:
-        lower = (phase.lower.bulk - phase.lower.shear / 3, phase.lower.shear)
-        upper = (phase.upper.bulk - phase.upper.shear / 3, phase.upper.shear)
-        bulk, shear = rng.uniform(lower, upper)
+    for phase in phases(alpha, ordered):
+        ends = [(p.bulk - p.shear / 3, p.shear) for p in (phase.lower, phase.upper)]
+        bulk, shear = rng.uniform(*ends)
         moduli.append((bulk + shear / 3, shear))
-    bulk, shear = (np.where(mask, b, a) for a, b in zip(*moduli, strict=True))
-    return solve_image(bulk, shear).bounds
+    return solve_image(*(np.where(mask, b, a) for a, b in zip(*moduli, strict=True))).bounds
 
 
 @pytest.mark.parametrize("ordered", [True, False])
-def test_samples_never_leave_the_cut(ordered):
-    grey, rng = noise(24, 1), np.random.default_rng(2)
-    cuts = [*each_cut(grey, [box(a, ordered) for a in (1.0, 0.5, 0.0)])]
-    assert [cut.nature for cut in cuts] == [
-        TWO_CORNERS,
-        *[TWO_CORNERS if ordered else ENCLOSED] * 2,
-    ]
-    for cut, alpha in zip(cuts, (1.0, 0.5, 0.0), strict=True):
-        for _ in range(6):
-            found = sample(box(alpha, ordered), rng, grey)
-            assert np.linalg.eigvalsh(cut.bounds.upper - found.lower)[0] > 0
-            assert np.linalg.eigvalsh(found.upper - cut.bounds.lower)[0] > 0
-            assert cut.bounds.contains((found.lower + found.upper) / 2)
-
-
-def test_the_ends_are_those_of_the_two_corners_solved_in_full():
-    grey, cut = noise(32, 3), box(0.0)
-    found = [*each_cut(grey, [box(1.0), cut])][1].bounds
-    for end, threshold in ((0, cut.thresholds[0][1]), (1, cut.thresholds[0][0])):
-        sides = [(p.lower, p.upper)[end] for p in cut.phases]
-        mask = grey >= threshold
-        corner = solve_image(
-            np.where(mask, sides[1].bulk, sides[0].bulk),
-            np.where(mask, sides[1].shear, sides[0].shear),
-            solver=FINE,
-        ).bounds
-        exact, near = ((corner.lower, found.lower), (corner.upper, found.upper))[end]
-        assert np.abs(near - exact).max() < 1e-4 * np.abs(exact).max()
-
-
-def test_three_phases_and_two_thresholds():
-    grey = noise(24, 4)
-    phases = [
-        ModuliInterval.crisp(PlaneModuli(k, g)) for k, g in ((1.0, 0.5), (3.0, 2.0), (9.0, 6.0))
-    ]
-    cut = next(each_cut(grey, [ImageBox([(0.3, 0.4), (0.6, 0.6)], phases)]))
-    labels = np.digitize(grey, [0.35, 0.6])
-    moduli = np.array([(1.0, 0.5), (3.0, 2.0), (9.0, 6.0)])[labels]
-    inside = solve_image(moduli[..., 0], moduli[..., 1]).bounds
-    assert cut.bounds.contains((inside.lower + inside.upper) / 2)
-    assert cut.nature == TWO_CORNERS
+def test_samples_never_leave_the_cut_and_its_ends_are_corners_where_phases_have_an_order(ordered):
+    grey, rng, model = smooth(24, 1), np.random.default_rng(2), ImageModel(division=1)
+    pairs = [images(grey, alpha, ordered) for alpha in ALPHA]
+    cuts = model.cuts(pairs, (pairs[-1], model.solve(pairs[-1])))
+    assert [cut.attained for cut in cuts] == [ordered, ordered, True]
+    for cut, alpha in zip(cuts, ALPHA, strict=True):
+        for _ in range(4):
+            inside = sample(rng, grey, alpha, ordered)
+            assert cut.bounds.contains((inside.lower + inside.upper) / 2)
+            low, high = inside.young(model.average)
+            assert cut.modulus[0] <= high
+            assert low <= cut.modulus[1]
+    if ordered:
+        corner = model.solve(ModuliImages((pairs[0].bulk[0],) * 2, (pairs[0].shear[0],) * 2, True))
+        assert (
+            np.abs(corner.bounds.lower - cuts[0].bounds.lower).max()
+            < 1e-3 * corner.bounds.lower[0, 0]
+        )
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_an_interval_of_poisson_ratios_is_enclosed(seed):
+def test_an_interval_of_poisson_ratios_is_enclosed_and_no_wider_than_it_must(seed):
     rng = np.random.default_rng(seed)
-    ratios = np.sort(rng.uniform(-0.5, 0.45, 2))
-    interval = ModuliInterval.of_young((2.0, 3.0), tuple(ratios))
+    ratios = tuple(np.sort(rng.uniform(-0.5, 0.45, 2)))
+    interval = ModuliInterval.of_young((2.0, 3.0), ratios)
     assert not interval.attained
-    for young, poisson in zip(rng.uniform(2, 3, 500), rng.uniform(*ratios, 500), strict=True):
-        moduli = PlaneModuli.of_young(young, poisson)
-        assert interval.lower.bulk <= moduli.bulk <= interval.upper.bulk
-        assert interval.lower.shear <= moduli.shear <= interval.upper.shear
+    nu = np.linspace(*ratios, 2001)
+    ends = [[PlaneModuli.of_young(e, float(n)) for n in nu] for e in (2.0, 3.0)]
+    for name in ("bulk", "shear"):
+        low, high = (np.array([getattr(m, name) for m in end]) for end in ends)
+        assert getattr(interval.lower, name) == pytest.approx(low.min(), rel=1e-6)
+        assert getattr(interval.upper, name) == pytest.approx(high.max(), rel=1e-6)
+        assert getattr(interval.lower, name) <= low.min()
+        assert getattr(interval.upper, name) >= high.max()
 
 
 def test_nested_cuts_hold_those_before():
     assert nested([(2.0, 3.0), (2.5, 4.0), (1.0, 3.5)]) == [(2.0, 3.0), (2.0, 4.0), (1.0, 4.0)]
 
 
+@pytest.mark.parametrize(("contrast", "rows", "parts"), [(9, 4, 2), (11, 4, 1), (9, 1 << 19, 1)])
+def test_pixels_are_divided_where_that_is_cheap(contrast, rows, parts):
+    image = np.ones((rows, 4))
+    image[0] = contrast
+    assert usual_division(ModuliImages((image, image), (image, image), attained=True)) == parts
+
+
+def test_a_width_is_reached_by_more_parts():
+    mixed = np.where(smooth(16, 3) > 0.5, 3.0, 1.0)
+    pair = ModuliImages((mixed, mixed), (mixed, mixed), attained=True)
+    _, usual = ImageModel().refined(pair)
+    model, solution = ImageModel(width=usual.bounds.width / 2).refined(pair)
+    assert model.parts == 4
+    assert solution.bounds.width <= usual.bounds.width / 2
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.npy"])
+def test_grey_values_are_read_as_they_are(tmp_path, name, kind):
+    values = np.random.default_rng(0).integers(0, np.iinfo(kind).max, (5, 7)).astype(kind)
+    path = tmp_path / name
+    if name.endswith("npy"):
+        np.save(path, values)
+    else:
+        pytest.importorskip("PIL.Image").fromarray(values).save(path)
+    assert np.array_equal(read_grey(path), values[::-1])
+
+
+BROKEN = {
+    "colour.png": np.zeros((4, 4, 3), np.uint8),
+    "nan.npy": np.array([[1.0, np.nan], [0.0, 1.0]]),
+    "line.npy": np.arange(5.0),
+    "text.png": b"no image",
+    "text.npy": b"no array",
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_files_that_are_no_plane_grey_image_are_refused(tmp_path, name):
+    path, content = tmp_path / name, BROKEN[name]
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif name.endswith("npy"):
+        np.save(path, content)
+    else:
+        pytest.importorskip("PIL.Image").fromarray(content).save(path)
+    with pytest.raises(RefusedError) as error:
+        read_grey(path)
+    assert error.value.key == name
+
+
+def test_an_image_too_large_for_memory_is_refused_with_a_piece_that_fits():
+    with pytest.raises(RefusedError, match=r"1000000 × 1000000 pixels .* crop a piece of"):
+        require_memory(1_000_000, 1_000_000, 1)
+
+
 @pytest.mark.parametrize(
-    ("thresholds", "phases", "told"),
-    [
-        ([(0.1, 0.2)], 3, "1 thresholds part 2 phases; 3 are given"),
-        ([(0.5, 0.5), (0.3, 0.6)], 3, "do not rise"),
-        ([(0.5, 0.4)], 2, "runs backwards"),
-    ],
+    "thresholds",
+    [((9.0, 9.0),), ((0.0, 2.0),), ((3.0, 3.5), (3.6, 4.0)), ((6.0, 6.0), (3.0, 3.0))],
 )
-def test_boxes_that_do_not_fit_are_refused(thresholds, phases, told):
-    phase = ModuliInterval.crisp(PlaneModuli(1.0, 1.0))
-    with pytest.raises(ValueError, match=told):
-        ImageBox(thresholds, [phase] * phases)
+def test_thresholds_that_leave_a_phase_empty_are_refused(thresholds):
+    with pytest.raises(RefusedError) as error:
+        require_phases(np.arange(8), thresholds)
+    assert error.value.key == "threshold"

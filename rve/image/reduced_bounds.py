@@ -1,4 +1,4 @@
-"""Reduced bases of an image, one a side, from solves at distant moduli."""
+"""Proved bounds of an image for any moduli of its phases, by reduced bases from a few solves."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from time import perf_counter
 import numpy as np
 from scipy.linalg import eigh
 
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.image.bounds import inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, Side, solve_side
-from alphacut.rve.image.reduced.basis import ReducedSide
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.rve.image.reduced_side import ReducedSide
 
 PIECE = 4000  # parameter points worked on at once
-
 NEGLIGIBLE = 1e-10  # relative energy of a field that is no use
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReducedBounds:
     """Proved bounds of the stiffness of an image for any moduli of its phases.
 
@@ -59,7 +58,7 @@ def widths(lower: Array, upper: Array) -> Array:
 
 
 def reduced_bounds(
-    labels: Array,
+    labels: Rows,
     bulk: Array,
     shear: Array,
     *,
@@ -80,8 +79,7 @@ def reduced_bounds(
         aspect: Height of a pixel over its width.
         solver: Stopping rule.
     """
-    began = perf_counter()
-    rule = solver or ConjugateGradient()
+    began, rule = perf_counter(), solver or ConjugateGradient()
     sides = [_empty(side, aspect, labels, bulk.shape[1]) for side in (DISPLACEMENT, STRESS)]
     chosen = _far_apart(np.log(np.hstack([bulk, shear])), solves)
     for k in chosen:
@@ -102,8 +100,8 @@ def _far_apart(logarithms: Array, number: int) -> list[int]:
     return chosen
 
 
-def _empty(side: Side, aspect: float, labels: Array, phases: int) -> ReducedSide:
-    fields = np.zeros((0, side.element(aspect).types, *labels.shape))
+def _empty(side: Side, aspect: float, labels: Rows, phases: int) -> ReducedSide:
+    fields = np.zeros((0, len(side.element(aspect).unknowns), *labels.shape))
     return ReducedSide.of(side, aspect, labels, phases, fields)
 
 
@@ -111,23 +109,16 @@ def _extended(
     reduced: ReducedSide, bulk: Array, shear: Array, solver: ConjugateGradient
 ) -> ReducedSide:
     """The side with what its best fields lack at these moduli, made orthogonal."""
+    own = reduced.side, reduced.aspect, reduced.labels, reduced.phases
     coefficients = reduced.coefficients(bulk[None], shear[None])
     shares = reduced.combination(coefficients)[0, 3:]
     start = np.tensordot(shares.T, reduced.fields, axes=1)
-    solution = solve_side(
-        reduced.side,
-        bulk[reduced.labels][None],
-        shear[reduced.labels][None],
-        solver=solver,
-        aspect=reduced.aspect,
-        start=start[None],
-    )
-    lacking = solution.fields[0] - start
-    raw = ReducedSide.of(reduced.side, reduced.aspect, reduced.labels, reduced.phases, lacking)
-    energies = np.tensordot(coefficients[0], raw.energies.value, axes=1)[3:, 3:]
-    values, vectors = np.linalg.eigh(energies)
-    uniform = np.tensordot(coefficients[0], raw.energies.value, axes=1)[:3, :3]
-    kept = values > NEGLIGIBLE * np.trace(uniform)
+    moduli = bulk[reduced.labels], shear[reduced.labels]
+    solution = solve_side(reduced.side, *moduli, solver=solver, aspect=reduced.aspect, start=start)
+    lacking = solution.fields - start
+    raw = ReducedSide.of(*own, lacking)
+    products = np.tensordot(coefficients[0], raw.energies.value, axes=1)
+    values, vectors = np.linalg.eigh(products[3:, 3:])
+    kept = values > NEGLIGIBLE * np.trace(products[:3, :3])
     turned = np.tensordot((vectors[:, kept] / np.sqrt(values[kept])).T, lacking, axes=1)
-    fields = np.concatenate([reduced.fields, turned])
-    return ReducedSide.of(reduced.side, reduced.aspect, reduced.labels, reduced.phases, fields)
+    return ReducedSide.of(*own, np.concatenate([reduced.fields, turned]))

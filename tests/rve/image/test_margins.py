@@ -1,0 +1,144 @@
+"""Every ingredient of the proof of an image's bounds, each tight within a factor of two somewhere.
+
+Rounded sums are judged by the order of summation that does worst: the first term is 1, each other
+one is lost. Halving a margin, or leaving it out, turns its test red.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from alphacut.rve.anisotropy import AVERAGES, AXES
+from alphacut.rve.image.bounds import StiffnessBounds, inverse_below, residual_above
+from alphacut.rve.image.fields.element import airy_element, displacement_element
+from alphacut.rve.image.fields.energy import (
+    COEFFICIENT,
+    PIECE,
+    UNIT,
+    Energies,
+    _anchored,
+    energies,
+    modes_of,
+)
+
+LOST = UNIT * (1 - 2.0**-20)  # just too little to change 1
+ELEMENTS = [displacement_element(), airy_element()]
+
+
+def in_order(terms):
+    """Their sum from the first to the last, and by what it is off."""
+    total = 0.0
+    for term in terms:
+        total += term
+    return abs(Fraction(total) - sum(map(Fraction, terms)))
+
+
+def tight(bound, error):
+    """Whether a bound holds and half of it does not."""
+    return error <= bound < 2 * error
+
+
+def test_the_sum_of_a_piece_of_products():
+    element = ELEMENTS[0]
+    fields, means = np.zeros((1, 8, 3, 3)), np.ones((len(element.modes), 1))
+    result = energies(element, fields, means, [(element.parts[0], np.ones((3, 3)))])
+    lost = in_order([1.0] + [LOST] * (PIECE - 1)) + COEFFICIENT * Fraction(UNIT)
+    assert tight(Fraction(result.summed), lost)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
+def test_the_product_of_modes_and_unknowns(element):
+    count = len(element.local)
+    row = int(np.argmax((element.modes != 0).sum(axis=1)))
+    used = [k for k in range(count) if element.modes[row, k] != 0 and k not in element.anchors[k]]
+    fields = np.zeros((1, len(element.unknowns), 4, 4))
+    for k in used:
+        kind, up, right = element.local[k]
+        fields[0, kind, 1 + up, 1 + right] = (1.0 if k == used[0] else LOST) / element.modes[row, k]
+    for anchors in element.anchors:
+        for anchor in anchors:
+            kind, up, right = element.local[anchor]
+            fields[0, kind, 1 + up, 1 + right] = 0.0
+    ((_, _, rounding),) = modes_of(element, fields, np.zeros((len(element.modes), 1)))
+    # a sum in order, the entries of the matrix off by ten units and their products by one
+    error = in_order([1.0] + [LOST] * (count - 1)) + 11 * Fraction(UNIT)
+    assert tight(Fraction(rounding[row, 0, 1, 1]), error)
+
+
+@pytest.mark.parametrize("element", ELEMENTS, ids=["displacement", "stress"])
+def test_the_difference_from_an_anchor(element):
+    k, (anchor, *_) = next(
+        (k, a) for k, a in enumerate(element.anchors) if len(a) == 1 and k not in a
+    )
+    raw = np.zeros((len(element.local), 1, 1, 1))
+    raw[k], raw[anchor] = 1.0, -LOST
+    local, doubt = _anchored(element, raw)
+    error = abs(Fraction(float(local[k, 0, 0, 0])) - 1 - Fraction(LOST))
+    assert tight(Fraction(float(doubt[k, 0, 0, 0])), error)
+
+
+def test_errors_of_modes_that_all_point_one_way():
+    size, wrong = 3.0, 1e-3
+    bound = Energies(np.full((1, 1, 1), size**2), np.full((1, 1), wrong), 0.0).rounding[0, 0, 0]
+    assert tight(bound, (size + wrong) ** 2 - size**2)
+
+
+def test_errors_of_entries_that_all_lift_one_load():
+    value, wrong = np.full((1, 3, 3), 1.0), np.full((1, 3), 1e-3)
+    one = Energies(value, wrong, 0.0)
+    lifted = one.value[0] + one.rounding[0]
+    assert np.linalg.eigvalsh(one.upper - lifted)[0] >= 0
+    half = one.value[0] + np.diag(one.rounding[0].sum(axis=1)) / 2
+    assert np.linalg.eigvalsh(half - lifted)[0] < 0
+
+
+def test_the_residual_of_an_inverse():
+    inverse, matrix = np.zeros((3, 3)), np.zeros((3, 3))
+    inverse[0], matrix[:, 0] = 1.0, [1.0, LOST, LOST]
+    assert residual_above(inverse, matrix)[0, 0] >= 2 * LOST
+    bound = residual_above(inverse, matrix)[0, 0] - abs(1 - (inverse @ matrix)[0, 0])
+    assert tight(Fraction(bound), in_order([1.0, LOST, LOST]))
+
+
+def test_the_inverse_is_below_and_near():
+    """Also where the computed one is off by a small matrix of the worst sign."""
+    rng, above = np.random.default_rng(0), 0
+    for _ in range(200):
+        root = rng.normal(size=(3, 3)) @ np.diag([1, 10.0 ** rng.uniform(-3, 0), 1])
+        matrix = root @ root.T
+        matrix = (matrix + matrix.T) / 2
+        product = matrix.astype(np.longdouble) @ inverse_below(matrix).astype(np.longdouble)
+        assert np.linalg.eigvals(product.astype(float)).real.max() <= 1 + 1e-15
+        plain = matrix.astype(np.longdouble) @ np.linalg.inv(matrix).astype(np.longdouble)
+        above += np.linalg.eigvals(plain.astype(float)).real.max() > 1 + 1e-15
+    assert above > 50  # so that an inverse without the margin would not pass
+
+
+def rational(stiffness, average):
+    """K, G, E and ν of an average, exactly."""
+    c = [[Fraction(x) for x in row] for row in stiffness.tolist()]
+    axial, shear = (c[0][0] + c[1][1]) / 2, c[2][2]
+    bulk, diagonal = (axial + c[0][1]) / 2, (axial - c[0][1]) / 2
+    if average != AXES:
+        shear = ((shear + diagonal) / 2 + 2 / (1 / shear + 1 / diagonal)) / 2
+    return bulk, shear, 3 * shear - shear**2 / bulk, (1 - shear / bulk) / 2
+
+
+@pytest.mark.parametrize("average", AVERAGES)
+def test_the_constants_of_one_stiffness(average):
+    rng, used = np.random.default_rng(1), np.zeros(4)
+    for _ in range(3000):
+        bulk = np.exp(rng.uniform(0, 3))
+        shear = bulk * 10.0 ** rng.choice([rng.uniform(-1, 0), rng.uniform(0.3, 4)])
+        c11, c22 = bulk + shear * np.exp(0.1 * rng.normal(size=2))
+        c12 = bulk - shear
+        one = np.array([[c11, c12, 0], [c12, c22, 0], [0, 0, shear * np.exp(0.1 * rng.normal())]])
+        bounds = StiffnessBounds(one, one)
+        ends = bounds.bulk, bounds.shear(average), bounds.young(average), bounds.poisson(average)
+        for k, ((low, high), exact) in enumerate(zip(ends, rational(one, average), strict=True)):
+            assert low <= exact <= high
+            if high > low:
+                off = abs(exact - (Fraction(low) + Fraction(high)) / 2)
+                used[k] = max(used[k], off / ((Fraction(high) - Fraction(low)) / 2))
+    assert (used[:2] > 0.5).all() if average != AXES else used[0] > 0.5

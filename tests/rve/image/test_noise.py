@@ -1,0 +1,66 @@
+"""Bounds of noisy images, unevenly lit, hold those of the clean image, or the image is refused."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.image.moduli import ModuliInterval
+from alphacut.rve.image.phase_images import moduli_images
+from alphacut.rve.image.solve import solve_between
+from alphacut.stochastic.segmentation import segmented
+from tests.stochastic.test_segmentation import picture
+
+PHASES = [ModuliInterval.of_young((e, e), (0.3, 0.3)) for e in (3.0, 70.0)]
+SURE = 0.02  # fraction, relative
+
+
+def bounds(first, last):
+    return solve_between(moduli_images(first, last, PHASES)).bounds
+
+
+def judged(grey, **options):
+    """The segmentation half-way between the levels that the image itself shows."""
+    threshold = (grey.min() + grey.max()) / 2
+    for _ in range(4):
+        (threshold,) = segmented(grey, [threshold]).middles
+    result = segmented(grey, [threshold], **options)
+    result.require()
+    return result
+
+
+def outcome(seed):
+    """The word for an image drawn from a seed: refused, right or wrong."""
+    rng = np.random.default_rng(seed)
+    noise, drift = (
+        rng.uniform(0, 0.4) * rng.choice([0.1, 0.4, 1]),
+        rng.uniform(0, 1) * rng.choice([0, 0.2, 1]),
+    )
+    options = {"smooth": bool(rng.integers(2)), "level": bool(rng.integers(2))}
+    grey, cover = picture(
+        rng, contrast=rng.uniform(40, 160), blur=rng.integers(3), noise=noise, drift=drift
+    )
+    try:
+        segmentation = judged(grey, **options)
+    except RefusedError:
+        return "refused"
+    clean = (cover >= 0.5).astype(int)
+    noisy, true = bounds(*segmentation.ranges()), bounds(clean, clean)
+    overlap = all(
+        np.linalg.eigvalsh(one.upper - other.lower)[0] >= 0
+        for one, other in ((noisy, true), (true, noisy))
+    )
+    near = abs(segmentation.fractions[1] / clean.mean() - 1) <= SURE
+    return "right" if overlap and near else f"wrong: {seed} {noise} {drift} {options}"
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_noisy_image_is_right_or_refused(seed):
+    assert outcome([seed, 52]) in ("right", "refused")
+
+
+@pytest.mark.slow
+def test_forty_noisy_images_are_right_or_refused(request):
+    seed = np.random.SeedSequence().entropy % 10**6
+    outcomes = [outcome([seed, k]) for k in range(40)]
+    assert not [word for word in outcomes if word.startswith("wrong")], seed
+    assert outcomes.count("right") >= 15, seed

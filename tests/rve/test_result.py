@@ -1,0 +1,190 @@
+"""E, ν and the constants of fibres: one definition each, and errors that cover and are tight."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import Phase, effective_modulus
+from alphacut.rve.anisotropy import (
+    AVERAGES,
+    AXES,
+    ISOTROPIC,
+    directional_shear,
+    directional_young,
+    plane_constants,
+    rotated,
+    shear_ratio,
+)
+from alphacut.rve.bounds import hashin_shtrikman
+from alphacut.rve.cell import STRAIN, square_moduli, square_voigt
+from alphacut.rve.fibre_constants import fibre_constants
+from alphacut.rve.series.longitudinal import longitudinal_shear
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.stochastic import HermiteMap
+
+MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
+CELL = square_stiffness(np.array([0.87]), MATRIX, [Phase(80e9, 0.2)]).matrix[0, 0]
+PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+PAIRS = [
+    (Phase(20e9, 0.2), Phase(80e9, 0.4)),
+    (Phase(20e9, 0.4999), Phase(20e6, 0.1)),
+    (Phase(20e9, 0.1), Phase(2e12, 0.45)),
+]
+
+
+def test_an_isotropic_plane_is_the_same_in_every_direction_and_by_every_average():
+    angles = np.linspace(0, np.pi, 7)
+    turned = rotated(MATRIX.stiffness, angles)
+    assert turned == pytest.approx(
+        np.broadcast_to(MATRIX.stiffness, (7, 3, 3)), rel=1e-13, abs=1e-3
+    )
+    assert directional_young(MATRIX.stiffness, angles) == pytest.approx(20e9 / (1 - 0.3**2))
+    assert directional_shear(MATRIX.stiffness, angles) == pytest.approx(20e9 / 2.6)
+    for average in AVERAGES:
+        own = plane_constants(square_moduli(MATRIX.stiffness), average)
+        assert own == pytest.approx((20e9, 0.3), rel=1e-12)
+
+
+def test_energy_does_not_depend_on_the_axes():
+    strain, angle = np.array([0.3, -0.2, 0.5]), 0.7
+    tensor = np.array([[strain[0], strain[2] / 2], [strain[2] / 2, strain[1]]])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    seen = turn @ tensor @ turn.T
+    seen = np.array([seen[0, 0], seen[1, 1], 2 * seen[0, 1]])
+    assert seen @ rotated(CELL, angle) @ seen == pytest.approx(strain @ CELL @ strain, rel=1e-13)
+
+
+def test_the_shear_of_a_square_array_is_extreme_along_axes_and_diagonals():
+    """4 % at r = 0.5 and 19 % at 0.87 for the paper's phases."""
+    cells = square_stiffness(np.array([0.5, 0.87]), MATRIX, [PARTICLE]).matrix[:, 0]
+    assert [round(100 * (shear_ratio(cell) - 1)) for cell in cells] == [4, 19]
+    ends = directional_shear(CELL, np.array([0.0, np.pi / 4]))
+    assert ends[1] / ends[0] == pytest.approx(shear_ratio(CELL), rel=1e-12)
+    young = directional_young(CELL, np.linspace(0, np.pi / 2, 46))
+    assert young == pytest.approx(young[::-1], rel=1e-12)
+
+
+def test_the_isotropic_average_is_half_way_between_those_of_equal_strain_and_stress():
+    """Shear over all directions by quadrature: of strains from above, of stresses from below."""
+    turned = rotated(CELL, np.linspace(0, np.pi, 360, endpoint=False))
+    ends = turned[:, 2, 2].mean(), 1 / np.linalg.inv(turned)[:, 2, 2].mean()
+    young, poisson = plane_constants(square_moduli(CELL), ISOTROPIC)
+    assert CELL[0, 0] + CELL[0, 1] == pytest.approx(young / (1 + poisson) / (1 - 2 * poisson))
+    assert young / 2 / (1 + poisson) == pytest.approx(np.mean(ends), rel=1e-12)
+
+
+def test_eq_16_is_the_average_along_the_axes_with_or_without_the_whole_stiffness():
+    moduli = square_moduli(CELL)
+    s11, s12 = STRAIN * moduli[0], 2 * STRAIN * moduli[2]
+    a, b = s12 / STRAIN, s11 / STRAIN
+    assert effective_modulus(s11, s12) == pytest.approx(
+        (a * (1 + (1 - a / b) / 2), (1 - a / b) / 2)
+    )
+    whole = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0]
+    bare = replace(whole, curve=replace(whole.curve, stiffness=None))
+    assert (bare.modulus, bare.poisson) == pytest.approx((whole.modulus, whole.poisson), rel=1e-12)
+    assert bare.estimated_error == pytest.approx(whole.estimated_error)
+    with pytest.raises(RefusedError, match="let the model make the whole plane stiffness"):
+        bare.averaged(ISOTROPIC)
+
+
+@pytest.mark.parametrize("average", AVERAGES)
+def test_e_nu_and_g_follow_from_the_stiffness_with_errors_that_cover(average):
+    radius, phase = HermiteMap(0.3, 0.1, 0.9, 0.2), Phase(80e9, 0.2)
+    rough, exact = (
+        SeriesModel(accuracy=a).solve(radius, MATRIX, [phase])[0].averaged(average)
+        for a in (1e-6, 1e-11)
+    )
+    young, poisson = plane_constants(square_moduli(rough.stiffness), average)
+    assert (rough.modulus, rough.poisson) == (young, poisson)
+    assert rough.shear == pytest.approx(young / 2 / (1 + poisson), rel=1e-12)
+    assert abs(rough.modulus / exact.modulus - 1) <= rough.estimated_error <= 1e-5
+    assert abs(rough.poisson - exact.poisson) <= rough.poisson_error <= 1e-5
+    assert sum(rough.error.values()) == pytest.approx(rough.estimated_error)
+    assert AVERAGES[average] in repr(rough)
+
+
+def test_the_isotropic_average_keeps_within_hashin_shtrikman_where_eq_16_does_not():
+    """Stiff fibres at 35 %: eq. 16 falls below what any isotropic composite can have."""
+    radius = HermiteMap(*(2 * np.sqrt(0.35 / np.pi), 0.0) * 2)
+    phases = Phase(3e9, 0.35), Phase(70e9, 0.22)
+    result = SeriesModel().solve(radius, phases[0], [phases[1]])[0]
+    bulk, shear = hashin_shtrikman(np.array(0.35), *phases)[:, 0]
+    least = 3 * shear - shear**2 / bulk
+    assert result.averaged(AXES).modulus < least < result.averaged(ISOTROPIC).modulus
+
+
+@pytest.mark.parametrize(("matrix", "inclusion"), PAIRS)
+def test_constants_of_fibres_are_those_of_one_transversely_isotropic_stiffness(matrix, inclusion):
+    result = SeriesModel().solve(PAPER, matrix, [inclusion])[0].averaged(ISOTROPIC)
+    c = fibre_constants(result).values
+    across = c["E_T"] / (2 * c["G_T"]) - 1  # ν_TT of the plane of isotropy
+    along = -c["nu_LT"] / c["E_L"]
+    compliance = np.array([[1, -across, 0], [-across, 1, 0], [0, 0, 0]]) / c["E_T"] + np.array(
+        [[0, 0, along], [0, 0, along], [along, along, 1 / c["E_L"]]]
+    )
+    stiffness = np.linalg.inv(compliance)
+    bulk = (stiffness[0, 0] + stiffness[0, 1]) / 2
+    assert bulk == pytest.approx(c["K_T"], rel=1e-9)
+    assert bulk == pytest.approx(result.moduli[0] / 2, rel=1e-9)
+    assert (stiffness[0, 0] - stiffness[0, 1]) / 2 == pytest.approx(result.shear, rel=1e-9)
+
+
+def test_equal_poissons_ratios_mix_the_modulus_along_the_fibres_exactly():
+    result = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0]
+    constants = fibre_constants(result)
+    share = result.curve.weights @ (np.pi / 4 * PAPER(result.curve.theta) ** 2)
+    assert constants.values["E_L"] == pytest.approx(20e9 + share * 60e9, rel=1e-10)
+    assert constants.values["nu_LT"] == pytest.approx(0.3, rel=1e-9)
+    assert constants.errors["E_L"] < 1e-9 * constants.values["E_L"]
+
+
+def test_phases_of_one_bulk_modulus_leave_what_the_bounds_leave():
+    """The plane then tells nothing of E_L; the declared error is the width of the bounds."""
+    matrix, poisson = Phase(20e9, 0.2), 0.35
+    bulk = (matrix.stiffness[0, 0] + matrix.stiffness[0, 1]) / 2
+    modulus = 2 * bulk * (1 + poisson) * (1 - 2 * poisson)
+    vague, clear = (
+        fibre_constants(SeriesModel().solve(PAPER, matrix, [Phase(e, poisson)])[0])
+        for e in (modulus, 1.001 * modulus)
+    )
+    for name, error in vague.errors.items():
+        assert abs(vague.values[name] - clear.values[name]) <= error + 2e-3 * vague.values[name]
+    assert 0 < vague.errors["E_L"] < 1e-3 * vague.values["E_L"]
+
+
+def test_shear_along_the_fibres_is_dual_and_dilute():
+    """Keller: moduli of a contrast and of its inverse multiply to the matrix' squared."""
+    radius = np.array([0.2, 0.5, 0.9, 0.99])
+    stiff, error = longitudinal_shear(radius, MATRIX, PARTICLE)
+    soft, _ = longitudinal_shear(radius, MATRIX, Phase(5e9))
+    shear = MATRIX.stiffness[2, 2]
+    assert stiff * soft == pytest.approx(np.full(4, shear**2), rel=1e-10)
+    assert (error < 1e-9).all()
+    thin, _ = longitudinal_shear(np.array([0.01]), MATRIX, PARTICLE)
+    assert thin[0] / shear == pytest.approx(1 + 2 * np.pi / 4 * 0.01**2 * 3 / 5, rel=1e-7)
+
+
+def test_without_a_cell_there_are_no_constants():
+    result = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0]
+    with pytest.raises(RefusedError, match="round particles and isotropic phases"):
+        fibre_constants(replace(result, cell=None))
+
+
+@pytest.mark.parametrize("part", [0, 1, 2])
+@pytest.mark.parametrize(("matrix", "inclusion"), PAIRS)
+def test_an_error_of_the_plane_is_declared_for_all_that_follows(matrix, inclusion, part):
+    """One modulus of the plane off by what is declared of it: no more and no less is declared."""
+    exact = SeriesModel().solve(PAPER, matrix, [inclusion])[0].averaged(ISOTROPIC)
+    error = np.where(np.arange(3) == part, 1e-6, 0.0)
+    moduli = square_moduli(np.asarray(exact.curve.stiffness)) * (1 + error)
+    curve = replace(exact.curve, stiffness=square_voigt(*moduli.T))
+    off = fibre_constants(replace(exact, curve=curve, errors={"space": error}))
+    for name, value in fibre_constants(exact).values.items():
+        true = abs(off.values[name] - value)
+        assert true <= off.errors[name] * (1 + 1e-6)
+        if true > 1e-8 * value:
+            assert off.errors[name] <= 1.8 * true

@@ -1,0 +1,82 @@
+"""A segmentation is judged before anything rests on it."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stochastic.segmentation import CONFIDENT, segmented
+
+SIZE = 96
+
+
+def picture(rng, *, contrast=100.0, blur=1.0, noise=0.0, drift=0.0):
+    """Grey values of discs from 60 up, and how far each pixel is covered, shape (SIZE, SIZE)."""
+    places, cover = (np.arange(SIZE) + 0.5) / SIZE, np.zeros((SIZE, SIZE))
+    for radius in rng.uniform(0.05, 0.1, 12):
+        x, y = rng.random(2)
+        across, up = ((places - c + 0.5) % 1 - 0.5 for c in (x, y))
+        distance = (radius - np.hypot(across, up[:, None])) * SIZE
+        edge = np.clip(0.5 + distance / (2 * blur), 0, 1) if blur else distance > 0
+        cover = np.maximum(cover, edge)
+    v, u = np.meshgrid(*(np.linspace(-1, 1, SIZE),) * 2, indexing="ij")
+    light = np.tensordot(rng.normal(size=5), [u, v, u * u / 2, u * v / 2, v * v / 2], axes=1)
+    light = drift * contrast * (light - light.mean()) / np.ptp(light)
+    grain = noise * contrast * rng.normal(size=cover.shape)
+    return np.rint(60 + contrast * cover + light + grain), cover
+
+
+@pytest.mark.parametrize(("noise", "drift"), [(0.02, 0.0), (0.1, 0.0), (0.02, 0.3), (0.05, 0.2)])
+def test_noise_and_light_are_measured(noise, drift):
+    grey, _ = picture(np.random.default_rng(4), noise=noise, drift=drift)
+    judged = segmented(grey, [110])
+    assert judged.noise == pytest.approx(100 * noise, rel=0.15)
+    assert judged.drift == pytest.approx(100 * drift, abs=5)
+    assert judged.levels[1] - judged.levels[0] == pytest.approx(100, rel=0.03)
+    assert judged.separation == pytest.approx(0.5 / noise, rel=0.2)
+
+
+def test_a_clean_image_is_as_sharp_as_its_threshold():
+    grey, _ = picture(np.random.default_rng(0))
+    judged = segmented(grey, [110])
+    assert judged.open == 0
+    assert judged.fractions[1] == np.mean(grey >= 110)
+
+
+def test_a_border_is_open_by_the_deviations_of_the_noise():
+    """A ramp of grey values: what is open is as wide as the confidence says, no less."""
+    rng, noise = np.random.default_rng(1), 4.0
+    plain = np.repeat([0.0, 100.0], 200)
+    plain[180:220] = np.linspace(0, 100, 40)
+    judged = segmented(plain + noise * rng.normal(size=(100, 400)), [50])
+    first, last = judged.ranges()
+    truly = plain >= 50
+    sure = first == last
+    assert np.mean((first[sure] > 0) != np.broadcast_to(truly, first.shape)[sure]) < 1e-4
+    assert (~sure).sum() == pytest.approx(100 * 40 / 100 * 2 * CONFIDENT * noise, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("noise", "drift", "options"),
+    [(0.2, 0.0, {}), (0.02, 0.9, {}), (0.6, 0.0, {"smooth": True})],
+)
+def test_what_noise_and_light_leave_too_open_is_refused(noise, drift, options):
+    grey, _ = picture(np.random.default_rng(2), noise=noise, drift=drift)
+    with pytest.raises(RefusedError) as error:
+        segmented(grey, [110], **options).require()
+    assert error.value.key == "threshold"
+
+
+@pytest.mark.parametrize(
+    ("noise", "drift", "options"),
+    [(0.2, 0.0, {"smooth": True}), (0.02, 0.9, {"level": True})],
+)
+def test_smoothing_and_levelling_cure_what_was_refused(noise, drift, options):
+    grey, cover = picture(np.random.default_rng(2), noise=noise, drift=drift)
+    judged = segmented(grey, [110], **options)
+    judged.require()
+    assert judged.fractions[1] == pytest.approx(np.mean(cover >= 0.5), rel=0.03)
+
+
+def test_a_threshold_beyond_the_grey_values_is_refused():
+    with pytest.raises(RefusedError, match="leave each class some pixels"):
+        segmented(np.random.default_rng(0).normal(size=(9, 9)), [30])
