@@ -77,14 +77,16 @@ class Peaks:
 
 def peaks(envelope: Envelope) -> Peaks:
     """Fuzzy peaks of the magnitude of every output."""
-    stated, error, inner = Ends(envelope.lower, envelope.upper), _error(envelope), _inner(envelope)
-    size = np.maximum(stated.upper, -stated.lower)
-    away = np.maximum(np.maximum(stated.lower, -stated.upper), 0.0)
+    natures = envelope.natures or (envelope.nature,) * len(envelope.outputs)
+    proved = np.array([nature is Nature.GUARANTEED for nature in natures])
+    error = np.where(proved, 0.0, envelope.error)  # of proved bounds it lies inside them
+    inner = envelope.attained
+    size = np.maximum(envelope.upper, -envelope.lower)
+    away = np.maximum(np.maximum(envelope.lower, -envelope.upper), 0.0)
     upper, lower = size.max(1), away.max(1)
     above = within_steps(size + error, envelope.between).max(1) - upper
     below = lower - np.maximum(away - error, 0.0).max(1)
     reached = np.nan_to_num(np.maximum(inner.upper, -inner.lower).max(1), nan=0.0)
-    natures = _natures(envelope)
     return Peaks(
         np.asarray(envelope.alpha),
         tuple(map(str, envelope.outputs)),
@@ -108,19 +110,3 @@ def within_steps(size: Array, between: Array | None) -> Array:
     out = size.copy()
     out[..., 1:, :] = np.maximum(size[..., 1:, :], size[..., :-1, :]) + between[1:]
     return out
-
-
-def _natures(envelope: Envelope) -> tuple[Nature, ...]:
-    return tuple(map(envelope.nature_of, envelope.outputs))
-
-
-def _error(envelope: Envelope) -> Array:
-    """Error by which the stated bounds may be short, shape (A, T, m)."""
-    if envelope.nature is Nature.GUARANTEED:
-        return np.zeros(envelope.lower.shape)
-    return envelope.error
-
-
-def _inner(envelope: Envelope) -> Ends:
-    """Bounds that are attained, NaN where none is known, shape (A, T, m) each."""
-    return envelope.attained

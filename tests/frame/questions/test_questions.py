@@ -88,7 +88,9 @@ def test_any_of_several_limits_is_as_possible_as_the_most_possible(proved):
 
 
 def test_attained_bounds_exclude_nothing_and_say_so():
-    motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="graph-follower")
+    motion = envelope(
+        FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="quasi-monte-carlo"
+    )
     of = peaks(motion)
     assert set(of.natures) == {Nature.ATTAINED}
     far = passing(of, {"q1": 10 * of.upper[0, 0]})["q1"]
