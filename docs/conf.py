@@ -14,12 +14,18 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 project = "alphacut"
 author = "The alphacut developers"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
-myst_enable_extensions = ["dollarmath", "colon_fence"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_update_mathjax = False
 myst_heading_anchors = 3
-source_suffix = {".md": "markdown"}
-exclude_patterns = ["README.md"]
+# demos are programs in percent format: they run while the pages are built
+source_suffix = {".md": "myst-nb", ".py": "myst-nb"}
+nb_custom_formats = {".py": ["jupytext.reads", {"fmt": "py:percent"}]}
+nb_execution_mode = "cache"
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+exclude_patterns = ["conf.py", "**/__pycache__"]
+suppress_warnings = ["mystnb.unknown_mime_type"]
 html_theme = "furo"
 html_title = "alphacut"
 html_theme_options = {"source_repository": "", "navigation_with_keys": True}
@@ -46,11 +52,11 @@ mathjax2_config = {
 }
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
-nitpicky = False
+autodoc_default_options = {"members": True, "imported-members": True, "inherited-members": True}
 
 
 def copy_mathjax(app: Sphinx) -> None:
-    """Put what draws formulas beside the pages."""
+    """Puts the scripts that draw formulas beside the pages."""
     for part in MATHJAX_PARTS:
         source, target = MATHJAX / part, Path(app.outdir) / "_static/mathjax" / part
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -63,12 +69,12 @@ def copy_mathjax(app: Sphinx) -> None:
 def without_modules(
     _app: Sphinx, _page: str, _template: str, context: dict[str, Any], _doctree: object
 ) -> None:
-    """Leave the theme's script out, which browsers refuse to pages that are opened from a disk."""
+    """Leaves the theme's script out, which browsers refuse to pages that are opened from a disk."""
     scripts = context["script_files"]
     context["script_files"] = [one for one in scripts if "scripts/furo.js" not in str(one)]
 
 
 def setup(app: Sphinx) -> None:
-    """Hook into the build."""
+    """Hooks into the build."""
     app.connect("builder-inited", copy_mathjax)
     app.connect("html-page-context", without_modules, priority=900)
