@@ -25,7 +25,7 @@ nb_execution_mode = "cache"
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
 exclude_patterns = ["conf.py", "**/__pycache__"]
-suppress_warnings = ["mystnb.unknown_mime_type"]
+suppress_warnings = ["mystnb.unknown_mime_type", "myst-nb.lexer"]
 html_theme = "furo"
 html_title = "alphacut"
 html_theme_options = {"source_repository": "", "navigation_with_keys": True}
@@ -74,7 +74,17 @@ def without_modules(
     context["script_files"] = [one for one in scripts if "scripts/furo.js" not in str(one)]
 
 
+def with_fields(
+    _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
+) -> None:
+    """Adds the keys of a section of a case to its description, from the model's own fields."""
+    for key, field in getattr(documented, "model_fields", {}).items():
+        needed = " (needed)" if field.is_required() else ""
+        lines += ["", f"- ``{key}``{needed}: {field.description or 'a section'}"]
+
+
 def setup(app: Sphinx) -> None:
     """Hooks into the build."""
     app.connect("builder-inited", copy_mathjax)
+    app.connect("autodoc-process-docstring", with_fields)
     app.connect("html-page-context", without_modules, priority=900)
