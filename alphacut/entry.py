@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from alphacut.commands.parser import Parser, split_petsc
-from alphacut.fuzzy import CampaignError
+from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import leave as leave
 from alphacut.io.files import open_streams, rank, ranks, say, standard_output

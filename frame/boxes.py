@@ -14,7 +14,7 @@ from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.fuzzy.arguments import fuzzy_inputs
+from alphacut.fuzzy.knowledge.joint import joined_inputs as fuzzy_inputs
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 

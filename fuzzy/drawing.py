@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.fuzzy.refused import RefusedError
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -14,14 +16,10 @@ _BLUE = "#0072B2"
 
 
 def new_axes(axes: Axes | None) -> Axes:
-    """The given axes, or those of a new figure that a notebook shows.
-
-    Raises:
-        ValueError: What is given is none.
-    """
+    """The axes, or those of a new figure that a notebook shows."""
     if axes is not None:
         if not hasattr(axes, "fill_between"):
-            raise ValueError(f"the axes are {axes!r}; give Matplotlib's, or none for a new figure")
+            raise RefusedError("axes", axes, "Matplotlib's, or none for a new figure")
         return axes
     from matplotlib import pyplot
 

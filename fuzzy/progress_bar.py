@@ -6,7 +6,9 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import Any, Literal
+from typing import Any
+
+from alphacut.fuzzy.refused import RefusedError
 
 Progress = Callable[[float], None]
 _WAIT = 1.0  # seconds before a bar appears
@@ -58,12 +60,10 @@ def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
             notebook to show it; False for nothing.
 
     Raises:
-        ValueError: It is neither.
+        RefusedError: It is neither.
     """
     if not (progress is None or isinstance(progress, bool) or callable(progress)):
-        raise ValueError(
-            f"progress is {progress!r}; it must be a function of the share done, or False for none"
-        )
+        raise RefusedError("progress", progress, "a function of the share done, False for none")
     if callable(progress) or progress is False:
         yield progress or None
         return
@@ -72,11 +72,6 @@ def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
         yield bar if bar.show else None
     finally:
         bar.close()
-
-
-def part(progress: Progress | None, done: int, of: int) -> Progress | Literal[False]:
-    """Progress of one of several equal parts, to be told to the whole; False where nobody asks."""
-    return (lambda share: progress((done + share) / of)) if progress else False
 
 
 class _Bar:

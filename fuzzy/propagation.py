@@ -2,56 +2,52 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Literal
 
-from alphacut.fuzzy.arguments import (
-    fuzzy_inputs,
-    interaction_list,
-    known_facts,
-    require_callable,
-    require_plan,
-    shared_numbers,
-    wider_steps,
-)
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.campaign.sample_store import shelf
-from alphacut.fuzzy.campaign.spot_check import SpotCheck
-from alphacut.fuzzy.campaign.store import Identity, Store
-from alphacut.fuzzy.campaign.workers import pool, require_executor, require_workers
-from alphacut.fuzzy.counted import counted
+from alphacut.fuzzy.campaign.store import Identity, Store, model_key
+from alphacut.fuzzy.campaign.workers import pool, require_executor
+from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
+from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.progress_bar import Progress, told
-from alphacut.fuzzy.samples.result import FuzzyResult, Plan
+from alphacut.fuzzy.refused import RefusedError, chosen, real
+from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
+
+BUDGET = 10_000
+"""Evaluations of the model that a call may take unless it says more."""
 
 
 def propagate(
     function: Function,
     inputs: Mapping[str, FuzzyNumber | float],
-    plan: Plan | None = None,
+    method: Method | None = None,
     *,
     alpha: Sequence[float] | None = None,
     interactions: Sequence[Interaction] = (),
+    known: Known | None = None,
+    budget: int = BUDGET,
+    units: Mapping[str, str] | None = None,
+    on_failure: Literal["raise", "skip"] = "raise",
     shared: Sequence[str] = (),
     vectorised: bool = False,
     workers: int = 1,
     executor: Executor | None = None,
-    known: Known | None = None,
     store: Store | str | Path | None = None,
     identity: Identity | None = None,
-    spot_check: float = 0.05,
     progress: Progress | bool | None = None,
-) -> FuzzyResult:
+) -> Bounds:
     """Fuzzy outputs of a function of fuzzy inputs.
 
     Args:
@@ -60,97 +56,98 @@ def propagate(
             in those inputs and returns a list of outputs; with `vectorised` it gets arrays, shape
             (n,), and returns arrays whose first axis is n.
         inputs: Fuzzy number of each input; a plain number is crisp. Inputs are independent, also
-            where one number object stands for two.
-        plan: How the boxes of the inputs are searched; if not given, a search that sees extremes
-            inside and says what was verified.
+            where one number object stands for two. Claims are joined (`jointly`).
+        method: How the boxes of the inputs are searched; `Automatic` if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
-        interactions: Constraints between the inputs; plans that cannot respect them refuse.
+        interactions: Constraints between the inputs; methods that cannot respect them refuse.
+        known: Facts about the function, such as the signs of its effects, on which guaranteed
+            bounds rest.
+        budget: Evaluations that the call may take, stored ones among them. Methods that know their
+            samples beforehand refuse to begin; a search ends, and says so.
+        units: Unit of each output by name, which every text, table and drawing then shows.
+        on_failure: "raise" ends the call where a sample failed, after all others have been run;
+            "skip" leaves such samples out: the bounds are then attained only.
         shared: Inputs whose equality lets samples share one call.
         vectorised: Whether the function takes arrays.
         workers: Processes of this machine; the result is the same for any number. They import the
             main script, so its calls must stand under `if __name__ == "__main__":` and the function
             in a file.
         executor: Any `concurrent.futures` executor, instead of `workers`.
-        known: Facts about the function, such as the signs of its effects, on which guaranteed
-            bounds rest.
         store: Where samples are kept (or its path): a campaign that was stopped, however, resumes
             from it.
         identity: What a sample depends on besides its inputs (case, options, versions), as JSON can
             say it; a store needs it, not empty. The store cannot see that the function changed: say
             so here, by a version or a hash of its text.
-        spot_check: Time for running samples from the store again, as a share of the time that they
-            took: the modal point (or another, if it is not stored) in any case, then random ones.
-            The store is refused if one gives something else; 0 runs none. Without store and budget
-            the first of 20 samples or more is run again: random functions are warned of.
-        progress: Called with the share done, 0 … 1; of a plan that goes on from its samples a
-            guess that never falls. If not given, a bar appears on a terminal or in a notebook after
-            a second; False shows none.
+        progress: Called with the share done. If not given, a bar appears on a terminal or in a
+            notebook after a second; False shows none.
 
     Raises:
-        ValueError: An argument is wrong.
-        KeyboardInterrupt: Interrupted; its message says what the store keeps.
+        RefusedError: An argument is wrong, or the budget does not carry the method.
         CampaignError: Samples failed; the others were run first.
-        StoreError: The store cannot be written.
-        RuntimeError: The workers cannot start.
+        FailedError: The store cannot be written, a worker died, or a cut has no sample.
     """
-    domain = Domain(
-        fuzzy_inputs(inputs), levels(4) if alpha is None else alpha, interaction_list(interactions)
-    )
-    known = known_facts(known, domain.names)
-    plan = plan or Automatic()
-    require_plan(plan)
-    require_workers(workers)
-    require_executor(executor, workers)
-    require_callable(function, domain.names, by_name=not shared, sent=workers > 1)
-    call = Call(function, domain.names, tuple(shared), vectorised)
     start = perf_counter()
+    domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
+    method, known = method or Automatic(), known or Known()
+    if not hasattr(method, "run") or isinstance(method, type):
+        raise RefusedError("method", repr(method), "an object such as General() or Signed()")
+    known.check_inputs(domain.names)
+    chosen("on_failure", on_failure, ("raise", "skip"))
+    real("budget", budget, positive=True, whole=True)
+    require_executor(executor, workers)
+    call = Call(function, domain.names, tuple(shared), vectorised)
+    key = b"" if store is None else model_key(identity or {})
     with (
         told(progress) as tell,
         nullcontext(executor) if executor else pool(workers) as running,
-        shelf(store, identity, domain.names) as samples,
+        nullcontext(store) if isinstance(store, Store | None) else Store(store) as shelf,
     ):
-        check = SpotCheck(spot_check, domain.modal)
-        campaign = Campaign(
-            call, running, tell, known, samples, stepwise=plan.stepwise, spot_check=check
-        )
-        with on_interrupt(lambda: _kept(campaign, store)):
-            result = plan.run(campaign, domain)
-            within = store is None and not (isinstance(plan, Automatic) and plan.budget)
-            doubt = campaign.randomness() if within else ""
-        result = result.confronted(known.stated(domain.names, result.outputs))
+        skip = on_failure == "skip"
+        campaign = Campaign(call, known, budget, running, tell, shelf, key, skip)
+        bounds = method.run(campaign, domain)
         campaign.report(1.0)
-    if doubt:
-        warnings.warn(doubt, stacklevel=2)
-    own = filter(None, (TORN if samples is not None and samples.torn else "", doubt))
-    noted = (*shared_numbers(domain), *wider_steps(domain), *own)
-    result = replace(result, notes=(*result.notes, *noted))
-    cost = {"calls": campaign.calls, "reused": campaign.reused, "seconds": perf_counter() - start}
-    return replace(result, **cost)  # type: ignore[arg-type]
+    bounds = _without_failed(bounds, campaign.failed)
+    return replace(
+        bounds,
+        units=_units(units or {}, bounds.outputs),
+        evaluations=campaign.evaluations,
+        calls=campaign.calls,
+        reused=campaign.reused,
+        budget=budget,
+        notes=(*bounds.notes, *_wider_steps(domain)),
+        seconds=perf_counter() - start,
+    )
 
 
-TORN = (
-    "the store ended within a sample, as after a kill or a partial copy: what is whole was taken,"
-    " the rest was run anew"
-)
+def _without_failed(bounds: Bounds, failed: int) -> Bounds:
+    """The bounds as attained ones where samples were left out."""
+    if not failed:
+        return bounds
+    note = f"{failed} samples failed and were left out: the true range may reach further there"
+    return replace(
+        bounds,
+        nature=Nature.ATTAINED,
+        natures=(),
+        error=0 * bounds.lower,
+        basis=(),
+        inner=None,
+        notes=(*bounds.notes, note),
+    )
 
 
-@contextmanager
-def on_interrupt(words: Callable[[], str]) -> Iterator[None]:
-    """Say on Ctrl-C what is kept, in words."""
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; {words()}") from None
+def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
+    """Unit of each output; an entry of an array has its array's."""
+    names = {name.partition("[")[0] for name in outputs}.union(outputs)
+    for name in units:
+        chosen("unit of", name, sorted(names))
+    own = tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
+    return own if units else ()
 
 
-def _kept(campaign: Campaign, store: Store | str | Path | None) -> str:
-    """How many samples are kept, and how to go on."""
-    done = campaign.runs + campaign.reused
-    if store is None or campaign.shelf is None:
-        were = f"{counted(done, 'sample')} {'was' if done == 1 else 'were'} done"
-        return f"{were} and none is kept: `propagate` keeps them in a store="
-    path, more = store.path if isinstance(store, Store) else store, campaign.shelf.held
-    mine = f"the {counted(done, 'sample')} of this call {'is' if done == 1 else 'are'} in {path}"
-    mine = mine if done else f"no sample of this call is in {path}"
-    more -= campaign.reused
-    return f"{mine}{f', which holds {more} more' * (more > 0)}: the same call goes on from there"
+def _wider_steps(domain: Domain) -> tuple[str, ...]:
+    """Note on levels at which a cut stands for a narrower one that is not known."""
+    numbers = domain.inputs.values()
+    between = [x for x in domain.alpha if any(number.known(x) != x for number in numbers)]
+    shown = ", ".join(f"{level:g}" for level in between)
+    note = f"at α = {shown} an input's cut is that of a level below, as its own is not known"
+    return (note,) if between else ()

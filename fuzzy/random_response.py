@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Values
-from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.numbers import Array
 
 _STRATA = 2000  # equally likely parts of θ: the resolution of a probability is 1 / _STRATA
 
@@ -38,66 +39,60 @@ class RandomResponse:
 
     @classmethod
     def from_curves(
-        cls, result: FuzzyResult, curve: str, *, theta: str, quantile: Callable[[Array], Array]
+        cls,
+        domain: Domain,
+        points: Array,
+        curves: Array,
+        *,
+        theta: Array,
+        quantile: Callable[[Array], Array],
     ) -> RandomResponse:
-        """From an output that is a curve over θ.
+        """From the response at nodes of θ.
 
         Args:
-            result: A propagation whose samples hold the curve and its nodes.
-            curve: Output with the response at the nodes.
-            theta: Output with the nodes, rising.
+            domain: Fuzzy inputs and levels.
+            points: Samples of the fuzzy inputs, shape (n, inputs).
+            curves: Response at the nodes, shape (n, nodes).
+            theta: Nodes, rising, shape (nodes,).
             quantile: Quantile function of θ, any shape.
         """
         from scipy.interpolate import PchipInterpolator
 
-        wanted = quantile((np.arange(_STRATA) + 0.5) / _STRATA)
-        nodes, values = result.values.output(theta), result.values.output(curve)
-        rows = [
-            PchipInterpolator(nodes[i], values[i], extrapolate=True)(wanted)
-            for i in range(len(nodes))
-        ]
-        return cls(result.domain, result.points, np.sort(np.array(rows), axis=1))
+        at = quantile((np.arange(_STRATA) + 0.5) / _STRATA)
+        values = PchipInterpolator(theta, curves, axis=1, extrapolate=True)(at)
+        return cls(domain, points, np.sort(values, axis=1))
 
-    def mean(self) -> FuzzyResult:
+    def mean(self) -> Bounds:
         """Fuzzy mean of the response; output `mean`."""
         return self._bounds("mean", self.ordered.mean(axis=1, keepdims=True))
 
-    def p_box(self, at: ArrayLike) -> FuzzyResult:
+    def p_box(self, at: ArrayLike) -> Bounds:
         """Bounds of the distribution function at responses `at` (m,), on each cut."""
         return self._bounds("cdf", self._below(at))
 
-    def exceedance(self, limit: ArrayLike) -> FuzzyResult:
+    def exceedance(self, limit: ArrayLike) -> Bounds:
         """Fuzzy probability that the response exceeds each limit (m,)."""
         return self._bounds("exceedance", 1 - self._below(limit))
 
-    def quantile(self, probability: ArrayLike) -> FuzzyResult:
-        """Fuzzy quantiles of the response at probabilities (m,) in (0, 1).
-
-        Raises:
-            ValueError: A probability lies outside (0, 1).
-        """
-        wanted = np.atleast_1d(np.asarray(probability, float))
-        if not ((wanted > 0) & (wanted < 1)).all():
-            raise ValueError(
-                f"the probability of a quantile is {wanted.tolist()}; it must lie inside (0, 1)"
-            )
+    def quantile(self, probability: ArrayLike) -> Bounds:
+        """Fuzzy quantiles of the response at probabilities (m,) inside (0, 1)."""
+        at = np.atleast_1d(np.asarray(probability, float))
+        if not ((at > 0) & (at < 1)).all():
+            raise RefusedError("probability", at.tolist(), "values inside (0, 1)")
         strata = (np.arange(self.ordered.shape[1]) + 0.5) / self.ordered.shape[1]
-        return self._bounds(
-            "quantile", np.array([np.interp(wanted, strata, row) for row in self.ordered])
-        )
+        table = np.array([np.interp(at, strata, row) for row in self.ordered])
+        return self._bounds("quantile", table)
 
     def _below(self, at: ArrayLike) -> Array:
         """Probability of a response up to `at` (m,) at every sample, shape (n, m)."""
-        responses = np.atleast_1d(np.asarray(at, float))
-        if not np.isfinite(responses).all():
-            raise ValueError(f"the responses are {responses.tolist()}; all must be finite")
+        responses = np.array([real("response", x) for x in np.atleast_1d(at).tolist()])
         return np.array([_share_below(row, responses) for row in self.ordered])
 
-    def _bounds(self, name: str, table: Array) -> FuzzyResult:
+    def _bounds(self, name: str, table: Array) -> Bounds:
         """α-cuts of a quantity that each sample has, shape (n, m)."""
-        values = Values(((name, table.shape[1:]),), table)
-        result = Design.from_samples(self.domain, self.points).bounds(values, plan="polymorphic")
-        return replace(result, notes=(f"probabilities resolve to 1/{self.ordered.shape[1]}",))
+        design = Design.from_samples(self.domain, self.points)
+        bounds = design.bounds(Values(((name, table.shape[1:]),), table), "stored samples")
+        return replace(bounds, notes=(f"probabilities resolve to 1/{self.ordered.shape[1]}",))
 
 
 def _share_below(ordered: Array, at: Array) -> Array:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from math import isfinite, nan
+from numbers import Integral, Real
+
 
 class RefusedError(ValueError):
     """A value that has no meaning where it stands.
@@ -30,3 +34,36 @@ class FailedError(RuntimeError):
     def __init__(self, what: str, cure: str = "") -> None:
         self.what, self.cure = what, cure
         super().__init__(what + (f"; {cure}" if cure else ""))
+
+
+def real(key: str, value: object, *, positive: bool = False, whole: bool = False) -> float:
+    """A finite number; True and False are none.
+
+    Args:
+        key: Name of the argument.
+        value: What stands for it.
+        positive: Whether it must be greater than 0.
+        whole: Whether it must be a whole number; then 1 or more where `positive`, else 0 or more.
+
+    Raises:
+        RefusedError: It is none.
+    """
+    kind = Integral if whole else Real
+    truth = type(value).__name__ in ("bool", "bool_")
+    number = float(value) if isinstance(value, kind) and not truth else nan
+    if not isfinite(number) or (positive and number <= 0) or (whole and number < 0):
+        what = "whole numbers" if whole else "finite numbers"
+        least = " greater than 0" if positive else " of 0 or more" if whole else ""
+        raise RefusedError(key, repr(value), what + least)
+    return number
+
+
+def chosen(key: str, value: object, names: Iterable[str]) -> None:
+    """Refuse a word that is none of those.
+
+    Raises:
+        RefusedError: It is none.
+    """
+    known = tuple(names)
+    if value not in known:
+        raise RefusedError(key, repr(value), ", ".join(known))

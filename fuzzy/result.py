@@ -23,10 +23,14 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 from alphacut.fuzzy.shown import Shown
 
 if TYPE_CHECKING:
+    from alphacut.fuzzy.samples.model import Samples
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 ROUND_OFF = 1e-9
@@ -39,6 +43,15 @@ class Nature(StrEnum):
     ATTAINED = "attained"
     ESTIMATED = "estimated"
     GUARANTEED = "guaranteed"
+
+    @property
+    def sentence(self) -> str:
+        """What the nature promises."""
+        return {
+            "attained": "values at points in the box; the true range may reach further",
+            "estimated": "attained, with an error that an independent pass estimated",
+            "guaranteed": "the true range is proved to lie inside, from knowledge that is named",
+        }[self]
 
 
 class Ends(NamedTuple):
@@ -74,6 +87,10 @@ class Bounds(Shown):
         inner: Of guaranteed bounds those attained, if any, less the scheme's error.
         outer: Of other bounds the proved ones, if any.
         notes: What the method saw on its way, one sentence each.
+        budget: Evaluations that were allowed; 0 where there was no such limit.
+        calls: Of the model, each for the samples that share a set-up.
+        reused: Evaluations that were taken from a store.
+        samples: Points and values that the bounds were taken from; None where none are kept.
 
     Raises:
         RefusedError: Levels do not rise within [0, 1], shapes differ, an end is not finite or an
@@ -100,6 +117,10 @@ class Bounds(Shown):
     inner: Ends | None = None
     outer: Ends | None = None
     notes: tuple[str, ...] = ()
+    budget: int = 0
+    calls: int = 0
+    reused: int = 0
+    samples: Samples | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "alpha", np.asarray(self.alpha, float))
@@ -182,6 +203,28 @@ class Bounds(Shown):
         outer = self.outer or Ends(-wide, wide)
         lower = np.where(self._guaranteed, self.lower, outer.lower)
         return Ends(lower, np.where(self._guaranteed, self.upper, outer.upper))
+
+    @property
+    def claim(self) -> JointClaim:
+        """What the cuts claim, and which inputs are opinions."""
+        return JointClaim.of(self.inputs).resting_on(self.nature)
+
+    def said(self) -> tuple[str, ...]:
+        """Notes of the method, and what is claimed, if anything is."""
+        return (*self.notes, *([str(self.claim)] if self.claim.rule else []))
+
+    def number(self, output: str = "y") -> Stepwise | Claimed:
+        """One output as a fuzzy number: between two levels the wider α-cut holds.
+
+        Raises:
+            RefusedError: The levels do not reach from 0 to 1, and nothing is claimed.
+        """
+        steps = outer_steps(self.alpha, *self.bounds(output))
+        if (claim := self.claim.claim) is not None:
+            return Claimed(steps, claim, float(self.alpha[0]))
+        if (self.alpha[0], self.alpha[-1]) != (0, 1):
+            raise RefusedError("alpha", self.alpha.tolist(), "levels from 0 to 1: alpha=levels(4)")
+        return steps
 
     def column(self, output: str = "y") -> int:
         """Index of an output.

@@ -40,7 +40,7 @@ class Shown:
     seconds: float
     basis: tuple[str, ...]
     time: Array | None
-    notes: tuple[str, ...]
+    budget: int
 
     def __str__(self) -> str:
         """Bounds of the first outputs, a line for each level, with nature and cost."""
@@ -52,7 +52,7 @@ class Shown:
         ]
         hidden = len(self.outputs) - count
         more = [f"… and {hidden} outputs more: bounds(NAME) has them"] if hidden > 0 else []
-        return "\n".join([self._head, *lines, *more, *self.notes])
+        return "\n".join([self._head, *lines, *more, *self.said()])
 
     __repr__ = __str__
 
@@ -61,14 +61,15 @@ class Shown:
         count = max(1, _ROWS // len(self.alpha))
         rows = [row for k in range(min(count, len(self.outputs))) for row in self._rows(k)]
         header = ("output", "α", "lower", "upper", "error")
-        return html_table(header, rows, below="\n".join([self._head, *self.notes]))
+        return html_table(header, rows, below="\n".join([self._head, *self.said()]))
 
     @property
     def _head(self) -> str:
         """Nature, what it rests on, and what it cost."""
         rests = f" (given that {' and '.join(self.basis)})" if self.basis else ""
         over = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
-        cost = f"{self.evaluations:,} evaluations, {self.seconds:.2g} s"
+        most = f" of at most {self.budget:,}" if self.budget else ""
+        cost = f"{self.evaluations:,} evaluations{most}, {self.seconds:.2g} s"
         return f"bounds {self.nature}{rests}{over} by the method {self.method}: {cost}"
 
     def _worth(self, error: str, column: int) -> str:
@@ -126,6 +127,10 @@ class Shown:
 
     def column(self, output: str) -> int:
         """Index of an output."""
+        raise NotImplementedError
+
+    def said(self) -> tuple[str, ...]:
+        """What is to be known of the bounds, one sentence each."""
         raise NotImplementedError
 
     def nature_of(self, output: str) -> str:

@@ -11,6 +11,8 @@ from tempfile import NamedTemporaryFile
 import numpy as np
 from numpy.typing import ArrayLike
 
+from alphacut.fuzzy.refused import RefusedError
+
 Cell = str | float
 _WIDTH, _HEIGHT, _EDGE = 220, 70, 6  # of the drawing, in pixels
 
@@ -68,7 +70,7 @@ def write_csv(path: str | Path, titles: Sequence[str], rows: Iterable[Sequence[C
         rows: Texts and numbers.
 
     Raises:
-        ValueError: The file cannot be written there.
+        RefusedError: The file cannot be written there.
     """
     target = Path(path)
     partial: Path | None = None
@@ -83,7 +85,5 @@ def write_csv(path: str | Path, titles: Sequence[str], rows: Iterable[Sequence[C
     except OSError as error:
         if partial is not None:
             partial.unlink(missing_ok=True)
-        raise ValueError(
-            f"the table cannot be written to {target} ({error.strerror}); name a file in a folder"
-            " that exists and may be written to"
-        ) from None
+        allowed = "a file in a folder that exists and may be written to"
+        raise RefusedError("table", target, allowed, str(error.strerror)) from None

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import INPUTS, in_words
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import sources
 from alphacut.io.units import engineering
@@ -175,7 +175,7 @@ def methods(summary: Document) -> Markup:
 
 def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
     """Meaning of each nature of bounds in the table."""
-    told = {nature.value: nature.sentence() for nature in Nature}
+    told = {nature.value: nature.sentence for nature in Nature}
     yield from (
         f"{nature.capitalize()}: {told[nature]}."
         for nature in dict.fromkeys(str(row[2]) for row in rows)

@@ -43,7 +43,6 @@ def modulus_shares(case: Case, progress: Tick | None = None) -> Shares:
     return width_shares(
         lambda inputs: cell_range(wanted, inputs, wanted.alpha),
         wanted.inputs,
-        progress=progress or False,
     )
 
 
@@ -111,7 +110,7 @@ def envelope_shares(
         axes.append((found.time, list(found.outputs)))
         return found.lower[0], found.upper[0]
 
-    shares = width_shares(bounds, inputs, groups=groups, progress=False)
+    shares = width_shares(bounds, inputs, groups=groups)
     return shares, *axes[0], [*together(groups), *roughness(max(rough))]
 
 

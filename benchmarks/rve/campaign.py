@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.case.load import load
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.result import Bounds
 from alphacut.stages.material.campaign import Campaign, campaign
 from alphacut.stages.material.cell import parts
 from alphacut.stages.material.cell_models import cell_model
@@ -72,7 +72,7 @@ def modulus(folder: Path, workers: int) -> tuple[float, float, dict[str, Any]]:
     return command(folder, "fuzzy", "modulus", "cases/paper.toml", "--workers", str(workers))
 
 
-def alone(wanted: Campaign, found: FuzzyResult) -> float:
+def alone(wanted: Campaign, found: Bounds) -> float:
     """Largest relative difference in E from samples that are solved one by one, to round-off."""
     from alphacut.rve.prism.model import PrismModel
 

@@ -22,9 +22,9 @@ from alphacut.frame.decisions.sure_exceeding import sure_exceeding
 from alphacut.frame.structures.modes import ModalError, UnsuitedOutputError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.arguments import fuzzy_inputs
 from alphacut.fuzzy.counted import ranged
-from alphacut.fuzzy.knowledge.joint import JointClaim, joined_once
+from alphacut.fuzzy.knowledge.joint import JointClaim
+from alphacut.fuzzy.knowledge.joint import joined_inputs as fuzzy_inputs
 from alphacut.fuzzy.progress_bar import Progress
 
 
@@ -92,7 +92,7 @@ def exceeding(
     Raises:
         ValueError: A limit is not positive, or an input is no parameter.
     """
-    numbers, most = joined_once(fuzzy_inputs(inputs)), 1.0 - lowest
+    numbers, most = fuzzy_inputs(fuzzy_inputs(inputs)), 1.0 - lowest
     nominal = {name: number.modal for name, number in numbers.items()}
 
     def reach(size: float) -> tuple[Array, Array]:

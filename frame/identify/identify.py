@@ -71,7 +71,7 @@ class Identified:
         """Coverage of the boxes: the claims, and the conditions under which they hold."""
         joint = JointClaim.of(self.agreement.numbers)
         model = ("the structure is such a storey frame",)
-        return JointClaim(self.agreement.joint, (*joint.given, *model), joint.opinions)
+        return JointClaim(self.agreement.joint, (*joint.conditions, *model), joint.opinions)
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
@@ -88,7 +88,7 @@ class Identified:
                 alpha, decided = np.append(0.0, alpha), 0.0
                 ends = np.column_stack([priors[name].support, ends])
             steps = outer_steps(tuple(alpha), tuple(ends[0]), tuple(ends[1]))
-            claim = Claim("" if rule is None else rule.means, self.claim.given)
+            claim = Claim("" if rule is None else rule.means, self.claim.conditions)
             numbers[name] = steps if rule is None else Claimed(steps, claim, decided, joint=rule)
         return numbers
 

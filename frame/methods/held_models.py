@@ -8,7 +8,7 @@ from math import prod
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.fuzzy.campaign.workers import require_bytes
+from alphacut.fuzzy.campaign.memory import require_bytes
 
 Models = tuple[Array, Array, Array]
 """Values (K,), first derivatives (K, d) and second derivatives (K, d, d)."""

@@ -1,281 +1,190 @@
-"""A durable store of samples: a file of checked records that campaigns resume from and share.
+"""A durable store of samples: an SQLite file that campaigns resume from.
 
 Samples are keyed by what they depend on: the identity of the model (case, mesh options, versions:
-whatever the caller names) and the values of all inputs. Records are only ever appended, under a
-lock, and written through to the disk. A killed process or a power cut loses what was not yet
-written. Damage is found by the checksum of every record, told, and dropped by `Store.repair`.
+whatever the caller names) and the values of all inputs. Each row carries a checksum over all of it,
+and a batch is one transaction: a killed process or a power cut loses what was not yet written.
+Opening a store reads and checks every row. A file that is damaged is set aside, what is whole of it
+goes into a new one, and a warning says so in one line; what is lost is computed anew.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import sqlite3
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from errno import EDQUOT, EFBIG, ENOSPC
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
-from shlex import quote
-from threading import RLock
-from time import monotonic, sleep
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from alphacut.fuzzy.campaign import records
-from alphacut.fuzzy.campaign.records import Damage, Record
+import numpy as np
 
-try:
-    import fcntl
-except ImportError:  # no locks on this system: one campaign on a store at a time
-    fcntl = None  # type: ignore[assignment]
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.call import Sample
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.samples.model import Layout
 
-Identity = Mapping[str, Any]
+Identity = Mapping[str, object]
 _PATIENCE = 60.0  # seconds to wait for another campaign's write
-_MODEL = 16  # bytes that tell a model's records
-_FULL = (ENOSPC, EDQUOT, EFBIG)
-_WRITING = RLock()  # campaigns in threads of one process
+_TABLE = """create table if not exists sample
+(model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
+_TROUBLE = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
+_COLUMNS = "model, point, layout, outputs, checksum"
 
 
-class StoreError(RuntimeError):
-    """Trouble with a store's file: damage, no space, no right, or another campaign's lock."""
-
-
-class Stored(NamedTuple):
-    """Summary of one model's samples in a store."""
-
-    identity: dict[str, Any]
-    samples: int
-    failures: int
-    mean_seconds: float
-
-
-class Repaired(NamedTuple):
-    """Outcome of a repair: records that are whole, damaged places, and their bytes."""
-
-    kept: int
-    places: int
-    size: int
-
-
-class Entry(NamedTuple):
-    """A record of a model.
+class Row(NamedTuple):
+    """A sample as it is stored.
 
     Args:
-        head: What it says: `identity`, or `point`, `seconds` and either `error` or `layout`.
-        outputs: Outputs at the point, as bytes; empty without.
-        start: Where the record starts in the file.
-        end: Where it ends.
+        model: Key of the model.
+        point: Inputs by name as JSON, exact to the last bit, in the order of their names.
+        layout: Names and shapes of the outputs as JSON.
+        outputs: Outputs as bytes of little-endian doubles.
+        checksum: Of all that.
     """
 
-    head: dict[str, Any]
+    model: bytes
+    point: str
+    layout: str
     outputs: bytes
-    start: int
-    end: int
+    checksum: bytes
+
+    @classmethod
+    def of(cls, model: bytes, point: str, sample: Sample) -> Row:
+        """A sample with its checksum."""
+        layout = json.dumps(sample.layout)
+        outputs = sample.row.astype("<f8").tobytes()
+        return cls(model, point, layout, outputs, _checksum(model, point, layout, outputs))
 
     @property
-    def point(self) -> str:
-        """Inputs as text; empty if the record is of no sample."""
-        return json.dumps(self.head["point"], separators=(",", ":")) if "point" in self.head else ""
+    def whole(self) -> bool:
+        """Whether the row is what was written."""
+        with suppress(TypeError, AttributeError):
+            return _checksum(*self[:4]) == self.checksum
+        return False
+
+    @property
+    def sample(self) -> Sample:
+        """The sample."""
+        layout: Layout = tuple((name, tuple(shape)) for name, shape in json.loads(self.layout))
+        return Sample(layout, np.frombuffer(self.outputs, "<f8").astype(float))
+
+
+def _checksum(model: bytes, point: str, layout: str, outputs: bytes) -> bytes:
+    parts = model, point.encode(), layout.encode(), outputs
+    sizes = np.array([len(part) for part in parts], "<i8").tobytes()
+    return blake2b(b"".join((sizes, *parts)), digest_size=16).digest()
 
 
 class Store:
-    """A file of samples, each with its checksum.
+    """Samples of all models in one file.
 
     Args:
         path: The file; made if there is none.
 
     Raises:
-        ValueError: The file is something else, or of another format.
-        StoreError: It cannot be opened or made.
+        RefusedError: There is another file, or it cannot be opened or made.
     """
 
     def __init__(self, path: str | Path) -> None:
-        if not isinstance(path, str | os.PathLike):
-            raise ValueError(f"the store is {path!r}; it must be the path of a file, or a Store")
         self.path = Path(path)
-        self._handle: int | None = None
-        self._whole = 0  # up to here the file holds whole records
-        self.torn = False  # whether it was seen to end within a record
-        if self.path.is_dir():
-            raise ValueError(
-                f"{self.path} is a folder; give the store a file in it, such as"
-                f" {self.path / 'samples.db'}"
-            )
-        with self.reported():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._handle = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
-        self._require_store()
-
-    def _require_store(self) -> None:
-        """Refuse a file that holds neither a record nor the mark of one."""
-        start = self._read(0, len(records.MARK))
-        if records.MARK.startswith(start) or start[:1] == records.VOID:
-            return  # a record, or the torn beginning of the first one
-        if any(isinstance(one, Record) for one in self._scan(0)):
-            return
-        self.close()
-        if records.marked(start):
-            raise ValueError(
-                f"{self.path} has format {start[len(records.NAME)]}, this program writes"
-                f" {records.FORMAT}; update the program or give another path"
-            )
-        raise ValueError(f"{self.path} is no store of samples; give another path")
-
-    @property
-    def handle(self) -> int:
-        """The open file.
-
-        Raises:
-            ValueError: The store is closed.
-        """
-        if self._handle is None:
-            raise ValueError(f"the store {self.path} is closed; open it anew")
-        return self._handle
-
-    def _read(self, start: int, count: int) -> bytes:
-        with self.reported():
-            return os.pread(self.handle, count, start)
-
-    def _scan(self, start: int) -> Iterator[Record | Damage]:
-        return records.scan(self._read, start, os.fstat(self.handle).st_size)
-
-    def entries(self, model: bytes, start: int = 0) -> Iterator[tuple[int, Entry | None]]:
-        """End of every record from the end of another on, with what it says if it is the model's.
-
-        Args:
-            model: Key of the model; empty for all.
-            start: Where to begin.
-
-        Raises:
-            StoreError: Something there is damaged; after the last record that is whole.
-        """
-        damage: list[Damage] = []
-        for one in self._scan(start):
-            if isinstance(one, Damage):
-                damage += [] if one.torn else [one]
-                self.torn |= one.torn
-            else:
-                yield one.end, _entry(one) if one.content.startswith(model) else None
-        if damage:
-            raise StoreError(self._told(damage))
-
-    def entry(self, start: int, end: int) -> Entry:
-        """The record between two offsets, checked once more.
-
-        Raises:
-            StoreError: It has been damaged meanwhile.
-        """
-        one = next(records.scan(self._read, start, end), None)
-        if not isinstance(one, Record):
-            raise StoreError(self._told([one or Damage(start, b"", end - start, False)]))
-        return _entry(one)
-
-    def _told(self, damage: list[Damage]) -> str:
-        """The damage with the first sample that it names, and what to do."""
-        named = [text for text in map(_sample_in, damage) if text]
-        which = f"; among what is lost: the sample {named[0]}" if named else ""
-        return (
-            f"the store {self.path} is damaged at {len(damage)} places, the first at byte"
-            f" {damage[0].start}{which}: run `python -m alphacut repair {quote(str(self.path))}`"
-            " (in Python: fuzzy.Store(path).repair()), which drops what is lost; the next run"
-            " computes only that anew"
-        )
-
-    def append(self, contents: Iterable[bytes]) -> None:
-        """Write contents as records: all or none.
-
-        Raises:
-            StoreError: There is no space, or another campaign blocks the file.
-        """
-        data = b"".join(map(records.packed, contents))
-        with self._locked():
-            end = self._end()
-            try:
-                with self.reported():
-                    if os.write(self.handle, data) < len(data):
-                        raise OSError(ENOSPC, os.strerror(ENOSPC))
-                    os.fsync(self.handle)
-            except BaseException:
-                os.ftruncate(self.handle, end)
-                raise
-
-    def _end(self) -> int:
-        """Size of the file, without the torn end of a write that was killed."""
-        for one in self._scan(self._whole):
-            if isinstance(one, Damage) and one.torn:
-                os.ftruncate(self.handle, one.start)
-                break
-            self._whole = one.end
-        return os.fstat(self.handle).st_size
-
-    def repair(self) -> Repaired:
-        """Void whatever is damaged; whole records stay where they are.
-
-        Raises:
-            StoreError: The file cannot be written.
-        """
-        with self._locked():
-            kept, damage = 0, []
-            for one in self._scan(0):
-                damage += [one] if isinstance(one, Damage) else []
-                kept += isinstance(one, Record)
-            with self.reported():
-                handle = os.open(self.path, os.O_WRONLY)
-                try:
-                    for one in damage:
-                        os.pwrite(handle, records.VOID * one.size, one.start)
-                    os.fsync(handle)
-                finally:
-                    os.close(handle)
-        lost = [one for one in damage if not one.torn]
-        return Repaired(kept, len(lost), sum(one.size for one in lost))
-
-    @contextmanager
-    def _locked(self) -> Iterator[None]:
-        """Nobody else writes meanwhile."""
-        if not _WRITING.acquire(timeout=_PATIENCE):
-            raise StoreError(self._blocked())
+        self._rows: dict[tuple[bytes, str], Row] = {}
         try:
-            until = monotonic() + _PATIENCE
-            while fcntl is not None:
-                try:
-                    fcntl.flock(self.handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    break
-                except OSError:
-                    if monotonic() > until:
-                        raise StoreError(self._blocked()) from None
-                    sleep(0.01)
-            try:
-                yield
-            finally:
-                if fcntl is not None:
-                    fcntl.flock(self.handle, fcntl.LOCK_UN)
-        finally:
-            _WRITING.release()
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            start = self.path.open("rb").read(16) if self.path.exists() else b""
+        except OSError as error:
+            raise RefusedError(
+                "store", self.path, "a file that may be written", str(error)
+            ) from None
+        if start not in (b"", b"SQLite format 3\0"):
+            cure = "move it away, or name another path"
+            raise RefusedError("store", self.path, "a file of samples", cure)
+        self._connection = self._opened()
 
-    def _blocked(self) -> str:
-        return (
-            f"the store {self.path} cannot be used: another campaign has been writing to it for"
-            f" {_PATIENCE:g} s; see whether it hangs, and run again: what is stored stays"
+    def _opened(self) -> sqlite3.Connection:
+        """The file with its rows read, mended if it is damaged."""
+        connection, damaged = self._connected(), False
+        with self.reported():
+            try:
+                _prepare(connection)
+                damaged = connection.execute("pragma quick_check").fetchone() != ("ok",)
+            except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+                damaged = _is_damage(error)
+            if not damaged:
+                damaged = self._read(connection, "order by rowid")
+            if damaged:
+                self._read(connection, "order by rowid desc")
+        return self._mended(connection) if damaged else connection
+
+    def _read(self, connection: sqlite3.Connection, order: str) -> bool:
+        """Keep the rows that are whole; whether anything was damaged."""
+        damaged = False
+        try:
+            for row in connection.execute(f"select {_COLUMNS} from sample {order}"):
+                one = Row(*row)
+                damaged |= not one.whole
+                if one.whole:
+                    self._rows[one.model, one.point] = one
+        except (sqlite3.DatabaseError, UnicodeDecodeError):
+            return True
+        return damaged
+
+    def _mended(self, connection: sqlite3.Connection) -> sqlite3.Connection:
+        """A new file with the rows that are whole; the damaged one is kept beside it."""
+        self._read(connection, "order by rowid")
+        connection.close()
+        aside = self.path.with_name(f"{self.path.name}.damaged")
+        with suppress(FileNotFoundError):
+            os.remove(f"{self.path}-journal")
+        os.replace(self.path, aside)
+        fresh = self._connected()
+        with self.reported():
+            _prepare(fresh)
+        self._write(fresh, self._rows.values())
+        said = (
+            f"{len(self._rows)} samples are whole, the others are run anew; it is kept as {aside}"
         )
+        warnings.warn(f"the store {self.path} was damaged: {said}", stacklevel=2)
+        return fresh
+
+    def _connected(self) -> sqlite3.Connection:
+        with self.reported():
+            return sqlite3.connect(self.path, timeout=_PATIENCE)
+
+    def get(self, model: bytes, point: str) -> Sample | None:
+        """The sample of a model at a point; None where there is none."""
+        row = self._rows.get((model, point))
+        return row and row.sample
+
+    def count(self, model: bytes) -> int:
+        """Samples of a model."""
+        return sum(key == model for key, _ in self._rows)
+
+    def put(self, model: bytes, samples: Mapping[str, Sample]) -> None:
+        """Write samples in one transaction: all or none."""
+        rows = [Row.of(model, point, sample) for point, sample in samples.items()]
+        self._write(self._connection, rows)
+        self._rows |= {(row.model, row.point): row for row in rows}
+
+    def _write(self, connection: sqlite3.Connection, rows: Iterable[Row]) -> None:
+        insert = f"insert or replace into sample ({_COLUMNS}) values (?, ?, ?, ?, ?)"
+        with self.reported(), connection:
+            connection.executemany(insert, rows)
 
     @contextmanager
     def reported(self) -> Iterator[None]:
-        """Raise what goes wrong with the file as a StoreError."""
+        """Raise what goes wrong with the file in one line."""
         try:
             yield
-        except OSError as error:
-            cure = "it cannot be written there: give another path, or the right to write"
-            if error.errno in _FULL:
-                cure = "free some space and run again: what is stored stays"
-            raise StoreError(
-                f"the store {self.path} cannot be used ({error.strerror or error}): {cure}"
-            ) from error
+        except sqlite3.Error as error:
+            cure = "see to its space, its rights, and who else writes; what is stored stays"
+            raise FailedError(f"the store {self.path} cannot be used: {error}", cure) from error
 
     def close(self) -> None:
         """Close the file."""
-        if self._handle is not None:
-            os.close(self._handle)
-            self._handle = None
+        self._connection.close()
 
     def __enter__(self) -> Store:
         return self
@@ -283,64 +192,37 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def models(self) -> list[Stored]:
-        """Summary of every model.
 
-        Raises:
-            StoreError: The file is damaged.
-        """
-        identities: dict[bytes, dict[str, Any]] = {}
-        samples: dict[bytes, dict[str, tuple[bool, float]]] = {}
-        for entry in (entry for _, entry in self.entries(b"") if entry):
-            rows = samples.setdefault(entry.head["model"], {})
-            if not entry.point:
-                identities[entry.head["model"]] = entry.head["identity"]
-            elif "layout" in entry.head or not rows.get(entry.point, (False,))[0]:
-                rows[entry.point] = "layout" in entry.head, entry.head["seconds"]
-        lost = {"identity": "lost to damage"}
-        return [
-            _summary(identities.get(key, lost), [*rows.values()]) for key, rows in samples.items()
-        ]
+def _prepare(connection: sqlite3.Connection) -> None:
+    connection.execute("pragma synchronous = full")
+    connection.execute(_TABLE)
 
 
-def _summary(identity: dict[str, Any], rows: list[tuple[bool, float]]) -> Stored:
-    done = sum(row[0] for row in rows)
-    return Stored(identity, done, len(rows) - done, sum(row[1] for row in rows) / max(len(rows), 1))
+def _is_damage(error: Exception) -> bool:
+    """Whether an error tells of damage; one of locks, space or rights is raised."""
+    name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
+    if any(word in name for word in _TROUBLE):
+        raise error
+    return True
 
 
 def model_key(identity: Identity) -> bytes:
-    """Bytes that tell the records of a model from those of others."""
-    return blake2b(canonical(identity).encode(), digest_size=_MODEL).digest()
-
-
-def content_of(model: bytes, head: Mapping[str, object], outputs: bytes = b"") -> bytes:
-    """Content of a record."""
-    return model + json.dumps(head, separators=(",", ":")).encode() + b"\n" + outputs
-
-
-def _entry(record: Record) -> Entry:
-    head, _, outputs = record.content[_MODEL:].partition(b"\n")
-    return Entry(
-        {**json.loads(head), "model": record.content[:_MODEL]}, outputs, record.start, record.end
-    )
-
-
-def _sample_in(damage: Damage) -> str:
-    """Inputs of the sample in a damaged record, as far as they can be read."""
-    text = damage.content.partition(b'"point":{')[2].partition(b"}")[0]
-    return text.decode("utf-8", "replace").replace('"', "").replace(":", " = ").replace(",", ", ")
-
-
-def canonical(identity: Identity) -> str:
-    """An identity as text, the same for equal content whatever the order of its keys.
+    """Bytes that tell the samples of a model from those of others.
 
     Raises:
-        ValueError: It holds something that JSON does not.
+        RefusedError: The identity is empty, or holds something that JSON does not.
     """
     try:
-        return json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ValueError(
-            f"the identity of the model holds what JSON does not ({error}); name it by text and"
-            " numbers"
-        ) from None
+        text = json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    except (TypeError, ValueError):
+        text = ""
+    if not isinstance(identity, Mapping) or not identity or not text:
+        cure = "it says what a sample depends on besides its inputs; texts and numbers"
+        raise RefusedError("identity", identity, "a mapping, as {'version': 1}", cure)
+    return blake2b(text.encode(), digest_size=16).digest()
+
+
+def point_key(names: tuple[str, ...], point: Array) -> str:
+    """A point as text, exact to the last bit and the same whatever the order of the inputs."""
+    values = {name: float(x) + 0.0 for name, x in zip(names, point, strict=True)}
+    return json.dumps(values, sort_keys=True, separators=(",", ":"))

@@ -1,67 +1,56 @@
-"""Executors of samples (this process, a pool, or the caller's own) and the memory they need."""
+"""Executors of samples: this process, a pool of processes, MPI's, or the caller's own."""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
-from contextlib import contextmanager, suppress
-from numbers import Integral
-from pathlib import Path
-from time import sleep
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import contextmanager
+from itertools import islice
+from time import perf_counter, sleep
 from typing import ParamSpec, TypeVar
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.call import Call, Outcome
+from alphacut.fuzzy.refused import FailedError, RefusedError, real
 
 P = ParamSpec("P")
 T = TypeVar("T")
+Task = tuple[list[int], Array]  # rows of the design, and their points
 _WATCH = 0.2  # seconds between looks at the parent
+_ENOUGH = 0.1  # seconds of work in a batch of quick calls
+_LARGEST = 1024  # calls in a batch
 _GROUP = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
 
 
-class ProcessPool(Executor):
-    """Fresh processes of this machine that end with this one and are replaced when they die.
+@contextmanager
+def pool(workers: int) -> Iterator[Executor | None]:
+    """A pool of `workers` processes, or None where one process does everything.
 
-    Functions go to them by value where they cannot be imported: those of a notebook, too.
-
-    Args:
-        workers: How many.
+    Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
+    says. Functions go to the processes by value where they cannot be imported.
     """
+    real("workers", workers, positive=True, whole=True)
+    if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
+        from mpi4py.futures import MPIPoolExecutor
 
-    def __init__(self, workers: int) -> None:
-        self._max_workers = workers
-        self._inner = _processes(workers)
-
-    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Run a call in one of the processes, new ones if one of them has died."""
-        try:
-            return self._inner.submit(fn, *args, **kwargs)
-        except BrokenExecutor:
-            self.stop()
-            self._inner = _processes(self._max_workers)
-            return self._inner.submit(fn, *args, **kwargs)
-
-    def alone(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        """Run one call in a process of its own, which may die.
-
-        Raises:
-            BrokenExecutor: It died.
-        """
-        with _processes(1) as executor:
-            return executor.submit(fn, *args, **kwargs).result()
-
-    def stop(self) -> None:
-        """End the processes in the middle of what they do: nobody waits for it any more."""
-        for process in list(getattr(self._inner, "_processes", None) or {}):
-            with suppress(ProcessLookupError):
-                os.kill(process, signal.SIGTERM)
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes."""
-        self._inner.shutdown(wait)
+        with MPIPoolExecutor() as executor:
+            yield executor
+    elif workers == 1:
+        yield None
+    else:
+        with _processes(int(workers)) as executor:
+            try:
+                yield executor
+            except BaseException:  # nobody waits for what they do any more
+                executor.shutdown(kill_workers=True)  # type: ignore[call-arg]
+                raise
 
 
 def _processes(workers: int) -> Executor:
+    """Processes of this machine that end with this one."""
     from joblib.externals.loky import ProcessPoolExecutor
 
     # loky's tracker of semaphores begins here and inherits what is blocked: it must outlive this
@@ -76,33 +65,26 @@ def _processes(workers: int) -> Executor:
     return made
 
 
-@contextmanager
-def pool(workers: int) -> Iterator[Executor | None]:
-    """A pool of `workers` processes, or None where one process does everything.
+def _end_with_parent(parent: int) -> None:
+    """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
+    from threading import Thread
 
-    Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
-    says.
+    for number in (signal.SIGINT, *_GROUP):  # which reach the whole group; the parent decides
+        signal.signal(number, signal.SIG_IGN)
 
-    Raises:
-        ValueError: `workers` is no whole number from 1.
-    """
-    require_workers(workers)
-    if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
-        from mpi4py.futures import MPIPoolExecutor
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(_WATCH)
+        os._exit(1)
 
-        with MPIPoolExecutor() as executor:
-            yield executor
-    elif workers == 1:
-        yield None
-    else:
-        processes = ProcessPool(int(workers))
-        try:
-            yield processes
-        except BaseException:
-            processes.stop()
-            raise
-        finally:
-            processes.shutdown()
+    Thread(target=watch, daemon=True).start()
+
+
+def require_executor(executor: object, workers: int) -> None:
+    """Refuse what is no executor, or one beside workers."""
+    if executor is not None and not (isinstance(executor, Executor) and workers == 1):
+        allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
+        raise RefusedError("executor", executor, allowed)
 
 
 def submitted(
@@ -116,110 +98,62 @@ def submitted(
     return done
 
 
-def require_workers(workers: object) -> None:
-    """Workers are a number of processes.
-
-    Raises:
-        ValueError: It is no whole number from 1.
-    """
-    if not isinstance(workers, Integral) or workers < 1:
-        raise ValueError(
-            f"the number of workers is {workers!r}; it must be a whole number, 1 or more"
-        )
-
-
-def require_executor(executor: object, workers: int) -> None:
-    """An executor is one of `concurrent.futures`, and stands instead of workers.
-
-    Raises:
-        ValueError: It is something else, or both are given.
-    """
-    if executor is not None and not isinstance(executor, Executor):
-        raise ValueError(
-            f"the executor is a {type(executor).__name__}; it must be one of concurrent.futures"
-            " (of a client of dask: client.get_executor())"
-        )
-    if executor is not None and workers != 1:
-        raise ValueError("workers and an executor are both given; give one")
-
-
-def _end_with_parent(parent: int) -> None:
-    """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
-    from threading import Thread
-
-    # These reach the whole group; the parent decides
-    for number in (signal.SIGINT, *_GROUP):
-        signal.signal(number, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            sleep(_WATCH)
-        os._exit(1)
-
-    Thread(target=watch, daemon=True).start()
-
-
-_NUMBER = 8  # bytes
-_COPIES = 3  # a plan holds its samples, their sorted copy and the result's
-_SMALL = 50_000_000  # bytes not worth a look
-_SHARE = 0.9  # of what is free
-
-
-class TooLargeError(ValueError):
-    """A campaign needs more memory than there is."""
-
-
-def available() -> int:
-    """Bytes that this process may still take."""
-    free = [_meminfo()]
-    try:
-        limit = Path("/sys/fs/cgroup/memory.max").read_text().strip()
-        used = int(Path("/sys/fs/cgroup/memory.current").read_text())
-        free += [int(limit) - used] if limit != "max" else []
-    except (OSError, ValueError):
-        pass
-    return min(free)
-
-
-def _meminfo() -> int:
-    try:
-        lines = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
-        return int(lines["MemAvailable"].split()[0]) * 1024
-    except (OSError, KeyError, ValueError):
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-
-
-def needed(samples: int, columns: int) -> int:
-    """Bytes for so many samples of so many inputs and outputs."""
-    return samples * columns * _NUMBER * _COPIES
-
-
-def require(samples: int, columns: int) -> None:
-    """Refuse a campaign that does not fit, before it starts.
+def completed(
+    call: Call, tasks: Iterable[Task], executor: Executor | None
+) -> Iterator[tuple[list[int], list[Outcome]]]:
+    """Run the tasks and yield each as it ends, with no more at the executor than keep it busy.
 
     Args:
-        samples: Samples of the campaign.
-        columns: Inputs and outputs of each.
+        call: The function with the way it is called.
+        tasks: Rows and points of each call; taken from the iterable only when there is room.
+        executor: Any `concurrent.futures` executor; None runs here, one after the other.
 
     Raises:
-        TooLargeError: It does not fit.
+        FailedError: A worker process died, or the function cannot be sent to one.
     """
-    what = f"{samples:,} samples of {columns} inputs and outputs"
-    cure = "take fewer levels, a plan with fewer samples (reduced, signed), or fewer outputs"
-    require_bytes(needed(samples, columns), what, cure)
+    if executor is None:
+        yield from ((rows, call(points)) for rows, points in tasks)
+        return
+    queue, size, most = iter(tasks), 1, 2 * slots(executor)
+    waiting: dict[Future[tuple[list[list[Outcome]], float]], list[Task]] = {}
+    try:
+        while True:
+            while len(waiting) < most and (batch := list(islice(queue, size))):
+                waiting[executor.submit(_run, call, [points for _, points in batch])] = batch
+            if not waiting:
+                return
+            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                batch = waiting.pop(future)
+                outcomes, seconds = _result(future)
+                size = int(min(max(_ENOUGH * len(batch) / max(seconds, 1e-9), 1), _LARGEST))
+                yield from ((rows, one) for (rows, _), one in zip(batch, outcomes, strict=True))
+    finally:
+        for future in waiting:
+            future.cancel()
 
 
-def require_bytes(need: int, what: str, cure: str) -> None:
-    """Refuse what does not fit, before it starts.
+def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
+    """Outcomes of a batch of calls, and the wall time that they took."""
+    start = perf_counter()
+    return [call(points) for points in batch], perf_counter() - start
 
-    Args:
-        need: Bytes.
-        what: They are for.
-        cure: What to do else.
 
-    Raises:
-        TooLargeError: It does not fit.
-    """
-    if need > _SMALL and need > _SHARE * (free := available()):
-        size = f"{need / 1e9:.3g} GB of memory and {free / 1e9:.3g} GB are free"
-        raise TooLargeError(f"{what} need {size}; {cure}")
+def _result(future: Future[T]) -> T:
+    """Result of a batch; its calls raise nothing themselves."""
+    try:
+        return future.result()
+    except BrokenExecutor as error:
+        cure = "out of memory, or a crash in compiled code; what a store holds stays"
+        raise FailedError("a worker process died", cure) from error
+    except Exception as error:
+        what = f"the function or its outputs cannot be sent between processes: {error}"
+        raise FailedError(what, "take workers=1, or out of it what cannot be copied") from error
+
+
+def slots(executor: Executor) -> int:
+    """Number of calls that an executor runs at once as far as it says, else the cores here."""
+    client = getattr(executor, "_client", None)  # dask
+    if client is not None and (threads := sum(client.nthreads().values())):
+        return int(threads)
+    says = getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0)
+    return int(says or os.cpu_count() or 1)

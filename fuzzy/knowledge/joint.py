@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 from alphacut.fuzzy.sets.stepwise import Stepwise
@@ -29,8 +31,8 @@ def jointly(
         means: What the joint claim means; needed where the claims are of different kinds.
 
     Raises:
-        ValueError: Claims of different kinds are joined without a meaning, or one number stands for
-            several independent inputs.
+        RefusedError: Claims of different kinds are joined without a meaning, or one number stands
+            for several independent inputs.
     """
     claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
     if not claimed:
@@ -44,26 +46,23 @@ def jointly(
     }
 
 
-def joined_once(inputs: Mapping[str, FuzzyNumber]) -> dict[str, FuzzyNumber]:
-    """The inputs with claims joined, unless they are so already; of unknown dependence.
+def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
+    """The inputs, plain numbers as crisp ones, with claims joined unless they are so already.
 
     Raises:
-        ValueError: As `jointly`.
+        RefusedError: As `fuzzy_inputs` and `jointly`.
     """
-    rules = {number.joint for number in inputs.values() if isinstance(number, Claimed)}
-    if len(rules) == 1 and None not in rules:
-        return dict(inputs)
-    return {
-        name: number for name, number in jointly(inputs).items() if isinstance(number, FuzzyNumber)
-    }
+    numbers = fuzzy_inputs(inputs)
+    rules = {number.joint for number in numbers.values() if isinstance(number, Claimed)}
+    whole = len(rules) == 1 and None not in rules
+    return numbers if whole else fuzzy_inputs(jointly(numbers))
 
 
 def _common(claimed: Mapping[str, Claimed]) -> str:
     kinds = {number.claim.about for number in claimed.values()}
     if len(kinds) > 1:
-        shown = ", ".join(f"{name}: {number.claim.about}" for name, number in claimed.items())
         cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
-        raise ValueError(f"the inputs claim different things ({shown}); {cure}")
+        raise RefusedError("claims of the inputs", sorted(kinds), "of one kind", cure)
     return kinds.pop()
 
 
@@ -72,10 +71,8 @@ def _require_apart(claimed: Mapping[str, Claimed]) -> None:
     for i, name in enumerate(names):
         for other in names[:i]:
             if claimed[name].number is claimed[other].number or claimed[name] == claimed[other]:
-                raise ValueError(
-                    f"inputs {other} and {name} rest on the same values and are not independent;"
-                    f" leave independent=True out"
-                )
+                cure = f"{other} and {name} rest on the same values"
+                raise RefusedError("independent", True, "False", cure)
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:
@@ -97,12 +94,12 @@ class JointClaim:
 
     Args:
         rule: How the claims were joined; None where no input has one.
-        given: Conditions of all claims.
+        conditions: Of all claims.
         opinions: Fuzzy inputs without a claim.
     """
 
     rule: Joint | None
-    given: tuple[str, ...]
+    conditions: tuple[str, ...]
     opinions: tuple[str, ...]
 
     @classmethod
@@ -116,28 +113,25 @@ class JointClaim:
         )
         alike: dict[str, list[str]] = {}
         for name, number in claimed.items():
-            if number.claim.given:
-                alike.setdefault(", ".join(number.claim.given), []).append(name)
-        given = [f"{', '.join(names)}: {words}" for words, names in alike.items()]
+            if number.claim.conditions:
+                alike.setdefault(", ".join(number.claim.conditions), []).append(name)
+        conditions = [f"{', '.join(names)}: {words}" for words, names in alike.items()]
         rules = (x.joint or Joint((name,), False, x.claim.about) for name, x in claimed.items())
         rule, where = next(rules, None), "their cuts" if len(opinions) > 1 else "its cut"
         held = [f"{', '.join(opinions)} in {where} at α (opinions)"] if opinions else []
-        return cls(rule, (*given, *([rule.words] if rule and rule.words else []), *held), opinions)
+        words = [rule.words] if rule and rule.words else []
+        return cls(rule, (*conditions, *words, *held), opinions)
 
-    def resting_on(
-        self, nature: str, *, interactions: bool = False, checked: bool = True
-    ) -> JointClaim:
-        """The claim of a result of a nature, under interactions, or that nothing checked."""
-        open_ = "is not proved" if checked else "this plan has not checked"
-        lack = f"if the true range stays inside the {nature} bounds, which {open_}"
-        more = [] if nature == "guaranteed" else [lack]
-        more += ["the interactions hold"] if interactions else []
-        return self if self.rule is None else replace(self, given=(*self.given, *more))
+    def resting_on(self, nature: str) -> JointClaim:
+        """The claim of a result of a nature."""
+        lack = f"if the true range stays inside the {nature} bounds, which is not proved"
+        more = () if nature == "guaranteed" or self.rule is None else (lack,)
+        return replace(self, conditions=(*self.conditions, *more))
 
     @property
     def claim(self) -> Claim | None:
         """The claim of a number computed from the inputs; None where no input has one."""
-        return None if self.rule is None else Claim(self.rule.means, self.given)
+        return None if self.rule is None else Claim(self.rule.means, self.conditions)
 
     @property
     def brief(self) -> str:
@@ -157,4 +151,4 @@ class JointClaim:
         subject = (
             self.rule.means if self.rule.named else f"result of the {self.rule.means} of {names}"
         )
-        return str(Claim(subject, self.given))
+        return str(Claim(subject, self.conditions))

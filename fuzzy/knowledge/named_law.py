@@ -14,10 +14,10 @@ from typing import Literal
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.observations import Observations
-from alphacut.fuzzy.knowledge.order_statistics import Side
+from alphacut.fuzzy.refused import RefusedError, real
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
-from alphacut.fuzzy.sets.numbers import Array
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
 Law = Literal["normal", "log-normal"]
@@ -30,7 +30,7 @@ them the wider cut holds.
 
 
 def law_cuts(
-    data: Observations, law: Law, quantile: float | None, side: Side, *, mean: bool
+    data: Observations, law: Law, quantile: float | None, *, mean: bool
 ) -> tuple[Stepwise, float]:
     """Cuts under a named law, and the least level at which they are finite without physical bounds.
 
@@ -38,48 +38,38 @@ def law_cuts(
         data: The values.
         law: Name of the law.
         quantile: Probability of a quantile; None for the next value, or for the mean.
-        side: Ends that move.
         mean: Whether the mean is meant.
 
     Raises:
-        ValueError: The values do not fit the law: fewer than two, all equal, not positive, or
+        RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
             censored without an end.
     """
     logarithmic = law == "log-normal"
     if logarithmic and not (data.lower > 0).all():
-        raise ValueError(f"a value is {data.lower[0]:g}; values of a log-normal law are positive")
+        raise RefusedError("least value", data.lower[0], "positive ones with a log-normal law")
     about = data.mapped(np.log) if logarithmic else data
     _require_scatter(about, law)
     if logarithmic and mean:
-        lower, upper = _log_normal_mean(about, side)
+        lower, upper = _log_normal_mean(about)
     else:
-        lower, upper = _student(about, 0.5 if mean else quantile, side)
+        lower, upper = _student(about, 0.5 if mean else quantile)
         with np.errstate(over="ignore"):
             lower, upper = (np.exp(lower), np.exp(upper)) if logarithmic else (lower, upper)
-    return _within(lower, upper, data.bounds, side)
+    return _within(lower, upper, data.bounds)
 
 
 def _require_scatter(data: Observations, law: str) -> None:
-    if data.count < 2:
-        raise ValueError(
-            f"there is {data.count} value; a {law} law needs 2 or more to tell its scatter:"
-            f" leave it out, or measure more"
-        )
-    if not (np.isfinite(data.lower).all() and np.isfinite(data.upper).all()):
-        raise ValueError(
-            f"a censored value has no other end; a {law} law needs one: give bounds=(lower,"
-            f" upper), or leave the law out"
-        )
-    if data.lower[0] == data.lower[-1] and data.exact:
-        raise ValueError(
-            f"all {data.count} values are {data.lower[0]:g}, which a {law} law does not give:"
-            f" leave the law out, or, in Python, say to what resolution= they are rounded"
-        )
+    """Refuse values that do not tell the scatter of a law."""
+    finite = np.isfinite(data.lower).all() and np.isfinite(data.upper).all()
+    if data.count < 2 or not finite or (data.exact and data.lower[0] == data.lower[-1]):
+        cure = "leave the law out, give bounds= or resolution=, or measure more"
+        values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
+        raise RefusedError(f"values of a {law} law", values, "two or more, finite, unlike", cure)
 
 
-def _student(data: Observations, quantile: float | None, side: Side) -> tuple[Array, Array]:
+def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
     """Ends mean + factor · scatter over the levels, worst over the values' intervals."""
-    below, above = _factors(data.count, quantile, side)
+    below, above = _factors(data.count, quantile)
     scatter = _scatter(data)
     least, most = scatter
     lower = data.lower.mean() + below * np.where(below < 0, most, least)
@@ -95,9 +85,9 @@ def _scatter(data: Observations) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=64)
-def _factors(n: int, quantile: float | None, side: Side) -> tuple[Array, Array]:
+def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
     """Factors of the standard deviation for the lower and the upper end at every level."""
-    tail = LEVELS / 2 if side == "both" else LEVELS
+    tail = LEVELS / 2
     if quantile is None or quantile == 0.5:
         from scipy.stats import t
 
@@ -111,9 +101,9 @@ def _factors(n: int, quantile: float | None, side: Side) -> tuple[Array, Array]:
     return nct.ppf(tail, n - 1, shift) / np.sqrt(n), nct.isf(tail, n - 1, shift) / np.sqrt(n)
 
 
-def _log_normal_mean(data: Observations, side: Side) -> tuple[Array, Array]:
+def _log_normal_mean(data: Observations) -> tuple[Array, Array]:
     """Least and greatest exp(μ + σ²/2) over the region of (μ, σ)."""
-    reach, narrow, wide = _region(data.count, side)
+    reach, narrow, wide = _region(data.count)
     scatter = _scatter(data)
     least, most = scatter[0] * narrow, scatter[1] * wide
     at = np.clip(reach, least, most)  # where x − reach σ + σ²/2 is least
@@ -124,7 +114,7 @@ def _log_normal_mean(data: Observations, side: Side) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def _region(n: int, side: Side) -> tuple[Array, Array, Array]:
+def _region(n: int) -> tuple[Array, Array, Array]:
     """Bounds of |μ − mean| / σ, and of σ / s from below and above, at every level.
 
     Both hold with probability √(1 − α), independently.
@@ -141,18 +131,12 @@ def _region(n: int, side: Side) -> tuple[Array, Array, Array]:
     )
 
 
-def _within(
-    lower: Array, upper: Array, bounds: tuple[float, float], side: Side
-) -> tuple[Stepwise, float]:
+def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
     """Steps from 0 to 1 within the bounds, and the least level at which they are finite."""
     low, high = bounds
-    lower = np.full_like(lower, low) if side == "upper" else np.clip(lower, low, high)
-    upper = np.minimum.accumulate(
-        np.full_like(upper, high) if side == "lower" else np.clip(upper, low, high)
-    )
-    lower = np.minimum(
-        np.maximum.accumulate(lower), upper[-1]
-    )  # at α = 1 both are one point, to round-off
+    upper = np.minimum.accumulate(np.clip(upper, low, high))
+    # at α = 1 both are one point, to round-off
+    lower = np.minimum(np.maximum.accumulate(np.clip(lower, low, high)), upper[-1])
     first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
     whole = bool(np.isfinite(bounds).all())
     ends = (low, high) if whole else (lower[first], upper[first])
@@ -172,21 +156,18 @@ def from_scatter(mean: float, deviation: float, count: int, *, known: bool = Fal
         known: Whether the deviation is known: a normal pivot in place of Student's t.
 
     Raises:
-        ValueError: The deviation is not positive, or there are too few values.
+        RefusedError: The deviation is not positive, or there are too few values.
     """
     from scipy.stats import norm, t
 
-    if not (deviation > 0 and np.isfinite([mean, deviation]).all()):
-        raise ValueError(f"mean and deviation are {mean:g}, {deviation:g}; it must be positive")
+    real("mean", mean)
+    real("deviation", deviation, positive=True)
     if count < (1 if known else 2):
-        raise ValueError(f"there is {count} value; its scatter needs 2 or more, or must be known")
+        raise RefusedError("count", count, "2 or more, or 1 where the deviation is known")
     factors = norm.isf(LEVELS / 2) if known else t.isf(LEVELS / 2, count - 1)
     reach = deviation / np.sqrt(count) * np.maximum(factors, 0.0)
-    law = (
-        f"{count} values drawn alike and independently from a normal law"
-        if not known
-        else f"{count} value{'s' * (count > 1)} of a normal law of known deviation"
-    )
+    law = f"{count} values drawn alike and independently from a normal law"
+    law += " of known deviation" if known else ""
     number = Stepwise(
         (0.0, *LEVELS), (mean - reach[0], *(mean - reach)), (mean + reach[0], *(mean + reach))
     )

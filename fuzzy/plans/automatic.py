@@ -1,331 +1,206 @@
-"""The plan that is taken where none is named: a search for extremes inside, and a second look."""
+"""The method that is taken where none is named: a search, and a pass that is independent of it.
+
+The search descends in every cut from the best of spread points (α-cut optimisation). The pass then
+looks at fresh points and descends from the best of these alone. Where most of its descents end on
+the bound that the search had, the bounds are estimated: their error is twice what the pass improved
+and what its ends lack. Where they end elsewhere, or where a bound lies at a kink or a jump, nothing
+is known of the error, and the bounds are attained only. A spike that is narrower than the distance
+of the samples is seen by neither.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 
-from alphacut.fuzzy.counted import counted
-from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.plans.alpha_cut_optimisation import LevelSearch
-from alphacut.fuzzy.plans.monotonicity import primary
-from alphacut.fuzzy.plans.sparse_chebyshev import Chebyshev
-from alphacut.fuzzy.plans.sparse_grid import SparseGrid
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation, attained, searched
+from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
-from alphacut.fuzzy.samples.design import Design
-from alphacut.fuzzy.samples.model import Memo, Model, Values
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.samples.model import Memo, Model, SpentError
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.given import require_fields
-from alphacut.fuzzy.sets.numbers import Array
 
-_SEARCHED = 12  # outputs up to which each bound of each is searched and confirmed
-_UNKNOWN = 0.5  # error over width from which the answer tells nothing
-UNKNOWN = (
-    "; the error is as wide as the answer itself: take it as unknown; BranchAndBound(function)"
-    " proves bounds of plain NumPy functions"
-)
-_SURFACE = 400  # samples at which the surface ends where no budget is named
+_MOST = 12  # outputs of which each bound is searched
+_SAFETY = 2  # the next pass may find more than the last one
+_ROUNDS = 12  # of a descent
+_AGREEING = 0.5  # least share of fresh descents that must end on the bound
+_SLOPE = 0.01  # of an output's range over the width of a cut: less is that of a smooth optimum
+_ROUNDING = 1e-9  # of an output's size
 
 
 @dataclass(frozen=True)
 class Automatic:
-    """Interpolates the model, runs it at the surface's extremes, and looks a second time.
-
-    Where the facts known of the model make corners suffice, these alone are run. Elsewhere every
-    cut is looked at with fresh points, from the best of which the model itself is descended, until
-    such a look finds nothing new. Bounds are attained by samples (inner); their error is what the
-    last look found, doubled, or the surface's, whichever is larger. Where most descents from fresh
-    points end on hills of their own a better hill is likely: the error is then at least twice the
-    step from the best hill to the next. Only a proof sees a spike that is narrower than the
-    distance of the samples.
+    """Corners where what is known of the model makes them suffice; a search elsewhere.
 
     Args:
-        tolerance: Share of an output's range that a look must not find more than.
-        budget: Samples altogether, of which the surface takes half. Where none is named, the
-            surface takes 400 at most and the looks what they need.
-        look: Fresh points per level, input and look.
-        looks: Looks at most.
-        seed: Where the fresh points start from.
-        outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
-            samples happen to bound them, without an error.
+        tolerance: Share of an output's range within which a fresh descent agrees with the bound,
+            and of which the last pass must not find more.
+        starts: Descents per bound of the search.
+        look: Fresh points of a pass per level and input.
+        passes: Passes at most; the last that finds nothing new ends them.
+        seed: Where the points start from.
+        outputs: Outputs whose bounds are searched; all if none is named, up to 12. The others are
+            as the samples happen to bound them.
 
     Raises:
-        ValueError: A number is not positive, or the budget does not carry the first surface.
+        RefusedError: A number is not positive, or the tolerance not below 1.
     """
 
     tolerance: float = 1e-3
-    budget: int | None = None
+    starts: int = 2
     look: int = 6
-    looks: int = 4
+    passes: int = 4
     seed: int = 0
     outputs: tuple[str, ...] = ()
 
+    name = "automatic"
+
     def __post_init__(self) -> None:
-        require_fields(self)
-        if not (
-            0 < self.tolerance < 1
-            and min(self.look, self.looks, 1 if self.budget is None else self.budget) >= 1
-        ):
-            budget = "" if self.budget is None else f", budget {self.budget}"
-            raise ValueError(
-                f"tolerance {self.tolerance:g}, look {self.look}, looks {self.looks}{budget}: all"
-                " must be positive, and the tolerance, a share of the range, below 1; samples are"
-                " bounded by budget="
-            )
+        if not 0 < real("tolerance", self.tolerance) < 1:
+            raise RefusedError("tolerance", self.tolerance, "shares inside (0, 1)")
+        for key in ("starts", "look", "passes"):
+            real(key, getattr(self, key), positive=True, whole=True)
+        real("seed", self.seed, whole=True)
 
-    stepwise = True  # samples depend on those before
-
-    def run(self, model: Model, domain: Domain) -> FuzzyResult:
-        """Bounds of every output, with one line on how they were verified."""
-        purse = Purse(model, np.inf if self.budget is None else self.budget)
-        memo = Memo(purse)
-        columns = memo(domain.modal[None]).columns
-        if not domain.interactions and _proved(memo, domain):
-            purse.left = np.inf
-            return Reduced().run(memo, domain)
-        names = self.outputs or primary(columns, model.known)
-        few = len(names) <= _SEARCHED
-        found = self._surface(memo, purse, domain, names if few else ())
-        spent = len(memo)
-        looks = Looks(memo, domain, names if few else (), self.tolerance)
-        looks.run(self.looks, self.look, self.seed)
-        result = Design.from_samples(domain, memo.points).bounds(memo.values, plan="automatic")
-        chosen = [result.column(name) for name in names]
-        if not few:
-            result = _further(result, found)
-        aside = np.isin(result.outputs, found.unsearched)
-        error = np.maximum(found.error, np.where(aside, 0.0, looks.error))
+    def run(self, model: Model, domain: Domain) -> Bounds:
+        """Bounds of every output."""
+        memo = Memo(model)
+        outputs = searched(memo, domain, self.outputs)
+        if not domain.interactions and corners_suffice(domain, outputs, model.known).all():
+            return replace(Reduced().run(memo, domain), method=self.name)
+        outputs = outputs if len(outputs) <= _MOST else ()
+        search = Optimisation(starts=self.starts, look=self.look, seed=self.seed)
+        spent = search.search(memo, domain, outputs)
+        check = _Passes(self, memo, domain, outputs)
+        spent = spent or check.run()
+        judged = check.judged(attained(memo, domain, self.name, spent=spent), spent=spent)
+        last = attained(memo, domain, self.name, spent=spent)  # the judgement took samples, too
         return replace(
-            result,
-            runs=spent,
-            verification_runs=len(memo) - spent,
-            error=error,
-            unsearched=found.unsearched,
-            notes=(*found.notes, self._told(result, error[:, chosen], chosen, looks)),
+            last,
+            error=judged.error,
+            natures=judged.natures,
+            nature=judged.nature,
+            notes=judged.notes,
         )
-
-    def _surface(
-        self, memo: Memo, purse: Purse, domain: Domain, names: tuple[str, ...]
-    ) -> FuzzyResult:
-        """Bounds by the surface; a named budget is halved until it carries the last step too."""
-        extremes = 2 * len(domain.alpha) * len(names)
-        budget = self.budget or 2 * _SURFACE
-        first = SparseGrid.first(len(domain.names))
-        if budget < first + extremes:
-            raise ValueError(
-                f"budget is {budget}; {len(names) or 'many'} outputs at {len(domain.alpha)} levels"
-                f" take {first + extremes} samples at least: raise it, or take fewer levels"
-            )
-        purse.left -= extremes
-        share = max(budget // 2, first)
-        while not self._carried(memo, domain, share):
-            share = max(share // 2, first)
-        purse.left += extremes
-        surface = Chebyshev(self.tolerance, share, confirm=bool(names), outputs=self.outputs)
-        return surface.run(memo, domain)
-
-    def _carried(self, memo: Memo, domain: Domain, share: int) -> bool:
-        """Whether the budget carries a surface of so many samples, whose last step passes them."""
-        try:
-            SparseGrid(memo, *(ends[0] for ends in domain.boxes)).refine(self.tolerance, share)
-        except SpentError:
-            return False
-        return True
-
-    def _told(self, result: FuzzyResult, error: Array, chosen: list[int], looks: Looks) -> str:
-        """One sentence on what was verified."""
-        width = (result.upper - result.lower)[0, chosen]
-        share = float((error / np.where(width > 0, width, np.inf)).max(initial=0.0))
-        how = " and descents from the best of them" if looks.names else ""
-        grade = "" if share <= 10 * self.tolerance else "; take a larger budget or another plan"
-        grade = grade if share < _UNKNOWN else UNKNOWN
-        many = (
-            "; most descents end on hills of their own, so a better one is likely"
-            if looks.hills.any()
-            else ""
-        )
-        ended = (
-            f"; the budget of {self.budget} samples ended the search"
-            + (f" after {counted(looks.done, 'round')}" if looks.done else " in its first round")
-            + ", a larger one may find more"
-            if looks.spent
-            else ""
-        )
-        return (
-            f"searched for extremes inside by fresh points in every cut{how}: the error is"
-            f" estimated at {_per_cent(share)} of the width{ended}{many}{grade}; a spike between"
-            " samples would not be seen"
-        )
-
-
-def _per_cent(share: float) -> str:
-    """A share in per cent, one digit that counts, without powers of ten; 0 below 0.0001 %."""
-    return f"{float(f'{100 * share:.1g}'):.4f}".rstrip("0").rstrip(".") + " %"
-
-
-def _further(samples: FuzzyResult, surface: FuzzyResult) -> FuzzyResult:
-    """The wider of two bounds each; estimated where the surface sees further."""
-    low, high = surface.lower < samples.lower, surface.upper > samples.upper
-    return replace(
-        samples,
-        lower=np.where(low, surface.lower, samples.lower),
-        upper=np.where(high, surface.upper, samples.upper),
-        lower_at=np.where(low[..., None], surface.lower_at, samples.lower_at),
-        upper_at=np.where(high[..., None], surface.upper_at, samples.upper_at),
-        base=surface.base if (low | high).any() else samples.base,
-    )
-
-
-def _proved(memo: Memo, domain: Domain) -> bool:
-    """Whether what is known of the model makes the corners of each cut hold its extremes."""
-    none = Design.from_levels(domain, [memo.points] * len(domain.alpha)).bounds(
-        memo.values, plan=""
-    )
-    return bool(corners_suffice(none, memo.known).all())
-
-
-_SAFETY = 2  # what a next look finds may be more than what the last one found
-_ROUNDS = 12  # of a descent
-_MISSED = 0.5  # share of fresh descents off the best hill from which a better hill is likely
-
-
-class SpentError(Exception):
-    """The next samples would pass the budget."""
 
 
 @dataclass
-class Purse:
-    """A model that counts its samples, and refuses those that would pass the budget.
+class _Passes:
+    """Passes that are independent of the search.
 
     Args:
-        model: The model.
-        left: Samples that it may still run.
-    """
-
-    model: Model
-    left: float
-
-    @property
-    def known(self) -> Known:
-        """Facts that the caller knows about the model."""
-        return self.model.known
-
-    def __call__(self, points: Array) -> Values:
-        """Outputs at the points, shape (n, inputs).
-
-        Raises:
-            SpentError: They are more than are left; none is run.
-        """
-        if len(points) > self.left:
-            raise SpentError
-        self.left -= len(points)
-        return self.model(points)
-
-    def report(self, share: float, *, last: bool = False) -> None:
-        """Tell the share done, 0 … 1."""
-        self.model.report(share, last=last)
-
-
-class Looks:
-    """Fresh points in every cut, and descents from the best old and new ones.
-
-    Args:
-        memo: The model with its samples so far, those of a surface for instance.
+        method: Their settings.
+        memo: The model with the samples of the search.
         domain: Inputs and levels.
-        names: Outputs whose bounds are searched.
-        tolerance: Share of an output's range that a look must not find more than.
+        outputs: Outputs whose bounds were searched.
 
     Attributes:
-        gain: What the last look added to any bound, shape (columns,).
-        hills: Step from a bound to the next best hill where most fresh descents ended on hills of
-            their own, shape (columns,).
-        done: Looks that were finished.
-        spent: Whether the budget ended them.
+        gain: What the last pass improved, shape (levels, columns).
+        ends: Where fresh descents ended: level and value by output and sign of the bound.
     """
 
-    def __init__(
-        self, memo: Memo, domain: Domain, names: tuple[str, ...], tolerance: float
-    ) -> None:
-        self.memo, self.domain, self.names, self.tolerance = memo, domain, names, tolerance
-        self.gain, self.hills = np.zeros((2, len(memo.values.columns)))
-        self.done, self.spent = 0, False
-        self._ends: dict[tuple[str, float, int], list[float]] = {}
+    method: Automatic
+    memo: Memo
+    domain: Domain
+    outputs: tuple[str, ...]
+    gain: Array = field(default_factory=lambda: np.zeros(()))
+    ends: dict[tuple[str, float], list[tuple[int, float]]] = field(default_factory=dict)
 
-    @property
-    def error(self) -> Array:
-        """What the bounds may lack, shape (columns,)."""
-        return _SAFETY * np.maximum(self.gain, self.hills)
-
-    def run(self, looks: int, per_input: int, seed: int) -> None:
-        """Look until a look finds nothing new, or the budget ends."""
+    def run(self) -> bool:
+        """Pass until one finds nothing new; whether the budget ended that."""
         before = self._bounds()
+        for turn in range(self.method.passes):
+            spent = self._pass(self.method.seed + turn + 1)
+            after = self._bounds()
+            self.gain = np.maximum(before.lower - after.lower, after.upper - before.upper)
+            before = after
+            if spent or (self.gain <= self.method.tolerance * self._span()).all():
+                return spent
+        return False
+
+    def _pass(self, seed: int) -> bool:
+        """Look and descend in every cut; whether the budget ended that."""
         try:
-            for turn in range(looks):
-                for cut in self._cuts():
-                    self._look(cut, per_input, seed + turn + 1, lines=turn == 0)
-                self.gain = np.abs(self._bounds() - before).max(axis=(0, 1))
-                before, self.done = self._bounds(), turn + 1
-                self.hills = self._hills(before)
-                if (self.error <= _SAFETY * self.tolerance * self._span()).all():
-                    break
+            for cut in cuts(self.memo, self.domain):
+                fresh = cut.look(self.method.look * len(cut.moving), seed)
+                for output, sign in product(self.outputs if len(fresh) else (), (1.0, -1.0)):
+                    end = self._end(cut, fresh, output, sign)
+                    self.ends.setdefault((output, sign), []).append((cut.level, end))
         except SpentError:
-            self.spent = True
-            now = self._bounds()
-            self.gain = np.maximum(self.gain, np.abs(now - before).max(axis=(0, 1)))
-            self.hills = self._hills(now)
+            return True
+        return False
 
-    def _look(self, cut: LevelSearch, per_input: int, seed: int, *, lines: bool) -> None:
-        fresh = cut.look(per_input, seed)
-        for name in self.names:
-            for sign in (1.0, -1.0):
-                best = cut.descend(cut.best(name, sign, 1)[0], name, sign, _ROUNDS)
-                if lines:
-                    cut.along(best, name, sign, _ROUNDS)
-                if len(fresh):
-                    start = fresh[cut.worth(fresh, name, sign).argmin()]
-                    end = self._end(cut, start, name, sign)
-                    self._ends.setdefault((name, sign, cut.level), []).append(end)
+    def _end(self, cut: LevelSearch, fresh: Array, output: str, sign: float) -> float:
+        """Value where a descent from the best of fresh points ends.
 
-    def _end(self, cut: LevelSearch, start: Array, name: str, sign: float) -> float:
-        """Worth of the hill that a descent ends on; hills at corners lead to one another."""
-        end, best = cut.descend(start, name, sign, _ROUNDS), cut.best(name, sign, 1)[0]
-        worth, least = cut.worth(np.stack([end, best]), name, sign)
-        near = self.tolerance * self._span()[self.memo.values.column(name)]
-        if worth > least + near and np.isin(best, (0.0, 1.0)).all():
-            worth = cut.worth(cut.along(end, name, sign, _ROUNDS)[None], name, sign)[0]
-        return float(worth)
+        Hills at corners lead to one another along the edges.
+        """
+        start = fresh[cut.worth(fresh, output, sign).argmin()]
+        end = cut.along(cut.descend(start, output, sign, _ROUNDS), output, sign, _ROUNDS)
+        return float(sign * cut.worth(end[None], output, sign)[0])
 
-    def _hills(self, bounds: Array) -> Array:
-        """Step to the next best hill, where most descents from fresh points missed the best."""
-        span, step = self._span(), np.zeros(len(self.hills))
-        for name, sign in product(self.names, (1.0, -1.0)):
-            column = self.memo.values.column(name)
-            off = [
-                np.array(ends) - sign * bounds[0 if sign > 0 else 1, level, column]
-                for (*own, level), ends in self._ends.items()
-                if own == [name, sign]
-            ]
-            far = [one[one > self.tolerance * span[column]] for one in off]
-            if sum(map(len, far)) > _MISSED * sum(map(len, off)):
-                steps = (one.min() for one in far if len(one))
-                step[column] = max(step[column], *steps)
-        return step
+    def judged(self, bounds: Bounds, *, spent: bool) -> Bounds:
+        """The bounds with their error where most fresh descents agree with them, else attained."""
+        near = self.method.tolerance * self._span()
+        missed = [self._missed(bounds, column, near[column]) for column in range(len(near))]
+        agrees = np.array([own is not None for own in missed]) & (self.gain <= near).all(axis=0)
+        agrees[agrees] = [self._smooth(bounds, column) for column in np.flatnonzero(agrees)]
+        sure = agrees & ~spent
+        size = np.maximum(np.abs(bounds.lower), np.abs(bounds.upper)).max(axis=0)
+        ends = np.stack([np.zeros(len(self.domain.alpha)) if x is None else x for x in missed], 1)
+        error = _SAFETY * np.maximum(self.gain, ends) + _ROUNDING * size
+        lower, upper = self.domain.boxes
+        crisp = (lower == upper).all(axis=1)[:, None]
+        natures = tuple(Nature.ESTIMATED if own else Nature.ATTAINED for own in sure)
+        unsure = [name for name in self.outputs if not agrees[bounds.column(name)]]
+        note = f"a better bound of {', '.join(unsure[:4])} is likely: an independent search ended"
+        return replace(
+            bounds,
+            error=np.where(sure & ~crisp, error, 0.0),
+            natures=natures,
+            nature=min(natures, key=list(Nature).index),
+            notes=(
+                *bounds.notes,
+                *(
+                    [f"{note} elsewhere, or the bound lies at a kink or a jump"]
+                    if unsure and not spent
+                    else []
+                ),
+            ),
+        )
 
-    def _bounds(self) -> Array:
-        """Least and greatest value of every cut so far, shape (2, levels, columns)."""
-        found = Design.from_samples(self.domain, self.memo.points).bounds(self.memo.values, plan="")
-        return np.array([found.lower, found.upper])
+    def _missed(self, bounds: Bounds, column: int, near: float) -> Array | None:
+        """What agreeing fresh descents lack of the bounds, shape (levels,); None where few do."""
+        missed, agreeing, count = np.zeros(len(self.domain.alpha)), 0, 0
+        for sign, bound in ((1.0, bounds.lower), (-1.0, bounds.upper)):
+            for level, end in self.ends.get((bounds.outputs[column], sign), []):
+                lack = sign * (end - bound[level, column])
+                count += 1
+                agreeing += bool(lack <= near)
+                missed[level] = max(missed[level], lack if lack <= near else 0.0)
+        return missed if count and agreeing >= _AGREEING * count else None
+
+    def _smooth(self, bounds: Bounds, column: int) -> bool:
+        """Whether an output has nearly no slope where its bounds are attained inside a cut."""
+        try:
+            return all(
+                cut.steepest(cut.unit(places[cut.level, column][None])[0], bounds.outputs[column])
+                <= _SLOPE
+                for cut in cuts(self.memo, self.domain)
+                for places in (bounds.lower_at, bounds.upper_at)
+            )
+        except SpentError:
+            return False
+
+    def _bounds(self) -> Bounds:
+        """Bounds so far."""
+        return attained(self.memo, self.domain, self.method.name, spent=False)
 
     def _span(self) -> Array:
-        return np.asarray(np.ptp(self.memo.values.array, axis=0))
-
-    def _cuts(self) -> Iterator[LevelSearch]:
-        """Cuts that have a width, from the narrowest on."""
-        for level in reversed(range(len(self.domain.alpha))):
-            cut = LevelSearch(self.memo, self.domain, level)
-            if len(cut.moving):
-                yield cut
+        """Range of each output over all samples, shape (columns,)."""
+        values = self.memo.samples.values.array
+        return np.asarray(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))

@@ -1,8 +1,12 @@
 """Metamodel from boxes of the inputs to bounds of the outputs (section 7, [44]).
 
 Unlike a surface in the model's place it needs no search afterwards: once trained, any fuzzy inputs
-within the support that it was trained on get their bounds at once, without another run of the
-model. What it learns from is another plan's bounds on many boxes.
+within the support that it was trained on get their bounds at once, without another evaluation. What
+it learns from is another method's bounds on many boxes.
+
+Its error is twice the largest miss on boxes that it was not trained on, plus what samples of other
+boxes show that it misses. Where that is more than a quarter of an output's width, as with a jump,
+the surface is not to be trusted: the bounds of that output are then those that the samples attain.
 """
 
 from __future__ import annotations
@@ -12,19 +16,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from alphacut.fuzzy.plans.transformation import Extended, General, Reduced
-from alphacut.fuzzy.samples.model import Memo, Model
-from alphacut.fuzzy.samples.nature import Nature
-from alphacut.fuzzy.samples.result import FuzzyResult, Plan
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.plans.method import Method
+from alphacut.fuzzy.plans.transformation import Reduced
+from alphacut.fuzzy.refused import FailedError, RefusedError, real
+from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.samples.model import Memo, Model, Samples
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.given import require_fields
-from alphacut.fuzzy.sets.numbers import Array, Interval, Rows
+from alphacut.fuzzy.sets.numbers import Interval
 
-CORNERS = (
-    "on one box the teacher {} has the corners alone, widened by the samples of other boxes within;"
-    " where the function turns inside take Optimisation() or BranchAndBound(function) as teacher"
-)
 _SAFETY = 2  # the error elsewhere may be larger than on the boxes that were held out
+_TRUSTED = 0.25  # of the width: a larger error is none
 
 
 @dataclass(frozen=True)
@@ -34,34 +36,29 @@ class Metamodel:
     Args:
         boxes: Boxes to learn from.
         held_out: Boxes more that it is tested on.
-        teacher: Plan whose bounds on each box are learnt, at its cost for each of `boxes` and
-            `held_out`, widened to hold the samples of all boxes that lie within. A box has one
-            level, of which `Reduced`, `General` and `Extended` take the 2^n corners alone, enough
-            where the model is monotone; where it turns inside, take `Optimisation()` or
-            `BranchAndBound(function)`. The bounds are "estimated" where the teacher's are
-            guaranteed, else "searched": the error holds what is seen of the teacher's misses.
+        teacher: Method whose bounds on each box are learnt, at its cost for each of `boxes` and
+            `held_out`, widened to hold the samples of all boxes that lie within. `Reduced` takes
+            the corners alone, enough where the model is monotone; where it turns inside, take
+            `Optimisation()`.
         seed: Where the boxes are drawn from.
 
     Raises:
-        ValueError: There are too few boxes.
+        RefusedError: There are too few boxes.
     """
 
     boxes: int = 200
     held_out: int = 50
-    teacher: Plan = field(default_factory=Reduced)
+    teacher: Method = field(default_factory=Reduced)
     seed: int = 0
 
+    name = "metamodel"
+
     def __post_init__(self) -> None:
-        require_fields(self)
-        if self.boxes < 2 or self.held_out < 1:
-            raise ValueError(
-                f"the metamodel has {self.boxes} boxes and {self.held_out} held out; it needs 2 and"
-                " 1 at least"
-            )
+        for key in ("boxes", "held_out"):
+            real(key, getattr(self, key), positive=True, whole=True)
+        real("seed", self.seed, whole=True)
 
-    stepwise = True  # samples depend on those before
-
-    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+    def run(self, model: Model, domain: Domain) -> Bounds:
         """Train on boxes within the support and predict the bounds of every cut."""
         return self.train(model, domain).bounds(domain)
 
@@ -73,66 +70,49 @@ class Metamodel:
             domain: Its inputs; only their supports matter.
 
         Raises:
-            ValueError: No input has a width.
+            RefusedError: No input has a width.
         """
         from scipy.interpolate import RBFInterpolator
 
-        domain.require_free("Metamodel")
+        domain.require_free(self.name)
         memo = Memo(model)
-        lower, upper = (ends[0] for ends in Domain(domain.inputs, (0.0,)).boxes)
-        moving = np.flatnonzero(upper > lower)
-        if not len(moving):
-            raise ValueError(
-                "no input has a width, so there is nothing to train a metamodel on; take Reduced,"
-                " which runs the model once"
-            )
-        unit = self._boxes(len(moving))
+        memo(domain.modal[None])
+        support = lower, upper = tuple(ends[0] for ends in Domain(domain.inputs, (0.0,)).boxes)
+        moving = upper > lower
+        if not moving.any():
+            raise RefusedError("inputs", domain.names, "one with a width or more")
+        unit = self._boxes(int(moving.sum()))
         boxes = [_real(box, lower, upper, moving) for box in unit]
-        lessons = []
-        for row, box in enumerate(boxes):
-            lessons.append(self._taught(memo, domain, box))
-            model.report(0.9 * (row + 1) / len(unit))
-        at, values = memo.points, memo.values
-        pairs = zip(lessons, boxes, strict=True)
-        taught = np.array([_widened(lesson, box, at, values.array) for lesson, box in pairs])
-        proved = all(result.nature is Nature.GUARANTEED for result in lessons)
-        features, targets = unit.reshape(len(unit), -1), taught.reshape(len(unit), -1)
+        for done, box in enumerate(boxes):
+            inputs = {name: Interval(*box[:, i]) for i, name in enumerate(domain.names)}
+            self.teacher.run(memo, Domain(inputs, (0.0,)))
+            model.report(0.9 * (done + 1) / len(boxes))
+        lessons = np.array([_extremes(box, memo.samples) for box in boxes])
+        features, targets = unit.reshape(len(unit), -1), lessons.reshape(len(unit), -1)
         learn, test = slice(0, self.boxes + 2), slice(self.boxes + 2, None)
         predict = RBFInterpolator(features[learn], targets[learn], kernel="cubic", degree=1)
-        missed = np.abs(predict(features[test]) - targets[test]).reshape(-1, 2, taught.shape[2])
-        each = len(memo) / len(unit)
-        notes = [f"the teacher {type(self.teacher).__name__} took {each:.3g} runs a box"]
-        if isinstance(self.teacher, Reduced | General | Extended):
-            notes.append(CORNERS.format(type(self.teacher).__name__))
-        support, most = (lower, upper), missed.max(axis=(0, 1))
-        base = Nature.ESTIMATED if proved else Nature.SEARCHED
-        return TrainedBounds(values.columns, support, predict, most, len(memo), base, (*notes,))
+        missed = np.abs(predict(features[test]) - targets[test]).reshape(-1, 2, lessons.shape[2])
+        return TrainedBounds(support, predict, missed.max(axis=(0, 1)), memo.samples)
 
     def _boxes(self, inputs: int) -> Array:
         """Boxes of the unit cube, shape (n, 2, inputs): the cube, its middle, spread ones."""
         from scipy.stats import qmc
 
-        pairs = qmc.Halton(2 * inputs, rng=np.random.default_rng(self.seed)).random(
-            self.boxes + self.held_out
-        )
+        drawn = qmc.Halton(2 * inputs, rng=np.random.default_rng(self.seed))
+        pairs = drawn.random(self.boxes + self.held_out)
         ends = np.sort(pairs.reshape(-1, 2, inputs), axis=1)
         first = np.array([[[0.0] * inputs, [1.0] * inputs], [[0.5] * inputs, [0.5] * inputs]])
         return np.concatenate([first, ends])
 
-    def _taught(self, memo: Memo, domain: Domain, box: Array) -> FuzzyResult:
-        """The teacher's bounds on a box."""
-        inputs = {name: Interval(*box[:, i]) for i, name in enumerate(domain.names)}
-        return self.teacher.run(memo, Domain(inputs, (0.0,)))
+
+def _extremes(box: Array, samples: Samples) -> Array:
+    """Least and greatest value of every sample within a box, shape (2, outputs)."""
+    within = ((samples.points >= box[0]) & (samples.points <= box[1])).all(axis=1)
+    values = samples.values.array[within]
+    return np.array([np.nanmin(values, axis=0), np.nanmax(values, axis=0)])
 
 
-def _widened(taught: FuzzyResult, box: Array, points: Array, values: Array) -> Array:
-    """Bounds on a box that hold every sample within, whatever it was for, shape (2, outputs)."""
-    within = ((points >= box[0]) & (points <= box[1])).all(axis=1)
-    seen = np.concatenate([taught.lower, taught.upper, values[within]])
-    return np.array([seen.min(axis=0), seen.max(axis=0)])
-
-
-def _real(box: Array, lower: Array, upper: Array, moving: Rows) -> Array:
+def _real(box: Array, lower: Array, upper: Array, moving: Mask) -> Array:
     """A box of the unit cube as a box of the inputs, shape (2, inputs)."""
     ends = np.array([lower, lower])
     ends[:, moving] += box * (upper - lower)[moving]
@@ -144,68 +124,68 @@ class TrainedBounds:
     """A trained metamodel of the bounds.
 
     Args:
-        outputs: Names of the outputs.
         support: Corners of the box that it was trained on, two arrays (inputs,).
         predict: From boxes of the unit cube (n, 2 · moving inputs) to bounds (n, 2 · outputs).
         missed: Largest error on the boxes that were held out, shape (outputs,).
-        runs: Samples of the model that the training took.
-        base: What its bounds are worth.
-        notes: What is to be said of the teacher, one sentence each.
+        samples: Samples of the model that the training took.
     """
 
-    outputs: tuple[str, ...]
-    support: tuple[Array, Array]
+    support: tuple[Array, ...]
     predict: Callable[[Array], Array]
     missed: Array
-    runs: int
-    base: Nature
-    notes: tuple[str, ...] = ()
+    samples: Samples
 
-    def bounds(self, domain: Domain) -> FuzzyResult:
-        """Predicted bounds of every cut, nested, without a run of the model.
+    def bounds(self, domain: Domain) -> Bounds:
+        """Predicted bounds of every cut, nested, without an evaluation of the model.
 
         Raises:
-            ValueError: An input leaves the support that the metamodel was trained on.
+            RefusedError: An input leaves the support that the metamodel was trained on.
         """
-        domain.require_free("Metamodel")
+        domain.require_free("metamodel")
         (low, high), (lower, upper) = self.support, domain.boxes
-        width = high - low
-        if (lower < low - 1e-12 * width).any() or (upper > high + 1e-12 * width).any():
-            known = f"{low.tolist()} to {high.tolist()}"
-            raise ValueError(
-                f"the inputs leave the support that the metamodel was trained on, {known}; train it"
-                " anew"
-            )
-        moving = width > 0
-        unit = np.stack(
-            [(lower - low)[:, moving] / width[moving], (upper - low)[:, moving] / width[moving]],
-            axis=1,
-        )
-        ends = self.predict(np.clip(unit, 0, 1).reshape(len(unit), -1)).reshape(len(unit), 2, -1)
-        least, most = ends.min(axis=1), ends.max(axis=1)
-        nested = np.minimum.accumulate(least[::-1])[::-1], np.maximum.accumulate(most[::-1])[::-1]
-        # a metamodel of bounds does not say where they are reached
-        places = np.full((*least.shape, lower.shape[1]), np.nan)
-        return FuzzyResult(
-            domain=domain,
-            outputs=self.outputs,
-            lower=nested[0],
-            upper=nested[1],
+        near = 1e-12 * (high - low)
+        if (lower < low - near).any() or (upper > high + near).any():
+            allowed = f"within {low.tolist()} … {high.tolist()}, which it was trained on"
+            raise RefusedError("inputs of the metamodel", lower[0].tolist(), allowed)
+        least, most = self._predicted(lower, upper)
+        seen_least, seen_most = self._seen(domain)
+        lacking = np.maximum(np.maximum(least - seen_least, seen_most - most), 0)
+        error = _SAFETY * (self.missed + lacking)
+        trusted = (error <= _TRUSTED * np.ptp(self.samples.values.array, axis=0)).all(axis=0)
+        if not (trusted | np.isfinite(seen_least).all(axis=0)).all():
+            cure = "take Automatic or Optimisation, or more boxes"
+            raise FailedError("the metamodel misses more than a quarter of an output's range", cure)
+        natures = tuple(Nature.ESTIMATED if own else Nature.ATTAINED for own in trusted)
+        places = np.full((*least.shape, lower.shape[1]), np.nan)  # a metamodel does not say where
+        return Bounds(
+            alpha=np.array(domain.alpha),
+            lower=np.where(trusted, np.minimum(least, seen_least), seen_least),
+            upper=np.where(trusted, np.maximum(most, seen_most), seen_most),
             lower_at=places,
             upper_at=places,
-            base=self.base,
-            plan="metamodel",
-            runs=self.runs,
-            error=np.broadcast_to(_SAFETY * self.missed, least.shape).copy(),
-            proved=np.zeros(least.shape, bool),
-            enforced=(nested[0] < least) | (nested[1] > most),
-            notes=(self._told(), *self.notes),
+            error=np.where(trusted, error, 0.0),
+            nature=min(natures, key=list(Nature).index),
+            natures=natures,
+            outputs=self.samples.values.columns,
+            inputs=domain.inputs,
+            method="metamodel",
+            evaluations=len(self.samples.points),
+            samples=self.samples,
         )
 
-    def _told(self) -> str:
-        missed = [f"{x:.3g} of {name}" for name, x in zip(self.outputs, self.missed, strict=True)]
-        shown = ", ".join([*missed[:4], *(["…"] if len(missed) > 4 else [])])
-        return (
-            f"the metamodel missed its teacher's bounds of held-out boxes by up to {shown}; the"
-            f" error is {_SAFETY} times that, and what the teacher misses is not in it"
-        )
+    def _seen(self, domain: Domain) -> tuple[Array, Array]:
+        """Least and greatest sample of each cut, infinite where it has none, (levels, outputs)."""
+        values = self.samples.values.array
+        inside = domain.inside(self.samples.points)[..., None] & ~np.isnan(values)
+        least = np.where(inside, values, np.inf).min(axis=1)
+        return least, np.where(inside, values, -np.inf).max(axis=1)
+
+    def _predicted(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Lower and upper ends for boxes (n, inputs), nested, two arrays (n, outputs)."""
+        (low, high), moving = self.support, self.support[1] > self.support[0]
+        width = (high - low)[moving]
+        ends = [(corner - low)[:, moving] / width for corner in (lower, upper)]
+        unit = np.clip(np.stack(ends, axis=1), 0, 1).reshape(len(lower), -1)
+        table = self.predict(unit).reshape(len(lower), 2, -1)
+        least = np.minimum.accumulate(table.min(axis=1)[::-1])[::-1]
+        return least, np.maximum.accumulate(table.max(axis=1)[::-1])[::-1]

@@ -17,14 +17,15 @@ from math import prod
 
 import numpy as np
 
-from alphacut.fuzzy.campaign.workers import require
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.known import Known, Signs
-from alphacut.fuzzy.plans.monotonicity import Effects, Verification, require_few, verified, verify
-from alphacut.fuzzy.samples.design import Design
+from alphacut.fuzzy.plans.monotonicity import Effects, Verification, verify
+from alphacut.fuzzy.refused import RefusedError, chosen
+from alphacut.fuzzy.result import Bounds, Ends
+from alphacut.fuzzy.samples.design import Design, proving
 from alphacut.fuzzy.samples.model import Memo, Model
-from alphacut.fuzzy.samples.result import FuzzyResult
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, Mask
+from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 # of the support: points of different levels closer than this differ by round-off only, and are one
 # point
@@ -39,7 +40,7 @@ def hanss_points(
     Args:
         number: A fuzzy number or interval.
         alpha: Rising levels.
-        inner: Whether points between the ends of a cut are wanted.
+        inner: Whether there are points between the ends of a cut.
 
     Returns:
         For each level, from the lowest, its points in rising order: n at the top (one where the cut
@@ -75,9 +76,9 @@ class _Transformation:
     """Base of the methods: a grid per level, and the retransformation."""
 
     @property
-    def stepwise(self) -> bool:
-        """All samples are known beforehand."""
-        return False
+    def name(self) -> str:
+        """The word for it in a case file."""
+        return type(self).__name__.lower()
 
     def _refined(self, names: Sequence[str]) -> set[str]:
         """Inputs that get the recursion's inner points."""
@@ -97,26 +98,34 @@ class _Transformation:
 
     def points(self, domain: Domain) -> Design:
         """The samples of every level, each distinct one listed once."""
-        require(self.size(domain), len(domain.names))
         return Design.from_levels(
             domain, [np.array(list(product(*grid))) for grid in self.grids(domain)]
         )
 
-    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+    def run(self, model: Model, domain: Domain) -> Bounds:
         """Evaluate the samples and rearrange them into α-cuts."""
-        domain.require_free(type(self).__name__)
+        domain.require_free(self.name)
+        afford(self.size(domain), model, self.name)
         design = self.points(domain)
-        result = design.bounds(model(design.points), plan=type(self).__name__.lower())
-        return result.proving(
-            lambda bounds: corners_suffice(bounds, model.known), model.known.words
-        )
+        bounds = design.bounds(model(design.points), self.name)
+        assert bounds.samples is not None
+        proved = corners_suffice(domain, bounds.outputs, model.known)
+        return proving(bounds, bounds.samples, proved, model.known)
 
 
-def corners_suffice(result: FuzzyResult, known: Known) -> Mask:
-    """Bounds that corners prove: the output is stated to be monotone in every input."""
-    lower, upper = result.domain.boxes
-    monotone = known.monotone_in(result.inputs, result.outputs)
-    return np.asarray((monotone[None] | (lower == upper)[:, None, :]).all(axis=2))
+def corners_suffice(domain: Domain, outputs: Sequence[str], known: Known) -> Mask:
+    """Outputs that are stated to be monotone in every input that has a width, shape (outputs,)."""
+    lower, upper = domain.boxes
+    monotone = known.monotone_in(domain.names, outputs)
+    return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
+
+
+def afford(samples: float, model: Model, method: str) -> None:
+    """Refuse a design that the budget does not carry, before any sample is run."""
+    if samples > model.left:
+        cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
+        cure += " fewer levels, state signs (Known) for Signed, or take Automatic"
+        raise RefusedError("budget", f"{model.left:,} evaluations", f"{samples:,.0f} or more", cure)
 
 
 @dataclass(frozen=True)
@@ -144,75 +153,58 @@ class Extended(_Transformation):
             knows of the model, and for the other inputs a verification at probes.
         verification: How monotonicity is looked for.
         outputs: Outputs whose bounds matter; all if none is named.
-        limit: Samples that the plan may take where monotonicity is not found in enough inputs.
     """
 
     monotone: tuple[str, ...] | None = None
     verification: Verification = field(default_factory=Verification)
     outputs: tuple[str, ...] = ()
-    limit: int = 10_000
-
-    @property
-    def stepwise(self) -> bool:
-        """True if monotonicity is looked for first."""
-        return self.monotone is None
 
     def _refined(self, names: Sequence[str]) -> set[str]:
-        unknown = set(self.monotone or ()) - set(names)
-        if unknown:
-            raise ValueError(
-                f"the monotone inputs name {sorted(unknown)}, which is no fuzzy input; there are"
-                f" {list(names)}"
-            )
+        for name in self.monotone or ():
+            chosen("monotone input", name, names)
         return set(names) - set(self.monotone or ())
 
-    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+    def run(self, model: Model, domain: Domain) -> Bounds:
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
         if self.monotone is not None:
-            known = replace(model.known, monotone=(*model.known.monotone, *self.monotone))
-            result = super().run(model, domain)
-            return result.proving(lambda bounds: corners_suffice(bounds, known), known.words)
+            return super().run(model, domain)
+        domain.require_free(self.name)
         memo = Memo(model)
-        effects = verify(memo, domain, self.verification, outputs=self.outputs)
-        widest = effects.signs[0] != 0
-        classes = (widest | model.known.monotone_in(domain.names, effects.outputs)).all(axis=0)
-        names = tuple(name for name, holds in zip(domain.names, classes, strict=True) if holds)
-        chosen = replace(self, monotone=names)
-        model.report(0.5, last=True)
-        require_few(chosen.size(domain), self.limit, effects.notes(domain))
-        return verified(super(Extended, chosen).run(memo, domain), memo, effects)
+        effects = verify(memo, domain, self.verification, self.outputs)
+        classes = (effects.signs[0] != 0) | model.known.monotone_in(domain.names, effects.outputs)
+        pairs = zip(domain.names, classes.all(axis=0), strict=True)
+        plan = replace(self, monotone=tuple(name for name, holds in pairs if holds))
+        design = plan.points(domain)
+        afford(len(design.points), memo, self.name)
+        return _verified(design, memo, effects, self.name)
 
 
 @dataclass(frozen=True)
 class Signed:
     """Two corners per level where all effects have a sign, else the general method's points.
 
-    Signs are stated by the caller (`Known.signs`), proved from a range of the gradient, or seen at
-    probes. The bounds are guaranteed where all signs are stated or proved, and inner otherwise.
+    Signs are stated by the caller (`Known.signs`), verified by a range of the gradient, or seen at
+    probes. The bounds are guaranteed where all signs are stated or verified, else attained.
 
     Args:
-        outputs: Outputs whose bounds matter; all if none is named. The others are printed as the
-            samples happen to bound them, without an error unless they are proved.
         verification: How signs are looked for where they are not stated.
-        limit: Samples that the plan may take where signs are missing.
+        outputs: Outputs whose bounds matter; all if none is named. The others are as the samples
+            happen to bound them.
     """
 
-    outputs: tuple[str, ...] = ()
     verification: Verification = field(default_factory=Verification)
-    limit: int = 10_000
+    outputs: tuple[str, ...] = ()
 
-    stepwise = True  # samples depend on those before
+    name = "signed"
 
-    def run(self, model: Model, domain: Domain) -> FuzzyResult:
+    def run(self, model: Model, domain: Domain) -> Bounds:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
-        domain.require_free("Signed")
+        domain.require_free(self.name)
         memo = Memo(model)
-        effects = verify(memo, domain, self.verification, outputs=self.outputs)
-        model.report(0.5, last=True)
-        require_few(_size(effects, domain), self.limit, effects.notes(domain))
+        effects = verify(memo, domain, self.verification, self.outputs)
+        afford(_size(effects, domain), memo, self.name)
         design = Design.from_levels(domain, self._points(effects, domain))
-        result = design.bounds(memo(design.points), plan="signed")
-        return verified(result, memo, effects)
+        return _verified(design, memo, effects, self.name)
 
     def _points(self, effects: Effects, domain: Domain) -> list[Array]:
         """Corners that the signs name, times the general method's points of other inputs."""
@@ -223,24 +215,40 @@ class Signed:
         ]
 
 
-def _size(effects: Effects, domain: Domain) -> int:
+def _verified(design: Design, memo: Memo, effects: Effects, method: str) -> Bounds:
+    """Bounds from the samples of a design, proved where all signs are stated or verified."""
+    corners = design.bounds(memo(design.points), method, evaluations=len(memo))
+    proved = np.isin(corners.outputs, np.array(effects.outputs)[effects.proved.all(axis=(0, 2))])
+    judged = proving(corners, memo.samples, proved, memo.known)
+    every = Design.from_samples(design.domain, memo.samples.points)
+    bounds = every.bounds(memo.samples.values, method)
+    notes = (*effects.notes(design.domain), *judged.notes)
+    return replace(
+        bounds,
+        nature=judged.nature,
+        natures=judged.natures,
+        basis=judged.basis,
+        inner=Ends(bounds.lower, bounds.upper),
+        notes=notes,
+    )
+
+
+def _size(effects: Effects, domain: Domain) -> float:
     """Samples of the plan, counted without listing them."""
     total = 0.0
     for signs, grid in zip(effects.signs, General().grids(domain), strict=True):
-        counts = np.array([len(points) for points in grid])
-        total += (
-            2 * np.where(np.unique(signs == 0, axis=0), counts, 1).prod(axis=1, dtype=float).sum()
-        )
-    return int(total)
+        counts = np.array([len(points) for points in grid], float)
+        patterns = np.unique(signs == 0, axis=0)
+        total += 2 * np.where(patterns, counts, 1.0).prod(axis=1).sum()
+    return total
 
 
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
     rows: list[tuple[float, ...]] = []
     for pattern in np.unique(signs, axis=0):
         for sense in (1, -1):
-            rows += product(
-                *(_ends(points, sense * sign) for sign, points in zip(pattern, grid, strict=True))
-            )
+            pairs = zip(pattern, grid, strict=True)
+            rows += product(*(_ends(points, sense * sign) for sign, points in pairs))
     return np.array(rows)
 
 

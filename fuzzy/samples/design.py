@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.samples.model import Values
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.knowledge.known import Known, contradiction, negligible
+from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.result import Bounds, Ends, Nature
+from alphacut.fuzzy.samples.model import Samples, Values
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.numbers import Array, Mask, Rows
 
 
 @dataclass(frozen=True)
@@ -37,46 +39,95 @@ class Design:
     @classmethod
     def from_samples(cls, domain: Domain, points: Array) -> Design:
         """Let every level use all points, shape (n, inputs), that lie in its cut."""
-        rows = tuple(np.flatnonzero(inside) for inside in domain.inside(points))
-        empty = [alpha for alpha, own in zip(domain.alpha, rows, strict=True) if not len(own)]
-        if empty:
-            raise ValueError(
-                f"no sample lies in the cut at α = {empty[0]:g}: its interactions leave too little"
-                " room, or none"
-            )
-        return cls(domain, points, rows)
-
-    def bounds(self, values: Values, *, plan: str) -> FuzzyResult:
-        """Retransformation: extremes of each level's samples and of every level above.
-
-        Args:
-            values: Outputs at `points`.
-            plan: Name of the plan that made this design.
-        """
-        lowest, low_enforced = self._extremes(values.array)
-        highest, high_enforced = self._extremes(-values.array)
-        return FuzzyResult.attained(
-            self.domain,
-            self.points,
-            values,
-            lowest=lowest,
-            highest=highest,
-            enforced=low_enforced | high_enforced,
-            plan=plan,
+        return cls(
+            domain, points, tuple(np.flatnonzero(inside) for inside in domain.inside(points))
         )
 
-    def _extremes(self, values: Array) -> tuple[Rows, Mask]:
-        """Rows of the least values (levels, outputs), and places that own samples miss."""
+    def bounds(self, values: Values, method: str, *, evaluations: int | None = None) -> Bounds:
+        """Retransformation: attained extremes of each level's samples and of every level above.
+
+        Args:
+            values: Outputs at `points`; NaN where a sample failed and was skipped.
+            method: Name of the method.
+            evaluations: Of the model, those that verify among them; one a sample if not given.
+        """
+        lowest, highest = self._extremes(values.array), self._extremes(-values.array)
+        columns = np.arange(values.array.shape[1])
+        return Bounds(
+            alpha=np.array(self.domain.alpha),
+            lower=values.array[lowest, columns],
+            upper=values.array[highest, columns],
+            lower_at=self.points[lowest],
+            upper_at=self.points[highest],
+            error=np.zeros(lowest.shape),
+            nature=Nature.ATTAINED,
+            outputs=values.columns,
+            inputs=self.domain.inputs,
+            method=method,
+            evaluations=len(self.points) if evaluations is None else evaluations,
+            samples=Samples(self.points, values),
+        )
+
+    def _extremes(self, values: Array) -> Rows:
+        """Rows of the least values, shape (levels, outputs)."""
         columns = np.arange(values.shape[1])
+        usable = np.where(np.isnan(values), np.inf, values)
         best: list[Rows] = []
-        enforced: list[Mask] = []
-        for rows in reversed(self.levels):
-            own = rows[values[rows].argmin(axis=0)]
-            missed = (
-                values[best[-1], columns] < values[own, columns]
-                if best
-                else np.zeros(len(columns), bool)
-            )
-            best.append(np.where(missed, best[-1], own) if best else own)
-            enforced.append(missed)
-        return np.array(best[::-1]), np.array(enforced[::-1])
+        for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
+            both = [*([rows[usable[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
+            if not both or np.isinf(usable[both[0], columns]).any():
+                raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
+            least = np.array(both)
+            best.append(least[usable[least, columns].argmin(axis=0), columns])
+        return np.array(best[::-1])
+
+
+def proving(bounds: Bounds, samples: Samples, proved: Mask, known: Known) -> Bounds:
+    """Bounds that are guaranteed where corners prove them and no sample contradicts that.
+
+    Args:
+        bounds: Attained at the corners that the knowledge names.
+        samples: All samples of the model.
+        proved: Outputs that the knowledge covers on every level, shape (outputs,).
+        known: The knowledge.
+    """
+    if not proved.any():
+        return bounds
+    signs = known.stated(tuple(bounds.inputs), bounds.outputs)
+    beyond = _beyond(bounds, samples)
+    natures, notes = [], []
+    for column, name in enumerate(bounds.outputs):
+        own = samples.values.array[:, column]
+        pair = contradiction(samples.points, own, signs[column]) if proved[column] else None
+        sound = proved[column] and not beyond[column] and pair is None
+        natures.append(Nature.GUARANTEED if sound else Nature.ATTAINED)
+        if proved[column] and not sound:
+            notes.append(f"samples contradict what is known of {name}{_between(bounds, pair)}")
+    return replace(
+        bounds,
+        natures=tuple(natures),
+        nature=min(natures, key=list(Nature).index),
+        basis=known.words if Nature.GUARANTEED in natures else (),
+        inner=Ends(bounds.lower, bounds.upper),
+        notes=(*bounds.notes, *notes),
+    )
+
+
+def _beyond(bounds: Bounds, samples: Samples) -> Mask:
+    """Outputs of which a sample lies beyond the corners of its cut."""
+    domain = Domain(bounds.inputs, tuple(bounds.alpha))
+    every = Design.from_samples(domain, samples.points).bounds(samples.values, "")
+    small = negligible(samples.values.array)
+    low, high = every.lower < bounds.lower - small, every.upper > bounds.upper + small
+    return np.asarray((low | high).any(axis=0))
+
+
+def _between(bounds: Bounds, pair: tuple[Array, Array] | None) -> str:
+    """The two samples in words."""
+    if pair is None:
+        return ""
+    places = [
+        ", ".join(f"{name} = {x:.6g}" for name, x in zip(bounds.inputs, point, strict=True))
+        for point in pair
+    ]
+    return f": at {places[0]} it is larger than at {places[1]}"

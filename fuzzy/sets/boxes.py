@@ -2,54 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.refused import RefusedError, real
 from alphacut.fuzzy.sets.claimed import from_level
-from alphacut.fuzzy.sets.given import is_real
-from alphacut.fuzzy.sets.interaction import Interaction
-from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber, Mask
+from alphacut.fuzzy.sets.interaction import Interaction, named
+from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, level
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
-_STRAIGHT = 1e-9  # of the lowest cut: corners this close to a line lie on it
-
-MOST_LEVELS = 10_000
-
 
 def levels(steps: int) -> tuple[float, ...]:
-    """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five.
-
-    Raises:
-        ValueError: `steps` is no whole number from 1 to 10,000.
-    """
-    if not (isinstance(steps, int) and is_real(steps) and 1 <= steps <= MOST_LEVELS):
-        raise ValueError(
-            f"the number of steps between α-levels is {steps}; it must be a whole number from 1 to"
-            f" {MOST_LEVELS:,}"
-        )
+    """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five."""
+    real("steps between levels", steps, positive=True, whole=True)
     return tuple(step / steps for step in range(steps + 1))
 
 
-def _levels(alpha: Sequence[float]) -> tuple[float, ...]:
-    given = [] if isinstance(alpha, str) or not isinstance(alpha, Iterable) else list(alpha)
-    if not given or not all(map(is_real, given)):
-        raise ValueError(
-            f"the α-levels are {alpha!r}; they must be a sequence of numbers that rise within"
-            " [0, 1]"
-        )
-    return tuple(map(float, given))
+def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
+    """The inputs by name, a plain number as a crisp one.
 
-
-def _straight(number: FuzzyNumber, alpha: Sequence[float]) -> bool:
-    """Whether a number's corners between the first and the last level lie on straight lines."""
-    between = [level for level in number.cuts.alpha if alpha[0] < level < alpha[-1]]
-    ends = np.array([number.cut(level) for level in alpha])
-    lines = np.array([np.interp(between, alpha, ends[:, side]) for side in (0, 1)]).T
-    corners = np.array([number.cut(level) for level in between]).reshape(-1, 2)
-    return bool((np.abs(corners - lines) <= _STRAIGHT * np.ptp(ends[0])).all())
+    Raises:
+        RefusedError: The inputs are no mapping, there is none, or a value is neither a fuzzy number
+            nor a number.
+    """
+    if not isinstance(inputs, Mapping) or not inputs or not all(isinstance(x, str) for x in inputs):
+        raise RefusedError("inputs", inputs, "a mapping, as {'E': Triangular(24, 25, 26)}")
+    return {
+        name: value if isinstance(value, FuzzyNumber) else Crisp(real(f"input {name}", value))
+        for name, value in inputs.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -63,7 +48,7 @@ class Domain:
         interactions: Constraints between the inputs.
 
     Raises:
-        ValueError: There is no input, the levels are none, do not rise, or leave [0, 1], or an
+        RefusedError: There is no input, the levels are none, do not rise, or leave [0, 1], or an
             interaction names no input.
     """
 
@@ -72,18 +57,15 @@ class Domain:
     interactions: Sequence[Interaction] = ()
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "inputs", dict(self.inputs))
-        object.__setattr__(self, "alpha", _levels(self.alpha))
-        if not self.inputs:
-            raise ValueError("there is no fuzzy input; name one at least")
-        rising = all(np.diff(self.alpha) > 0) and len(self.alpha) > 0
-        if not (rising and self.alpha[0] >= 0 and self.alpha[-1] <= 1):
-            raise ValueError(f"the α-levels are {list(self.alpha)}; they must rise within [0, 1]")
-        decided = {name: from_level(number, self.alpha[0]) for name, number in self.inputs.items()}
+        alpha = tuple(level(alpha) for alpha in self.alpha)
+        if not alpha or (np.diff(alpha) <= 0).any():
+            raise RefusedError("alpha", list(alpha), "levels that rise within [0, 1]")
+        inputs = fuzzy_inputs(self.inputs)
+        decided = {name: from_level(number, alpha[0]) for name, number in inputs.items()}
+        object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "inputs", decided)
         object.__setattr__(self, "interactions", tuple(self.interactions))
-        for interaction in self.interactions:
-            interaction.check(self.names)
+        named(self.interactions, self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -93,21 +75,9 @@ class Domain:
     @property
     def boxes(self) -> tuple[Array, Array]:
         """Lower and upper corners of the boxes, two arrays of shape (levels, inputs)."""
-        cuts = np.array(
-            [[number.cut(level) for number in self.inputs.values()] for level in self.alpha]
-        )
-        return cuts[..., 0], cuts[..., 1]
-
-    @property
-    def exact(self) -> list[bool]:
-        """Whether at each level no input's cut is wider than it is told."""
         numbers = self.inputs.values()
-        return [all(one.known(level) == level for one in numbers) for level in self.alpha]
-
-    @property
-    def linear(self) -> bool:
-        """Whether the ends of every input's cut go straight from each level to the next."""
-        return all(_straight(number, self.alpha) for number in self.inputs.values())
+        cuts = np.array([[number.cut(alpha) for number in numbers] for alpha in self.alpha])
+        return cuts[..., 0], cuts[..., 1]
 
     @property
     def modal(self) -> Array:
@@ -118,29 +88,19 @@ class Domain:
         """Mask of points, shape (n, inputs), in the cut of each level, shape (levels, n)."""
         lower, upper = self.boxes
         slack = _ROUND_OFF * (upper[0] - lower[0])
-        boxes = ((points >= (lower - slack)[:, None]) & (points <= (upper + slack)[:, None])).all(
-            axis=2
-        )
-        allowed: Mask = boxes & np.array(
-            [self.slack(points, level) >= -_ROUND_OFF for level in self.alpha]
-        )
-        return allowed
+        above = (points >= (lower - slack)[:, None]).all(axis=2)
+        below = (points <= (upper + slack)[:, None]).all(axis=2)
+        room = np.array([self.slack(points, alpha) for alpha in self.alpha])
+        return np.asarray(above & below & (room >= -_ROUND_OFF))
 
     def slack(self, points: Array, alpha: float) -> Array:
         """Least room that the interactions leave at points (n, inputs), shape (n,)."""
-        rooms = [interaction.slack(points, self.inputs, alpha) for interaction in self.interactions]
+        rooms = [one.slack(points, self.inputs, alpha) for one in self.interactions]
         return np.asarray(np.min([np.full(len(points), np.inf), *rooms], axis=0))
 
-    def require_free(self, plan: str) -> None:
-        """Refuse interactions, which the named plan cannot respect.
-
-        Raises:
-            ValueError: There are interactions.
-        """
+    def require_free(self, method: str) -> None:
+        """Refuse interactions, which the named method cannot respect."""
         if self.interactions:
             kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
-            cure = "take MonteCarlo, QuasiMonteCarlo, Optimisation or Chebyshev"
-            raise ValueError(
-                f"the {plan} plan cannot respect interactions between inputs (here: {kinds});"
-                f" {cure}"
-            )
+            cure = "take Automatic or Optimisation"
+            raise RefusedError("interactions", kinds, f"none with the method {method}", cure)

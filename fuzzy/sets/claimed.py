@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.sets.numbers import Array, Cut, Cuts, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, level
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
 
@@ -17,17 +19,15 @@ class Claim:
     Args:
         about: The quantity: "next value", "mean", "median", "quantile 0.9", or what a joint claim
             means.
-        given: Conditions under which it holds, one each.
+        conditions: Conditions under which it holds, one each.
     """
 
     about: str
-    given: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        conditions = f", given {'; '.join(self.given)}" if self.given else ""
-        return (
-            f"the {self.about} lies in its α-cut with P >= 1 - α over repeated samples{conditions}"
-        )
+        under = f", given {'; '.join(self.conditions)}" if self.conditions else ""
+        return f"the {self.about} lies in its α-cut with P >= 1 - α over repeated samples{under}"
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Claimed(FuzzyNumber):
             hold by themselves.
 
     Raises:
-        ValueError: `decided` lies outside [0, 1].
+        RefusedError: `decided` lies outside [0, 1].
     """
 
     number: Stepwise
@@ -90,15 +90,14 @@ class Claimed(FuzzyNumber):
     joint: Joint | None = None
 
     def __post_init__(self) -> None:
-        if not 0 <= self.decided <= 1:
-            raise ValueError(f"the least decided α is {self.decided:g}; it must lie in [0, 1]")
+        level(self.decided)
 
     @property
     def cuts(self) -> Cuts:
         """The cuts at all levels.
 
         Raises:
-            ValueError: Some are not decided by the values.
+            RefusedError: Some are not decided by the values.
         """
         self.cut(0.0)
         return self.number.cuts
@@ -107,21 +106,16 @@ class Claimed(FuzzyNumber):
         """The cut at `alpha` in [0, 1].
 
         Raises:
-            ValueError: `alpha` lies outside [0, 1], or the values do not decide the cut there.
+            RefusedError: `alpha` lies outside [0, 1], or the values do not decide the cut there.
         """
-        if 0 <= alpha < self.decided:
-            cure = (
-                "give bounds=(lower, upper), what is physically possible, or take only levels"
-                " from there"
-            )
-            raise ValueError(
-                f"the values decide the cuts of the {self.claim.about} from α ="
-                f" {self.decided:.4g} on, not at α = {alpha:g}: {cure}{self.enough}"
-            )
+        if level(alpha) < self.decided:
+            allowed = f"levels from {self.decided:.4g} on, which the values decide"
+            cure = f"give bounds=(lower, upper), what is physically possible{self.enough}"
+            raise RefusedError(f"alpha of the {self.claim.about}", alpha, allowed, cure)
         return self.number.cut(alpha)
 
     def known(self, alpha: float) -> float:
-        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        """Greatest level up to `alpha` whose cut is no wider than what is known."""
         return self.number.known(alpha)
 
     def __str__(self) -> str:
@@ -136,7 +130,7 @@ def from_level(number: FuzzyNumber, alpha: float) -> FuzzyNumber:
     """The number for use from a level on: what the values do not decide lies below.
 
     Raises:
-        ValueError: The values do not decide the cut at `alpha`.
+        RefusedError: The values do not decide the cut at `alpha`.
     """
     if not isinstance(number, Claimed):
         return number

@@ -8,17 +8,19 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.fuzzy.sets.given import is_real
-from alphacut.fuzzy.sets.numbers import Array, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, chosen, real
+from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 _HALVINGS = 50
 
 
 class Interaction(Protocol):
-    """A constraint between inputs: fulfilled where `slack` is not negative."""
+    """A constraint between the inputs that it names: fulfilled where `slack` is not negative."""
 
-    def check(self, inputs: Sequence[str]) -> None:
-        """Refuse names that are no input."""
+    @property
+    def names(self) -> Sequence[str]:
+        """The inputs that it touches."""
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
         """Room at points (n, inputs) on a level, shape (n,); never falls with α."""
@@ -33,36 +35,28 @@ class Linear:
         bound: The bound.
 
     Raises:
-        ValueError: A weight or the bound is not finite.
+        RefusedError: A weight or the bound is not finite.
     """
 
     weights: Mapping[str, float]
     bound: float
 
     def __post_init__(self) -> None:
-        _require_weights(self.weights, self.bound)
-        if not np.isfinite([*self.weights.values(), self.bound]).all():
-            raise ValueError(
-                f"the linear interaction has weights {dict(self.weights)} and bound {self.bound};"
-                " all must be finite"
-            )
+        for name, weight in self.weights.items():
+            real(f"weight of {name}", weight)
+        real("bound of the weighted sum", self.bound)
 
-    def check(self, inputs: Sequence[str]) -> None:
-        """Refuse names that are no input.
-
-        Raises:
-            ValueError: As said.
-        """
-        _require_inputs("linear", self.weights, inputs)
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The inputs that have a weight."""
+        return tuple(self.weights)
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
         """Bound − Σ weights · inputs, shape (n,), as a share of its largest possible sum."""
         weights = np.array([self.weights.get(name, 0.0) for name in inputs])
         largest = np.array([np.abs(number.support).max() for number in inputs.values()])
-        slack: Array = (self.bound - points @ weights) / max(
-            abs(self.bound) + float(np.abs(weights) @ largest), np.finfo(float).tiny
-        )
-        return slack
+        size = abs(self.bound) + float(np.abs(weights) @ largest)
+        return np.asarray((self.bound - points @ weights) / max(size, np.finfo(float).tiny))
 
 
 @dataclass(frozen=True)
@@ -71,15 +65,16 @@ class Ellipsoidal:
 
     With R = 1 the grades of membership add up like lengths instead of each counting alone; off its
     diagonal R says which inputs tend to be high or low together. The ellipsoid touches the faces of
-    the box, so the range of each input alone stays what it was.
+    the box, so the range of each input alone stays what it was; inputs that it does not name keep
+    their whole cuts.
 
     Args:
         correlation: Entry of R for pairs of inputs, inside (−1, 1); 0 for pairs not named.
-        among: Inputs that interact; all if none is named.
+        among: Further inputs that interact, without a correlation.
 
     Raises:
-        ValueError: A correlation is out of range or belongs to an input that is not among those
-            that interact.
+        RefusedError: No two inputs are named, a correlation is out of range, or correlations
+            contradict each other.
     """
 
     correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
@@ -87,51 +82,44 @@ class Ellipsoidal:
 
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
-            if not is_real(value) or not -1 < value < 1:
-                shown = f"{value:g}" if is_real(value) else repr(value)
-                raise ValueError(
-                    f"the correlation of {' and '.join(pair)} is {shown}; it must lie inside"
-                    " (-1, 1)"
-                )
-            if self.among and not set(pair) <= set(self.among):
-                raise ValueError(
-                    f"the correlation of {' and '.join(pair)} names an input that is not among"
-                    f" {', '.join(self.among)}"
-                )
+            if not -1 < real(f"correlation of {' and '.join(pair)}", value) < 1:
+                raise RefusedError(f"correlation of {' and '.join(pair)}", value, "inside (-1, 1)")
+        if len(self.names) < 2:
+            raise RefusedError("inputs of the ellipsoid", self.names, "two names or more")
+        if np.linalg.eigvalsh(self._matrix).min() <= 0:
+            cure = "their matrix must be positive definite"
+            raise RefusedError("correlation", dict(self.correlation), "values that agree", cure)
 
-    def check(self, inputs: Sequence[str]) -> None:
-        """Refuse names that are no input, and correlations that contradict each other.
-
-        Raises:
-            ValueError: As said.
-        """
-        _require_inputs(
-            "ellipsoidal",
-            [*self.among, *(name for pair in self.correlation for name in pair)],
-            inputs,
-        )
-        if np.linalg.eigvalsh(self._matrix(self.among or tuple(inputs))).min() <= 0:
-            raise ValueError(
-                "the correlations of the ellipsoid contradict each other: their matrix must be"
-                " positive definite"
-            )
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The inputs that interact, each once."""
+        pairs = (name for pair in self.correlation for name in pair)
+        return tuple(dict.fromkeys((*pairs, *self.among)))
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
         """(1 − α)² − tᵀ R⁻¹ t, shape (n,)."""
-        names = self.among or tuple(inputs)
-        t = np.stack(
-            [_signed_distance(inputs[name], points[:, list(inputs).index(name)]) for name in names],
-            axis=1,
-        )
-        size: Array = np.einsum("ni,ij,nj->n", t, np.linalg.inv(self._matrix(names)), t)
+        columns = {name: points[:, list(inputs).index(name)] for name in self.names}
+        t = np.stack([_signed_distance(inputs[name], x) for name, x in columns.items()], axis=1)
+        size: Array = np.einsum("ni,ij,nj->n", t, np.linalg.inv(self._matrix), t)
         return (1 - alpha) ** 2 - size
 
-    def _matrix(self, names: Sequence[str]) -> Array:
-        matrix = np.eye(len(names))
+    @property
+    def _matrix(self) -> Array:
+        """R, in the order of `names`."""
+        matrix = np.eye(len(self.names))
         for (one, other), value in self.correlation.items():
-            i, j = names.index(one), names.index(other)
+            i, j = self.names.index(one), self.names.index(other)
             matrix[i, j] = matrix[j, i] = value
         return matrix
+
+
+def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
+    """1 − μ with the side of the modal value as sign; grows beyond 1 outside the support."""
+    lower, upper = number.support
+    outside = np.maximum(np.maximum(lower - x, x - upper), 0)
+    outside = outside / max(upper - lower, np.finfo(float).tiny)
+    distance: Array = np.where(x < number.modal, -1.0, 1.0) * (1 - number.membership(x) + outside)
+    return distance
 
 
 def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Array:
@@ -154,33 +142,8 @@ def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Arra
     return point + inside * (anchor - point)
 
 
-def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
-    """1 − μ with the side of the modal value as sign; grows beyond 1 outside the support."""
-    lower, upper = number.support
-    outside = np.maximum(np.maximum(lower - x, x - upper), 0) / max(
-        upper - lower, np.finfo(float).tiny
-    )
-    distance: Array = np.where(x < number.modal, -1.0, 1.0) * (1 - number.membership(x) + outside)
-    return distance
-
-
-def _require_weights(weights: object, bound: object) -> None:
-    numbers = isinstance(weights, Mapping) and all(
-        is_real(value) for value in (*weights.values(), bound)
-    )
-    if not numbers:
-        raise ValueError(
-            f"the linear interaction has weights {weights!r} and bound {bound!r}; it needs numbers"
-            " by name, and a number"
-        )
-
-
-def _require_inputs(
-    kind: str, names: Mapping[str, float] | Sequence[str], inputs: Sequence[str]
-) -> None:
-    unknown = sorted(set(names) - set(inputs))
-    if unknown:
-        raise ValueError(
-            f"the {kind} interaction names {', '.join(unknown)}; the fuzzy inputs are"
-            f" {', '.join(inputs)}"
-        )
+def named(interactions: Sequence[Interaction], inputs: Sequence[str]) -> None:
+    """Refuse interactions that name what is no input."""
+    for interaction in interactions:
+        for name in interaction.names:
+            chosen(f"input of {type(interaction).__name__}", name, inputs)

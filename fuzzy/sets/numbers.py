@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.drawing import draw_membership, new_axes
-from alphacut.fuzzy.sets.given import is_real
+from alphacut.fuzzy.refused import RefusedError, real
 from alphacut.fuzzy.tables import membership_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Rows = NDArray[np.intp]
 
 
 class Cut(NamedTuple):
@@ -67,21 +61,21 @@ class FuzzyNumber(ABC):
         return self.cut(0.0)
 
     def cut(self, alpha: float) -> Cut:
-        """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support.
-
-        Raises:
-            ValueError: `alpha` lies outside [0, 1].
-        """
-        if not 0 <= alpha <= 1:
-            raise ValueError(f"the α of a cut is {alpha:g}; it must lie in [0, 1]")
+        """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support."""
         levels, lower, upper = self.cuts
-        return Cut(
-            float(_interpolate(alpha, levels, lower)), float(_interpolate(alpha, levels, upper))
-        )
+        alpha = level(alpha)
+        return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
 
     def known(self, alpha: float) -> float:
-        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        """Greatest level up to `alpha` whose cut is no wider than what is known."""
         return alpha
+
+    def membership(self, x: ArrayLike) -> Array:
+        """Grade of membership μ in [0, 1] at `x`, any shape; not a number where `x` is none."""
+        levels, lower, upper = map(np.asarray, self.cuts)
+        x = np.asarray(x, float)
+        grade = np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
+        return np.where(np.isnan(x), np.nan, grade)
 
     def plot(self, axes: Axes | None = None, *, quantity: str = "p", name: str = "") -> Axes:
         """Draw the membership function (Fig. 36).
@@ -103,77 +97,28 @@ class FuzzyNumber(ABC):
         """The membership function as a small drawing, for notebooks."""
         return membership_svg(*self.cuts)
 
-    def membership(self, x: ArrayLike) -> Array:
-        """Grade of membership μ in [0, 1] at `x`, any shape; not a number where `x` is none."""
-        levels, lower, upper = map(np.asarray, self.cuts)
-        x = np.asarray(x, float)
-        grade: Array = np.minimum(
-            _highest_level(x, levels, lower), _highest_level(-x, levels, -upper)
-        )
-        return np.where(np.isnan(x), np.nan, grade)
 
-    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object) -> object:
-        """NumPy's signs act as the number's own; its functions are refused with what does them."""
-        if method == "__call__" and len(inputs) == 2:
-            with suppress(AttributeError):  # of functions that are no sign, such as numpy.hypot
-                return ufunc(*map(_boxed, inputs))
-        raise TypeError(
-            f"numpy.{ufunc.__name__} takes no fuzzy number; take propagate or, of one number,"
-            f" fuzzy.apply(numpy.{ufunc.__name__}, number)"
-        )
+def level(alpha: float) -> float:
+    """An α-level.
 
-    def __add__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return OPERATORS["+"](self, other)
-
-    def __radd__(self, other: float) -> FuzzyNumber:
-        return OPERATORS["+"](other, self)
-
-    def __sub__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return OPERATORS["-"](self, other)
-
-    def __rsub__(self, other: float) -> FuzzyNumber:
-        return OPERATORS["-"](other, self)
-
-    def __mul__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return OPERATORS["*"](self, other)
-
-    def __rmul__(self, other: float) -> FuzzyNumber:
-        return OPERATORS["*"](other, self)
-
-    def __truediv__(self, other: FuzzyNumber | float) -> FuzzyNumber:
-        return OPERATORS["/"](self, other)
-
-    def __rtruediv__(self, other: float) -> FuzzyNumber:
-        return OPERATORS["/"](other, self)
-
-    def __neg__(self) -> FuzzyNumber:
-        return OPERATORS["-"](0.0, self)
-
-    def __pow__(self, exponent: int) -> FuzzyNumber:
-        return OPERATORS["**"](self, exponent)
-
-
-def _boxed(value: object) -> NDArray[np.object_]:
-    """NumPy's numbers as Python's, anything else as an array of no dimension."""
-    if isinstance(value, np.ndarray | np.generic):
-        return np.asarray(value).astype(object)
-    box = np.empty((), object)
-    box[()] = value
-    return box
-
-
-OPERATORS: dict[str, Callable[[FuzzyNumber | float, FuzzyNumber | float], FuzzyNumber]] = {}
-"""Functions behind the signs; `fuzzy.sets.arithmetic` enters its own."""
+    Raises:
+        RefusedError: It lies outside [0, 1].
+    """
+    if not 0 <= real("alpha", alpha) <= 1:
+        raise RefusedError("alpha", alpha, "levels in [0, 1]")
+    return float(alpha)
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
-    """The end of the cut at `alpha`, exact at the given levels."""
+    """The end of the cut at `alpha`, exact at the levels that are listed."""
     right = bisect_right(levels, alpha)
     if right == len(levels):
-        return ends[-1]
+        return float(ends[-1])
     share = (alpha - levels[right - 1]) / (levels[right] - levels[right - 1])
     rise = ends[right] - ends[right - 1]
-    return ends[right - 1] + share * rise if share < 0.5 else ends[right] - (1 - share) * rise
+    return float(
+        ends[right - 1] + share * rise if share < 0.5 else ends[right] - (1 - share) * rise
+    )
 
 
 def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
@@ -182,42 +127,25 @@ def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
     inner = np.clip(right, 1, len(lower) - 1)
     rise = lower[inner] - lower[inner - 1]
     share = np.divide(x - lower[inner - 1], rise, out=np.zeros_like(x), where=rise > 0)
-    level = levels[inner - 1] + share * (levels[inner] - levels[inner - 1])
-    return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, level))
+    between = levels[inner - 1] + share * (levels[inner] - levels[inner - 1])
+    return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, between))
 
 
-WHOLE = 2**63
-"""Largest whole number taken; larger ones are written as decimals."""
-
-
-def _require_order(kind: str, values: Sequence[float], order: str) -> None:
-    wrong = [
-        value
-        for value in values
-        if not is_real(value) or (isinstance(value, int) and abs(value) > WHOLE)
-    ]
-    if wrong:
-        raise ValueError(
-            f"the {kind} holds {wrong[0]!r}; it needs plain numbers: convert units before, and"
-            " write large whole ones as 1e30"
-        )
-    if not (all(map(math.isfinite, values)) and all(a <= b for a, b in itertools.pairwise(values))):
-        shown = ", ".join(f"{value:g}" for value in values)
-        raise ValueError(f"the {kind} is [{shown}]; it needs {order}, all finite")
+def _ordered(kind: str, values: Sequence[float], order: str) -> None:
+    """Refuse values that are no finite numbers or not in order."""
+    numbers = [real(kind, value) for value in values]
+    if (np.diff(numbers) < 0).any():
+        raise RefusedError(kind, [float(x) for x in numbers], order)
 
 
 @dataclass(frozen=True)
 class Crisp(FuzzyNumber):
-    """A single value of membership 1.
-
-    Raises:
-        ValueError: The value is not finite.
-    """
+    """A single value of membership 1."""
 
     value: float
 
     def __post_init__(self) -> None:
-        _require_order("crisp number", [self.value], "one value")
+        _ordered("crisp number", [self.value], "")
 
     @property
     def cuts(self) -> Cuts:
@@ -230,14 +158,14 @@ class Interval(FuzzyNumber):
     """A crisp interval: membership 1 between its ends, 0 outside.
 
     Raises:
-        ValueError: The ends are not finite or not in order.
+        RefusedError: The ends are not finite or not in order.
     """
 
     lower: float
     upper: float
 
     def __post_init__(self) -> None:
-        _require_order("interval", [self.lower, self.upper], "lower <= upper")
+        _ordered("interval", [self.lower, self.upper], "lower <= upper")
 
     @property
     def cuts(self) -> Cuts:
@@ -255,7 +183,7 @@ class Triangular(FuzzyNumber):
         upper: Right end of the support.
 
     Raises:
-        ValueError: The three are not finite or not in order.
+        RefusedError: The three are not finite or not in order.
     """
 
     lower: float
@@ -263,7 +191,7 @@ class Triangular(FuzzyNumber):
     upper: float
 
     def __post_init__(self) -> None:
-        _require_order("triangle", [self.lower, self.modal, self.upper], "lower <= modal <= upper")
+        _ordered("triangle", [self.lower, self.modal, self.upper], "lower <= modal <= upper")
 
     @property
     def cuts(self) -> Cuts:
@@ -282,7 +210,7 @@ class Trapezoidal(FuzzyNumber):
         upper: Right end of the support.
 
     Raises:
-        ValueError: The four are not finite or not in order.
+        RefusedError: The four are not finite or not in order.
     """
 
     lower: float
@@ -291,11 +219,8 @@ class Trapezoidal(FuzzyNumber):
     upper: float
 
     def __post_init__(self) -> None:
-        _require_order(
-            "trapezoid",
-            [self.lower, self.left, self.right, self.upper],
-            "lower <= left <= right <= upper",
-        )
+        corners = [self.lower, self.left, self.right, self.upper]
+        _ordered("trapezoid", corners, "lower <= left <= right <= upper")
 
     @property
     def cuts(self) -> Cuts:
@@ -313,7 +238,7 @@ class PiecewiseLinear(FuzzyNumber):
         upper: Upper ends of the cuts, not rising with α.
 
     Raises:
-        ValueError: Lengths differ, levels do not rise from 0 to 1, or cuts are not finite, nested
+        RefusedError: Lengths differ, levels do not rise from 0 to 1, or cuts are not finite, nested
             intervals.
     """
 
@@ -322,27 +247,36 @@ class PiecewiseLinear(FuzzyNumber):
     upper: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        for name in ("alpha", "lower", "upper"):  # arrays are welcome; tuples are kept
-            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
-        if not len(self.alpha) == len(self.lower) == len(self.upper) >= 2:
-            sizes = (
-                f"{len(self.alpha)} level{'s' * (len(self.alpha) != 1)}, {len(self.lower)} lower"
-                f" and {len(self.upper)} upper ends"
-            )
-            raise ValueError(
-                f"the α-cuts have {sizes}; they need as many ends as levels, two levels or more"
-            )
-        if self.alpha[0] != 0 or self.alpha[-1] != 1 or not all(np.diff(self.alpha) > 0):
-            raise ValueError(
-                f"the levels of the α-cuts are {list(self.alpha)}; they must rise from 0 to 1"
-            )
-        _require_order(
-            "row of cut ends",
-            [*self.lower, *self.upper[::-1]],
-            "nested cuts, lower ends rising and upper ends falling with α",
-        )
+        rows = nested(self.alpha, self.lower, self.upper)
+        for name, row in zip(("alpha", "lower", "upper"), rows, strict=True):
+            object.__setattr__(self, name, row)
+        if self.alpha[-1] != 1 or len(self.alpha) < 2:
+            raise RefusedError("alpha", self.alpha, "levels that rise from 0 to 1")
 
     @property
     def cuts(self) -> Cuts:
         """The cuts it was made from."""
         return Cuts(self.alpha, self.lower, self.upper)
+
+
+def nested(alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Cuts:
+    """Cuts as tuples of numbers.
+
+    Args:
+        alpha: Levels, rising from 0, at most 1.
+        lower: Lower ends, not falling.
+        upper: Upper ends, not rising.
+
+    Raises:
+        RefusedError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not
+            finite, nested intervals.
+    """
+    levels, low, high = (np.atleast_1d(np.asarray(x, float)) for x in (alpha, lower, upper))
+    rising = levels[0] == 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()
+    if not (len(levels) == len(low) == len(high) and rising):
+        shown = levels.tolist(), len(low), len(high)
+        raise RefusedError("alpha", shown, "levels that rise from 0 within [0, 1], as many as ends")
+    ends = np.concatenate([low, high[::-1]])
+    if not np.isfinite(ends).all() or (np.diff(ends) < 0).any():
+        raise RefusedError("cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
+    return Cuts(*(tuple(map(float, row)) for row in (levels, low, high)))

@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from alphacut.fuzzy.sets.numbers import Array, Cut, Cuts, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, level, nested
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,8 @@ class Stepwise(FuzzyNumber):
         outer: Whether truer cuts are narrower between the levels.
 
     Raises:
-        ValueError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not finite,
-            nested intervals.
+        RefusedError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not
+            finite, nested intervals.
     """
 
     alpha: tuple[float, ...]
@@ -33,27 +34,9 @@ class Stepwise(FuzzyNumber):
     outer: bool = field(default=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        level, lower, upper = (
-            np.asarray(getattr(self, name), float) for name in ("alpha", "lower", "upper")
-        )
-        if (
-            not (0 < len(level) == len(lower) == len(upper))
-            or level[0] != 0
-            or level[-1] > 1
-            or (np.diff(level) <= 0).any()
-        ):
-            raise ValueError(
-                f"there are {len(level)} levels, {len(lower)} lower and {len(upper)} upper ends;"
-                f" levels must rise from 0 within [0, 1], with as many ends"
-            )
-        ends = np.concatenate([lower, upper[::-1]])
-        if not np.isfinite(ends).all() or (np.diff(ends) < 0).any():
-            raise ValueError(
-                "the ends of the cuts are not nested or not finite; lower ends must rise with α,"
-                " upper ends fall"
-            )
-        for name, row in (("alpha", level), ("lower", lower), ("upper", upper)):
-            object.__setattr__(self, name, tuple(row.tolist()))
+        rows = nested(self.alpha, self.lower, self.upper)
+        for name, row in zip(("alpha", "lower", "upper"), rows, strict=True):
+            object.__setattr__(self, name, row)
 
     @cached_property
     def cuts(self) -> Cuts:
@@ -71,18 +54,12 @@ class Stepwise(FuzzyNumber):
         )
 
     def cut(self, alpha: float) -> Cut:
-        """The cut that holds at `alpha` in [0, 1].
-
-        Raises:
-            ValueError: `alpha` lies outside [0, 1].
-        """
-        if not 0 <= alpha <= 1:
-            raise ValueError(f"the α of a cut is {alpha:g}; it must lie in [0, 1]")
-        at = bisect_right(self.alpha, alpha) - 1
+        """The cut that holds at `alpha` in [0, 1]."""
+        at = bisect_right(self.alpha, level(alpha)) - 1
         return Cut(self.lower[at], self.upper[at])
 
     def known(self, alpha: float) -> float:
-        """Greatest level up to `alpha` whose cut is no wider than it is told."""
+        """Greatest level up to `alpha` whose cut is no wider than what is known."""
         return self.alpha[bisect_right(self.alpha, alpha) - 1] if self.outer else alpha
 
 

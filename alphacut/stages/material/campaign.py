@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import Extended, FuzzyNumber, General, Known, Reduced, Signed
-from alphacut.fuzzy.samples.result import Plan
+from alphacut.fuzzy.plans.method import Method as Plan
 from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
 from alphacut.stages.material import cell as of_cell

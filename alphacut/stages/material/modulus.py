@@ -13,8 +13,8 @@ import numpy as np
 
 from alphacut.case.case import WHOLE, Case
 from alphacut.fuzzy import Crisp, FuzzyNumber, from_data, propagate
-from alphacut.fuzzy.samples.nature import Nature
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.result import Bounds
+from alphacut.fuzzy.samples.model import Samples
 from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.csv_rows import CsvFile
 from alphacut.io.files import Document
@@ -66,7 +66,7 @@ class FuzzyModulus:
             had.
     """
 
-    result: FuzzyResult
+    result: Bounds
     choice: CellChoice
     law: ThetaLaw = field(default_factory=TruncatedNormal)
     judged: Homogenised | None = None
@@ -79,14 +79,21 @@ class FuzzyModulus:
 
     @property
     def nature(self) -> str:
-        """Nature of the bounds of E: guaranteed if so on every level."""
-        natures = sorted({str(nature) for nature in self.result.nature_of("E")})
-        return natures[0] if len(natures) == 1 else str(self.result.nature)
+        """Nature of the bounds of E."""
+        return str(self.result.nature_of("E"))
+
+    @property
+    def samples(self) -> Samples:
+        """All samples of the cell."""
+        assert self.result.samples is not None
+        return self.result.samples
 
     @property
     def meaning(self) -> str:
         """Sentence on the worth of E's bounds, with what a proof rests on."""
-        return Nature(self.nature).sentence(self.result.given)
+        given = " and ".join(self.result.basis)
+        proved = f"proved, given that {given}"
+        return proved if self.nature == "guaranteed" else "values of samples"
 
     @property
     def reason(self) -> str:
@@ -105,7 +112,7 @@ class FuzzyModulus:
         one = self.judged and not self.largest("error")
         whose = "modal sample" if one else "largest of all samples"
         told = f"estimated at {sum(self.error.values()):.1e} of E ({parts}; {whose})"
-        base = self.result.base
+        base = self.result.nature_of("nu")
         nu = "" if self.nature == str(base) else f"; bounds of nu are {base}"
         return (
             f"bounds {self.nature}: {self.meaning}{nu}; the error of the cell's model"
@@ -115,16 +122,16 @@ class FuzzyModulus:
     @property
     def solves(self) -> int:
         """Linear systems solved; those that samples are projected on count once."""
-        systems = self.result.values.output("systems")
+        systems = self.samples.values.output("systems")
         if self.choice.method != "prism" or self.choice.moduli is None:
             return int(systems.sum())
         columns = [k for k, name in enumerate(self.result.inputs) if name != "inclusion_modulus"]
-        _, first = np.unique(self.result.points[:, columns], axis=0, return_index=True)
+        _, first = np.unique(self.samples.points[:, columns], axis=0, return_index=True)
         return int(systems[first].sum())
 
     def largest(self, kind: str) -> dict[str, float]:
         """Largest of each error or property of the certificate over all samples."""
-        values = self.result.values
+        values = self.samples.values
         found = {
             name.partition(":")[2]: float(values.output(name).max())
             for name, _ in values.layout
@@ -145,15 +152,14 @@ class FuzzyModulus:
                 name: {"lower": lower / unit, "upper": upper / unit}
                 for name, (unit, (lower, upper)) in scaled.items()
             },
-            "samples": self.result.runs,
+            "samples": self.result.evaluations,
             "solves": self.solves,
-            "verification_samples": self.result.verification_runs,
             "calls": self.result.calls,
             "reused": self.result.reused,
             "seconds": self.result.seconds,
             "nature": self.nature,
             "notes": list(self.result.notes),
-            "plan": self.result.plan,
+            "plan": self.result.method,
             "method": self.choice.method,
             "particles": self.choice.particles,
             "average": self.choice.meaning,
@@ -175,7 +181,7 @@ class FuzzyModulus:
             average = f", {AVERAGE[self.choice.meaning]}" if name in QUANTITIES else ""
             variables |= self._cuts(name, unit, about + average)
         point = {"long_name": "inputs of each sample, in SI"}
-        variables["point"] = (("sample", "parameter"), result.points, point)
+        variables["point"] = (("sample", "parameter"), self.samples.points, point)
         variables |= self._curves()
         for kind, largest in (("error", self.error), ("check", checks)):
             words = {"long_name": f"largest {kind} of all samples"}
@@ -200,7 +206,7 @@ class FuzzyModulus:
         return {
             name: (("alpha", "bound"), np.stack(result.bounds(name), axis=1), words),
             f"{name}_at": (("alpha", "bound", "parameter"), places, reached),
-            f"{name}_sample": (("sample",), result.values.output(name), words),
+            f"{name}_sample": (("sample",), self.samples.values.output(name), words),
         }
 
     def _curves(self) -> dict[str, Any]:
@@ -208,7 +214,7 @@ class FuzzyModulus:
         return {
             name: (
                 ("sample", "theta"),
-                self.result.values.output(name),
+                self.samples.values.output(name),
                 {"units": "Pa", "long_name": f"homogenised {about}"},
             )
             for name, about in CURVES.values()
@@ -219,8 +225,8 @@ class FuzzyModulus:
         facts: dict[str, Any] = {
             "method": self.choice.method,
             "reason": self.reason,
-            "plan": self.result.plan,
-            "samples": self.result.runs,
+            "plan": self.result.method,
+            "samples": self.result.evaluations,
             "solves": self.solves,
             "seconds": self.result.seconds,
             "nature": self.nature,
@@ -341,8 +347,8 @@ def measured_modulus(case: Case, file: str) -> FuzzyNumber:
     except ValueError as error:
         allowed = 'bounds such as bounds = "[10, 60] GPa"'
         raise case.refuse(key, in_gpa(str(error)), allowed) from None
-    given = tuple(in_gpa(condition) for condition in number.claim.given)
-    return replace(number, claim=replace(number.claim, given=given))
+    given = tuple(in_gpa(condition) for condition in number.claim.conditions)
+    return replace(number, claim=replace(number.claim, conditions=given))
 
 
 def in_gpa(told: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.case.case import Case
 from alphacut.fuzzy import RandomResponse
-from alphacut.fuzzy.samples.result import FuzzyResult
+from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.io.files import Document
 from alphacut.stages.material.campaign import fuzzy_inputs
@@ -29,26 +29,22 @@ CUT = ("alpha", "bound")
 
 def random_response(case: Case, modulus: xarray.Dataset) -> RandomResponse:
     """The wanted stress at every sample of the fuzzy modulus, whose curves over θ it holds."""
-    from alphacut.fuzzy.samples.design import Design
-    from alphacut.fuzzy.samples.model import Values
-
     curves, theta = modulus[CURVES[case.response.quantity][0]].values, modulus["theta"].values
     inputs = fuzzy_inputs(case)
     domain = Domain(
         {str(name): inputs[str(name)] for name in modulus["parameter"].values},
         tuple(map(float, modulus["alpha"].values)),
     )
-    table = np.hstack([curves, np.tile(theta, (len(curves), 1))])
-    values = Values((("curve", theta.shape), ("theta", theta.shape)), table)
-    samples = Design.from_samples(domain, modulus["point"].values).bounds(
-        values, plan="stored samples"
-    )
     return RandomResponse.from_curves(
-        samples, "curve", theta="theta", quantile=case.radius.distribution.quantile
+        domain,
+        modulus["point"].values,
+        curves,
+        theta=theta,
+        quantile=case.radius.distribution.quantile,
     )
 
 
-def ends(result: FuzzyResult) -> Array:
+def ends(result: Bounds) -> Array:
     """Lower and upper ends, shape (levels, 2, entries)."""
     return np.stack([result.lower, result.upper], axis=1)
 
@@ -88,9 +84,7 @@ def dataset(case: Case, modulus: xarray.Dataset) -> xarray.Dataset:
     return xarray.Dataset(found, coordinates, facts)
 
 
-def _cuts(
-    response: RandomResponse, quantiles: FuzzyResult, stress: Array, about: str
-) -> dict[str, Any]:
+def _cuts(response: RandomResponse, quantiles: Bounds, stress: Array, about: str) -> dict[str, Any]:
     """Variables with the fuzzy mean, the p-box at `stress` and the quantiles."""
 
     def words(what: str, unit: str = "Pa") -> dict[str, str]:

@@ -18,7 +18,8 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.decisions.safe_scale import SafeScale, safe_scale
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.quantities import RATIO, Output, of_storey_frame
-from alphacut.fuzzy import CampaignError, FuzzyNumber, Interval, Signed, Triangular, propagate
+from alphacut.fuzzy import FuzzyNumber, Interval, Signed, Triangular, propagate
+from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput
 from alphacut.io.progress import Tick

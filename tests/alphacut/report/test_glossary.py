@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from alphacut.fuzzy.samples.nature import Nature
+from alphacut.fuzzy.result import Nature
 from alphacut.report.glossary import TERMS
 
 ROOT = Path(__file__).parents[3]

@@ -8,7 +8,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.methods.held_models import HeldModels
 from alphacut.fuzzy import Triangular
-from alphacut.fuzzy.campaign.workers import TooLargeError
+from alphacut.fuzzy.campaign.memory import TooLargeError
 
 
 def test_models_are_those_of_the_last_holder_at_its_nodes_and_beside() -> None:

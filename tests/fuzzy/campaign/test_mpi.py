@@ -21,7 +21,7 @@ if __name__ == "__main__":
     parts = []
     for plan in (General(), Optimisation(outputs=("y",))):
         found = propagate(model, inputs, plan, shared=("a",), workers=workers, store=sys.argv[3], identity={"run": out})
-        parts += [found.values.array.tobytes(), found.lower.tobytes(), found.upper.tobytes(), found.lower_at.tobytes()]
+        parts += [found.samples.values.array.tobytes(), found.lower.tobytes(), found.upper.tobytes(), found.lower_at.tobytes()]
     with open(out, "wb") as file:
         file.write(b"".join(parts))
 """

@@ -1,4 +1,4 @@
-"""Fuzzy numbers: cuts, membership, and what they refuse."""
+"""Fuzzy numbers: cuts, membership, drawings."""
 
 import itertools
 
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alphacut.fuzzy import Crisp, Interval, PiecewiseLinear, Trapezoidal, Triangular
-from alphacut.fuzzy.sets.numbers import Cut
+from alphacut.fuzzy.plots import figure_36, figure_37
 from alphacut.fuzzy.sets.stepwise import outer_steps
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
@@ -33,9 +33,7 @@ def test_cuts_are_nested_and_reach_from_support_to_modal_value(number):
 def test_membership_is_the_highest_level_whose_cut_holds_the_point(number):
     levels = np.linspace(0, 1, 2001)
     for x in np.linspace(number.support.lower - 1, number.support.upper + 1, 57):
-        holding = [
-            level for level in levels if number.cut(level).lower <= x <= number.cut(level).upper
-        ]
+        holding = [a for a in levels if number.cut(a).lower <= x <= number.cut(a).upper]
         assert number.membership(x) == pytest.approx(max(holding, default=0.0), abs=6e-4)
 
 
@@ -48,48 +46,10 @@ def test_triangle_meets_its_three_values_exactly(values):
     assert triangle.modal == values[1]
 
 
-def test_membership_of_a_crisp_number_is_kronecker():
-    assert Crisp(1.0).membership([0.999, 1.0, 1.001]).tolist() == [0, 1, 0]
-
-
-def test_cut_width():
-    assert Cut(2.0, 3.5).width == 1.5
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Triangular(2, 1, 3), r"triangle is \[2, 1, 3\]; it needs lower <= modal <= upper"),
-        (lambda: Triangular(0, 1, np.inf), "all finite"),
-        (lambda: Interval(3, 2), r"interval is \[3, 2\]; it needs lower <= upper"),
-        (
-            lambda: Trapezoidal(0, 2, 1, 3),
-            r"trapezoid is \[0, 2, 1, 3\]; it needs lower <= left <= right <= upper",
-        ),
-        (lambda: Crisp(np.nan), "crisp number is"),
-        (lambda: PiecewiseLinear((0, 1), (0, 1), (1,)), "2 levels, 2 lower and 1 upper ends"),
-        (lambda: PiecewiseLinear((0, 0.5), (0, 1), (3, 2)), "must rise from 0 to 1"),
-        (lambda: PiecewiseLinear((0, 1), (0, 2), (3, 1)), "nested cuts"),
-        (lambda: Triangular(0, 1, 2).cut(1.5), r"α of a cut is 1.5; it must lie in \[0, 1\]"),
-    ],
-)
-def test_refusals_name_the_value_and_the_cure(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
-
-
 def test_what_is_no_number_has_no_grade():
-    assert np.isnan(Triangular(1, 2, 3).membership(np.nan))
-    np.testing.assert_array_equal(
-        Triangular(1, 2, 3).membership([0, 1.5, np.nan, np.inf]), [0, 0.5, np.nan, 0]
-    )
-
-
-def test_an_expression_is_printed_by_its_text():
-    assert "function" not in repr(Triangular(1, 2, 3) + Interval(0, 1))
-    assert "Triangular(lower=1, modal=2, upper=3) + Interval(lower=0, upper=1)" in str(
-        Triangular(1, 2, 3) + Interval(0, 1)
-    )
+    grades = Triangular(1, 2, 3).membership([0, 1.5, np.nan, np.inf])
+    np.testing.assert_array_equal(grades, [0, 0.5, np.nan, 0])
+    assert Crisp(1.0).membership([0.999, 1.0, 1.001]).tolist() == [0, 1, 0]
 
 
 def test_a_level_beside_a_decimal_by_rounding_is_that_decimal():
@@ -97,3 +57,15 @@ def test_a_level_beside_a_decimal_by_rounding_is_that_decimal():
     steps = outer_steps(grid, grid, 3 - grid)
     for k in range(11):
         assert steps.cut(k / 10) == steps.cut(float(grid[k])) == (grid[k], 3 - grid[k])
+    assert steps.cut(0.35) == steps.cut(0.3)  # the wider one
+    assert steps.known(0.35) == pytest.approx(0.3)
+
+
+def test_pictures_show_every_set_with_its_name_and_axis():
+    axes = figure_36().axes[0]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names[:2] == ["crisp number", "crisp interval"]
+    assert (len(axes.lines), axes.get_ylabel()) == (5, "membership μ")
+    assert len(figure_37().axes[0].lines) == 1 + 6
+    assert "<svg" in Triangular(1, 2, 3)._repr_html_()
+    assert Triangular(1, 2, 3).plot(quantity="E [GPa]").get_xlabel() == "E [GPa]"

@@ -1,0 +1,20 @@
+"""A method: a frozen dataclass that runs."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from alphacut.fuzzy.result import Bounds
+from alphacut.fuzzy.samples.model import Model
+from alphacut.fuzzy.sets.boxes import Domain
+
+
+class Method(Protocol):
+    """A way to search the boxes of the inputs for the extremes of a model."""
+
+    @property
+    def name(self) -> str:
+        """The word for it in a case file."""
+
+    def run(self, model: Model, domain: Domain) -> Bounds:
+        """Bounds of every output of the model on every level."""

@@ -1,0 +1,282 @@
+"""Every method against brute force; natures, budgets, units, and samples that fail."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from alphacut.fuzzy import (
+    Automatic,
+    Extended,
+    FailedError,
+    General,
+    Interval,
+    IntervalQuasiMonteCarlo,
+    Known,
+    Metamodel,
+    Nature,
+    Optimisation,
+    RandomInput,
+    Reduced,
+    RefusedError,
+    Signed,
+    Trapezoidal,
+    Triangular,
+    levels,
+    propagate,
+    width_shares,
+)
+
+
+def ishigami(x1, x2, x3):
+    return np.sin(x1) + 7 * np.sin(x2) ** 2 + 0.1 * x3**4 * np.sin(x1)
+
+
+def rosenbrock(x, y):
+    return (1 - x) ** 2 + 100 * (y - x * x) ** 2
+
+
+def branin(x, y):
+    square = (y - 5.1 / (4 * np.pi**2) * x**2 + 5 / np.pi * x - 6) ** 2
+    return square + 10 * (1 - 1 / (8 * np.pi)) * np.cos(x) + 10
+
+
+def inside(x, y):
+    """Both optima lie inside the support."""
+    return np.exp(-((x - 0.4) ** 2) - (y - 0.3) ** 2) - np.exp(-((x + 0.5) ** 2) - (y + 0.6) ** 2)
+
+
+PROBLEMS = {
+    "ishigami": (ishigami, {name: Triangular(-np.pi, 0.5, np.pi) for name in ("x1", "x2", "x3")}),
+    "rosenbrock": (rosenbrock, {"x": Triangular(-2, 0.5, 2), "y": Triangular(-1, 1, 3)}),
+    "branin": (branin, {"x": Triangular(-5, 2, 10), "y": Triangular(0, 5, 15)}),
+    "inside": (inside, {"x": Triangular(-2, 0.1, 2), "y": Triangular(-2, 0.0, 2)}),
+}
+SEARCHING = {"automatic": Automatic(), "multistart": Optimisation()}
+COARSE = {
+    "general": General(),
+    "reduced": Reduced(),
+    "extended": Extended(),
+    "signed": Signed(),
+    "evolution": Optimisation("differential_evolution", starts=1),
+}
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """Lower and upper ends over a fine grid of every cut."""
+    ends = {}
+    for name, (function, inputs) in PROBLEMS.items():
+        steps = 201 if len(inputs) == 3 else 1001
+        axes = [[np.linspace(*x.cut(a), steps) for x in inputs.values()] for a in levels(4)]
+        values = [function(*np.meshgrid(*own, indexing="ij", sparse=True)) for own in axes]
+        ends[name] = np.array([[v.min(), v.max()] for v in values]).T
+    return ends
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.parametrize("method", SEARCHING)
+def test_searches_find_the_brute_force_bounds(problem, method, truth):
+    function, inputs = PROBLEMS[problem]
+    result = propagate(function, inputs, SEARCHING[method], vectorised=True)
+    lower, upper = truth[problem]
+    span = upper[0] - lower[0]
+    assert (np.abs(result.bounds()[0] - lower) <= 3e-4 * span).all()
+    assert (np.abs(result.bounds()[1] - upper) <= 3e-4 * span).all()
+    assert method == "automatic" or result.nature is Nature.ATTAINED
+    assert result.evaluations == len(result.samples.points)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.parametrize("method", COARSE)
+def test_coarse_methods_stay_inside(problem, method, truth):
+    function, inputs = PROBLEMS[problem]
+    result = propagate(function, inputs, COARSE[method], vectorised=True)
+    lower, upper = truth[problem]
+    grid = 3e-3 * (upper[0] - lower[0])
+    assert (result.bounds()[0] >= lower - grid).all()
+    assert (result.bounds()[1] <= upper + grid).all()
+    assert result.nature is Nature.ATTAINED
+
+
+@pytest.mark.parametrize("scale", [1e-13, 1e13])
+@pytest.mark.parametrize("method", [Automatic(), Optimisation(), Metamodel(20, 5)])
+def test_the_unit_of_an_output_does_not_matter(method, scale):
+    function, inputs = PROBLEMS["inside"]
+    one = propagate(function, inputs, method, vectorised=True)
+    other = propagate(lambda **x: scale * function(**x), inputs, method, vectorised=True)
+    np.testing.assert_allclose(np.array(other.bounds()) / scale, one.bounds(), rtol=1e-6)
+    assert other.nature == one.nature
+
+
+def test_eight_inputs_that_are_stated_to_be_monotone_are_proved_by_their_corners():
+    inputs = {f"x{i}": Triangular(0.5, 1.0, 2.0) for i in range(8)}
+    known = Known(monotone=tuple(inputs), source="a product of positive factors")
+
+    def product(**x):
+        return np.prod(list(x.values()), axis=0)
+
+    result = propagate(product, inputs, Reduced(), vectorised=True, known=known)
+    cuts = np.array([inputs["x0"].cut(level) for level in levels(4)])
+    np.testing.assert_allclose(result.bounds(), cuts.T**8, rtol=1e-12)
+    assert result.evaluations == 4 * 256 + 1
+    assert result.nature is Nature.GUARANTEED
+    assert "a product of positive factors" in result.basis[0]
+    alone = propagate(product, inputs, known=known)
+    assert (alone.nature, alone.evaluations) == (Nature.GUARANTEED, 4 * 256 + 1)
+
+
+def curved(a, b):
+    return {"up": a**3 + b, "turns": (a - 0.2) ** 2 + b}
+
+
+INPUTS = {"a": Triangular(-1.0, 0.1, 1.0), "b": Triangular(0.0, 0.5, 1.0)}
+
+
+def test_only_outputs_whose_signs_are_stated_or_verified_are_guaranteed():
+    stated = propagate(curved, INPUTS, Signed(), known=Known({"a": {"up": 1}, "b": 1}))
+    assert stated.natures == (Nature.GUARANTEED, Nature.ATTAINED)
+    assert stated.nature is Nature.ATTAINED
+    assert any("turns is not monotone in input a" in note for note in stated.notes)
+
+    def gradient(lower, upper):
+        low, high = lower[0], upper[0]
+        least = 0.0 if low <= 0 <= high else min(3 * low**2, 3 * high**2)
+        return {"up": ([least, 1.0], [3 * max(low**2, high**2), 1.0])}
+
+    verified = propagate(curved, INPUTS, Signed(), known=Known(gradient_range=gradient))
+    assert verified.natures == (Nature.GUARANTEED, Nature.ATTAINED)
+    assert verified.basis == ("the range of the gradient holds, as stated by the caller",)
+    seen = propagate(curved, INPUTS, Signed())
+    assert seen.nature is Nature.ATTAINED
+    np.testing.assert_allclose(seen.bounds("up"), stated.bounds("up"))
+
+
+@pytest.mark.parametrize(
+    ("method", "wrong"),
+    [
+        (Signed(), {"a": -1, "b": -1}),
+        (Reduced(), {"a": 1, "b": 1}),
+        (General(), {"a": 1, "b": 1}),
+        (Automatic(), {"a": 1, "b": 1}),
+    ],
+)
+def test_wrong_signs_are_contradicted_by_the_samples(method, wrong):
+    result = propagate(lambda a, b: a - b, INPUTS, method, known=Known(wrong))
+    assert result.nature is Nature.ATTAINED
+    assert "contradict what is known of y" in result.notes[-1]
+    assert not result.basis
+
+
+def test_a_sample_beyond_the_corners_refutes_them():
+    known = Known(monotone=("x",))
+    inputs = {"x": Triangular(-1.0, 0.1, 1.0)}
+    assert propagate(lambda x: x**2, inputs, General(), known=known).nature is Nature.ATTAINED
+
+
+@pytest.mark.parametrize("method", [Automatic(), Optimisation()])
+def test_a_search_ends_at_its_budget_and_says_so(method):
+    function, inputs = PROBLEMS["branin"]
+    calls = []
+    result = propagate(
+        lambda x, y: calls.append(1) or function(x, y), inputs, method, budget=60, alpha=[0.0]
+    )
+    assert result.evaluations == len(calls) <= 60
+    assert result.nature is Nature.ATTAINED
+    assert "the budget ended the search" in result.notes[-1]
+    assert "of at most 60" in str(result)
+
+
+@pytest.mark.parametrize("method", [General(), Signed(), Extended()])
+def test_a_design_beyond_the_budget_is_refused_before_it_runs(method):
+    inputs = {f"x{i}": Triangular(-1.0, 0.0, 2.0) for i in range(8)}
+    with pytest.raises(RefusedError) as refused:
+        propagate(lambda **x: sum(value**2 for value in x.values()), inputs, method)
+    assert refused.value.key == "budget"
+    assert "state signs" in refused.value.cure
+
+
+def test_samples_that_fail_end_the_call_or_are_left_out():
+    def broken(a, b):
+        if a > 0.9:
+            raise ArithmeticError("no convergence")
+        return a + b
+
+    with pytest.raises(FailedError, match=r"2 of \d+ samples failed.*no convergence"):
+        propagate(broken, INPUTS, Reduced(), alpha=[0.05, 0.9])
+    for method in (Automatic(), General(), Signed()):
+        result = propagate(broken, INPUTS, method, on_failure="skip", known=Known({"a": 1, "b": 1}))
+        assert result.nature is Nature.ATTAINED
+        assert "failed and were left out" in result.notes[-1]
+        assert result.lower[0, 0] == -1
+        assert 1.0 < result.upper[0, 0] <= 1.9
+
+
+def test_units_are_shown_and_arrays_share_theirs():
+    result = propagate(
+        lambda a, b: {"u": [a, b], "f": a * b}, INPUTS, Reduced(), units={"u": "mm", "f": "Hz"}
+    )
+    assert result.outputs == ("u[0]", "u[1]", "f")
+    assert result.units == ("mm", "mm", "Hz")
+    assert "u[1] [mm]" in str(result)
+
+
+def test_many_outputs_are_attained_by_looks_alone():
+    result = propagate(lambda a, b: [a * k + b for k in range(30)], INPUTS)
+    assert result.nature is Nature.ATTAINED
+    assert result.evaluations < 500
+    chosen = propagate(
+        lambda a, b: [a * k + b for k in range(30)], INPUTS, Automatic(outputs=("y[3]",))
+    )
+    assert chosen.nature_of("y[3]") is Nature.ESTIMATED
+    assert chosen.nature_of("y[4]") is Nature.ATTAINED
+
+
+def test_shares_of_width():
+    inputs = {"a": Triangular(-1, 0, 1), "b": Triangular(-2, 0, 2), "c": Triangular(0, 1, 2)}
+
+    def run(fuzzy):
+        return propagate(lambda a, b, c: a + b + 0 * c, fuzzy, Reduced())
+
+    shares = width_shares(run, inputs)
+    expected = np.array([[1 / 3] * 4, [2 / 3] * 4, [0] * 4])
+    np.testing.assert_allclose(shares.share[:, :-1, 0], expected, atol=1e-12)
+    assert (shares.share[:, -1] == 0).all()
+    assert "y, a: 0 … 33.3 %" in str(shares)
+    grouped = width_shares(run, inputs, groups={"both": ("a", "b")})
+    np.testing.assert_allclose(grouped.lost[0], grouped.width)
+
+
+def quantiles(u, m, s):
+    return m + s * norm.ppf(u)
+
+
+def test_interval_quasi_monte_carlo_holds_the_fuzzy_mean_and_quantiles():
+    mean, spread = Triangular(9.0, 10.0, 12.0), Interval(1.0, 2.0)
+    random = {"r": RandomInput(quantiles, {"m": mean, "s": spread})}
+    method = IntervalQuasiMonteCarlo(128)
+    known = Known({"r": 1, "x": 1})
+    response = method.run(
+        lambda r, x: r + x, random, {"x": Interval(0, 1)}, alpha=levels(2), known=known
+    )
+    assert response.nature is Nature.GUARANTEED
+    assert response.evaluations > 128
+    for level, alpha in enumerate(levels(2)):
+        low, high = mean.cut(alpha)
+        # the mean of the wider interval of quantiles lies outside that of the parameters
+        assert response.mean()[0][level] <= low + 0.01
+        assert response.mean()[1][level] >= high + 1 - 0.01
+        at_95 = high + 1 + 2 * norm.ppf(0.95)
+        assert response.quantile(0.95)[1][level, 0] == pytest.approx(at_95, abs=0.15)
+        least, most = response.p_box(12.0)
+        assert least[level, 0] <= norm.cdf(12 - high - 1, scale=2) + 0.02
+        assert least[level, 0] <= most[level, 0]
+    turning = method.run(lambda r, x: r + x**2, random, {"x": Interval(-1, 1)}, alpha=[0.0])
+    assert turning.nature is Nature.ATTAINED
+
+
+@pytest.mark.parametrize("number", [Trapezoidal(0, 1, 2, 4), Interval(-1, 1)])
+def test_modal_intervals_are_searched_too(number):
+    result = propagate(lambda x: (x - 0.5) ** 2, {"x": number}, Automatic(), alpha=[1.0])
+    low, high = number.cut(1.0)
+    grid = (np.linspace(low, high, 1001) - 0.5) ** 2
+    assert result.bounds() == pytest.approx((grid.min(), grid.max()), abs=1e-6)

@@ -1,0 +1,158 @@
+"""What is refused, by key and value; and computations that end without an answer."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy import (
+    Automatic,
+    Crisp,
+    Ellipsoidal,
+    Extended,
+    FailedError,
+    General,
+    Interval,
+    IntervalQuasiMonteCarlo,
+    Known,
+    Linear,
+    Metamodel,
+    Optimisation,
+    PiecewiseLinear,
+    RefusedError,
+    Signed,
+    Trapezoidal,
+    Triangular,
+    decide,
+    from_data,
+    jointly,
+    levels,
+    propagate,
+    width_shares,
+)
+from alphacut.fuzzy.campaign.store import model_key
+from alphacut.fuzzy.plans.monotonicity import Verification
+
+X = {"x": Triangular(0, 1, 2)}
+SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
+
+
+def run(function=lambda x: x, inputs=X, *args, **options):
+    return propagate(function, inputs, *args, progress=False, **options)
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: Triangular(2, 1, 3), "triangle"),
+        (lambda: Triangular(0, 1, np.inf), "triangle"),
+        (lambda: Triangular(0, True, 2), "triangle"),
+        (lambda: Interval(3, 2), "interval"),
+        (lambda: Trapezoidal(0, 2, 1, 3), "trapezoid"),
+        (lambda: Crisp("1"), "crisp number"),
+        (lambda: PiecewiseLinear((0, 1), (0, 1), (1,)), "alpha"),
+        (lambda: PiecewiseLinear((0, 0.5), (0, 1), (3, 2)), "alpha"),
+        (lambda: PiecewiseLinear((0, 1), (0, 2), (3, 1)), "cuts"),
+        (lambda: Triangular(0, 1, 2).cut(1.5), "alpha"),
+        (lambda: levels(0), "steps between levels"),
+        (lambda: run(inputs={}), "inputs"),
+        (lambda: run(inputs=[1]), "inputs"),
+        (lambda: run(inputs={"x": "1 mm"}), "input x"),
+        (lambda: run(alpha=[0.5, 0.2]), "alpha"),
+        (lambda: run(alpha=[]), "alpha"),
+        (lambda: run("f"), "function"),
+        (lambda: run(lambda x: x, X, General), "method"),
+        (lambda: run(workers=0), "workers"),
+        (lambda: run(budget=0), "budget"),
+        (lambda: run(lambda x: x, X, General(), budget=14), "budget"),
+        (lambda: run(on_failure="ignore"), "on_failure"),
+        (lambda: run(units={"z": "m"}), "unit of"),
+        (lambda: run(executor=object()), "executor"),
+        (lambda: run(shared=("y",)), "shared input"),
+        (lambda: run(shared=("x",), vectorised=True), "shared"),
+        (lambda: run(known=Known({"y": 1})), "known input"),
+        (lambda: run(known=Known({"x": {"z": 1}})), "known output"),
+        (lambda: Known({"x": 2}), "sign of x"),
+        (lambda: run(lambda x: x, X, Extended(("e",))), "monotone input"),
+        (lambda: run(lambda x: x, X, Signed(outputs=("z",))), "output"),
+        (lambda: Verification(step=0.6), "margin, step"),
+        (lambda: Automatic(tolerance=2), "tolerance"),
+        (lambda: Optimisation("newton"), "optimiser"),
+        (lambda: Optimisation(starts=0), "starts"),
+        (lambda: Metamodel(boxes=0), "boxes"),
+        (lambda: run(lambda x: x, {"x": 1.0}, Metamodel(4, 1)), "inputs"),
+        (lambda: IntervalQuasiMonteCarlo(0), "points"),
+        (lambda: IntervalQuasiMonteCarlo(2).run(abs, {}, X, alpha=[0]), "random inputs"),
+        (lambda: Linear({"x": np.nan}, 1), "weight of x"),
+        (lambda: Ellipsoidal({("x", "y"): 1.0}), "correlation of x and y"),
+        (lambda: Ellipsoidal(among=("x",)), "inputs of the ellipsoid"),
+        (
+            lambda: Ellipsoidal({("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9}),
+            "correlation",
+        ),
+        (lambda: run(interactions=[Linear({"y": 1}, 1)]), "input of Linear"),
+        (lambda: run(store="/proc/none/s.db", identity={"v": 1}), "store"),
+        (lambda: run(store="s.db"), "identity"),
+        (lambda: model_key({"f": abs}), "identity"),
+        (lambda: decide(run(), {}), "limits"),
+        (lambda: decide(run(), {"z": 1}), "output"),
+        (lambda: run(alpha=[0.5]).number(), "alpha"),
+        (
+            lambda: width_shares(lambda x: run(inputs=x), X, groups={"g": ("z",)}),
+            "input of a group",
+        ),
+        (lambda: from_data([], "next value"), "values"),
+        (lambda: from_data([1, np.nan], "median"), "value 2"),
+        (lambda: from_data([1, (3, 2)], "median"), "value 2"),
+        (lambda: from_data([1, "2"], "median"), "value 2"),
+        (lambda: from_data([[1, 2, 3]], "median"), "value 1"),
+        (lambda: from_data(SEVEN, "mode"), "claim"),
+        (lambda: from_data(SEVEN, "quantile 1.5"), "claim"),
+        (lambda: from_data(SEVEN, "mean", law="gamma"), "law"),
+        (lambda: from_data(SEVEN, "mean"), "bounds"),
+        (lambda: from_data(SEVEN, "mean", bounds=(3, 2)), "bounds"),
+        (lambda: from_data(SEVEN, "mean", bounds=(2, 3)), "value 2"),
+        (lambda: from_data([5], "mean", law="normal"), "values of a normal law"),
+        (lambda: from_data([5, 5, 5], "mean", law="normal"), "values of a normal law"),
+        (lambda: from_data([1, (5, np.inf)], "mean", law="normal"), "values of a normal law"),
+        (lambda: from_data([-1, 5], "mean", law="log-normal"), "least value"),
+        (lambda: from_data([(-np.inf, np.inf)], "next value"), "value 1"),
+        (lambda: from_data(SEVEN, "next value").cut(0.05), "alpha of the next value"),
+        (
+            lambda: jointly(
+                {"x": from_data(SEVEN, "median"), "y": from_data([1, 2], "next value")}
+            ),
+            "claims of the inputs",
+        ),
+    ],
+)
+def test_what_has_no_meaning_is_refused_by_its_key(make, key):
+    with pytest.raises(RefusedError) as refused:
+        make()
+    assert refused.value.key == key
+    assert refused.value.allowed
+    assert "\n" not in str(refused.value)
+    assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("output", "allowed"),
+    [
+        (None, "finite real numbers"),
+        (np.nan, "finite real numbers"),
+        (1j, "finite real numbers"),
+        ("1", "finite real numbers"),
+        (np.ma.masked_equal([1.0, 2.0], 2.0), "finite real numbers"),
+        ({}, "one number or more"),
+        ({"a": [1.0], "a[0]": 2.0}, "each with a name of its own"),
+    ],
+)
+def test_outputs_that_are_no_numbers_fail_with_the_point_and_the_cause(output, allowed):
+    with pytest.raises(FailedError) as failed:
+        run(lambda x: output)
+    assert allowed in failed.value.what
+    assert "at x = 1" in failed.value.what
+    assert "skip" in failed.value.cure
+
+
+def test_a_cut_without_an_allowed_point_is_a_failure():
+    with pytest.raises(FailedError, match="fulfils its interactions"):
+        run(interactions=[Linear({"x": 1}, -0.5)])
