@@ -9,16 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import AnyPhase
 
 
-def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+def voigt(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
     """Stiffness at uniform strain, shape (…, 3, 3), in Pa, for area fractions of shape (…)."""
     share = np.asarray(fraction)[..., None, None]
     return np.asarray((1 - share) * matrix.stiffness + share * inclusion.stiffness)
 
 
-def reuss(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+def reuss(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
     """Stiffness at uniform in-plane stress, shape (…, 3, 3), in Pa."""
     share = np.asarray(fraction)[..., None, None]
     return np.asarray(
@@ -34,7 +34,7 @@ def bulk_modulus(stiffness: Array) -> Array:
     return np.asarray((stiffness[..., 0, 0] + stiffness[..., 1, 1] + 2 * stiffness[..., 0, 1]) / 4)
 
 
-def hashin_shtrikman_bulk(fraction: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
+def hashin_shtrikman_bulk(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> tuple[Array, Array]:
     """Bounds of the in-plane bulk modulus, in Pa (Hashin & Rosen 1964; Hashin 1965)."""
     bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
     shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
@@ -54,7 +54,7 @@ def harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> 
     return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
 
 
-def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+def hashin_shtrikman(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
     """Bounds of K and G of parallel fibres that are isotropic across, in plane strain, in Pa.
 
     Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); with the extreme
@@ -76,7 +76,7 @@ def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     return np.swapaxes(np.array(found), 0, 1)
 
 
-def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
+def mori_tanaka(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
     """Moduli of round aligned fibres by Mori and Tanaka (1973), exact where particles are few.
 
     Returns:

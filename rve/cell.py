@@ -42,8 +42,9 @@ class Phase:
                 cure = "a fuzzy one is an input of fuzzy.propagate, each sample makes its own phase"
                 raise RefusedError(what, repr(value), "plain numbers, in Pa", cure)
         if not (np.isfinite(self.modulus) and self.modulus > 0):
-            value = f"{self.modulus:g} Pa"
-            raise RefusedError("Young's modulus", value, "positive and finite numbers")
+            raise RefusedError(
+                "Young's modulus", f"{self.modulus:g} Pa", "positive and finite numbers"
+            )
         if IN_GPA[0] <= self.modulus < IN_GPA[1] and self.modulus != 1:  # 1 scales others
             soft = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
             warnings.warn(f"{soft}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)

@@ -73,10 +73,8 @@ def stiffness_checks(
         weights: Weights of the nodes, shape (n,).
         phases: Matrix and inclusion.
     """
-    mean = np.tensordot(weights, stiffness, axes=1)
-    low, high = (
-        np.tensordot(weights, bound(fraction, *phases), axes=1) for bound in (reuss, voigt)
-    )
+    mean = _mean(weights, stiffness)
+    low, high = (_mean(weights, bound(fraction, *phases)) for bound in (reuss, voigt))
     checks = {
         "symmetry": float(abs(mean - mean.T).max() / abs(mean).max()),
         "reuss": _below(mean - low, mean),
@@ -102,10 +100,9 @@ def load_checks(
         weights: Weights of the nodes, shape (n,).
         phases: Matrix and inclusion.
     """
-    energy = loads @ np.tensordot(weights, stress, axes=1)
+    energy = np.asarray(np.matmul(loads, _mean(weights, stress)))
     low, high = (
-        loads @ np.tensordot(weights, bound(fraction, *phases), axes=1) @ loads.T
-        for bound in (reuss, voigt)
+        loads @ _mean(weights, bound(fraction, *phases)) @ loads.T for bound in (reuss, voigt)
     )
     return {
         "symmetry": float(abs(energy - energy.T).max() / abs(energy).max()),
@@ -138,6 +135,11 @@ def certify(
     else:
         bounds = load_checks(stress, loads, fraction, weights, phases)
     return {"hill_mandel": gap, **bounds}
+
+
+def _mean(weights: Array, values: Array) -> Array:
+    """Weighted sum over the first axis."""
+    return np.asarray(np.tensordot(weights, values, axes=1))
 
 
 def _below(difference: Array, scale: Array) -> float:

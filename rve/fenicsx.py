@@ -80,7 +80,8 @@ def option_is_used(name: str) -> bool:
     interface = cffi.FFI()
     interface.cdef("int PetscOptionsUsed(void *options, const char *name, char *used);")
     used = interface.new("char[8]")  # as large as any PetscBool
-    interface.dlopen(PETSc.__file__).PetscOptionsUsed(interface.NULL, name.encode(), used)
+    library: Any = interface.dlopen(PETSc.__file__)
+    library.PetscOptionsUsed(interface.NULL, name.encode(), used)
     return any(byte != b"\0" for byte in used)
 
 

@@ -12,7 +12,7 @@ from alphacut.fuzzy.refused import RefusedError
 
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
-_ANGLES = np.linspace(0, 2 * np.pi, 721)
+_ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
 _ROUND = 1e-12
 
 

@@ -110,7 +110,7 @@ class PrismGrid:
 
     def levels(self, law: ThetaLaw) -> Array:
         """θ of all levels, shape (layers + 1,)."""
-        return np.linspace(law.lower, law.upper, self.layers + 1)
+        return np.asarray(np.linspace(law.lower, law.upper, self.layers + 1))
 
     def positions(self, radius: RadiusMap) -> Array:
         """(x1, x2, θ) of all nodes, shape (nodes, 3)."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.outline import Outline, circle, is_round, reach, require_fit
+from alphacut.rve.mesh.outline import Outline, circle, reach, require_fit
 from alphacut.rve.mesh.square import Triangles
 from alphacut.rve.settings import require_mesh_size
 from alphacut.stochastic import RadiusMap, require_map
@@ -60,9 +60,7 @@ def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
     return float(np.clip(middle, 0.1, 0.9 / reach(outline)))
 
 
-def triangulate(
-    *, size: float, radius: float, outline: Outline = circle, cache: Path | None = None
-) -> Triangulation:
+def triangulate(*, size: float, radius: float, outline: Outline = circle) -> Triangulation:
     """Mesh the cell with triangles of about `size`, opposite sides matching.
 
     Args:
@@ -70,7 +68,6 @@ def triangulate(
         radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
             it.
         outline: Of the particle.
-        cache: Folder where what Gmsh makes is kept; None to ask it every time.
 
     Raises:
         ValueError: `size` or `radius` out of range.
@@ -78,7 +75,7 @@ def triangulate(
     require_mesh_size(size)
     if not 0 <= radius < 1:
         raise ValueError(f"the reference radius is {radius:g}; it must lie in [0, 1)")
-    points, triangles, inside = _kept_triangles(size, radius, outline, cache)
+    points, triangles, inside = _kept_triangles(size, radius, outline)
     return _add_midpoints(*_neighbours_near(points, triangles, inside), radius, outline)
 
 
@@ -98,16 +95,14 @@ def _neighbours_near(points: Array, triangles: Rows, inside: Mask) -> Triangles:
     return points[along], place[triangles], inside
 
 
-def _kept_triangles(size: float, radius: float, outline: Outline, cache: Path | None) -> Triangles:
+def _kept_triangles(size: float, radius: float, outline: Outline) -> Triangles:
     """Gmsh's triangles, from the cache where an equal Gmsh was called with the same."""
-    origin = find_spec("gmsh")
-    if cache is None or origin is None or origin.origin is None or not is_round(outline):
+    origin, folder = find_spec("gmsh"), cache_folder()
+    if folder is None or origin is None or origin.origin is None or outline is not circle:
         return square.triangles(size, radius, outline)
-    about = Path(origin.origin).stat()
-    code = Path(square.__file__).read_text(encoding="utf-8")
+    about, code = Path(origin.origin).stat(), Path(square.__file__).read_text(encoding="utf-8")
     made_by = size, radius, origin.origin, about.st_size, about.st_mtime_ns, code
-    cache.mkdir(parents=True, exist_ok=True)
-    kept = cache / f"mesh-{sha256(repr(made_by).encode()).hexdigest()[:24]}.npz"
+    kept = folder / f"mesh-{sha256(repr(made_by).encode()).hexdigest()[:24]}.npz"
     try:
         with np.load(kept, allow_pickle=False) as archive:
             return archive["points"], archive["triangles"], archive["inside"]
@@ -117,6 +112,17 @@ def _kept_triangles(size: float, radius: float, outline: Outline, cache: Path | 
     np.savez(partial, points=points, triangles=triangles, inside=inside)
     partial.replace(kept)
     return points, triangles, inside
+
+
+def cache_folder() -> Path | None:
+    """Folder of meshes that Gmsh need not make again; None if it cannot be made."""
+    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = Path(os.environ.get("ALPHACUT_CACHE") or Path(caches) / "alphacut") / "meshes"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
 
 
 def _add_midpoints(

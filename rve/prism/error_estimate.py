@@ -95,7 +95,7 @@ def _readings(curve: StressCurve) -> Sequence[Array]:
     s11, s12 = curve.mean
     if curve.stiffness is None:
         return [with_ratio(np.array([s11 / STRAIN, np.nan, s12 / (2 * STRAIN)]))]
-    mean = np.tensordot(curve.weights, curve.stiffness, axes=1)
+    mean = np.asarray(np.tensordot(curve.weights, curve.stiffness, axes=1), float)
     both, first, second = axial_moduli(mean, square=False)
     return [second, first, both]
 

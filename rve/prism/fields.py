@@ -57,12 +57,13 @@ def cell_fields(
     positions = grid.positions(radius_map)
     total = np.empty((grid.nodes, 2, len(vectors)))
     wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
-    for k, (uniform, u) in enumerate(zip(model.loads, fluctuations, strict=True)):
+    for k, u in enumerate(fluctuations):
+        uniform: Array = model.loads[k]
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
         total[form.node, :, k] = u + positions[form.node, :2] @ tensor
         wedges[form.wedge, ..., k] = _strain_at_nodes(problem, u) + uniform
-    inside = grid.inside.astype(np.int64)
-    stress = np.array(phases)[inside][:, None] @ wedges
+    inside: Rows = grid.inside.astype(np.intp)
+    stress = np.stack(phases)[inside][:, None] @ wedges
     numbered = grid.cells + inside[:, None] * grid.nodes
     kept, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)

@@ -93,9 +93,9 @@ class PrismForm:
         """Share of the particle at the quadrature points, shape (cells, points)."""
         if self.grid.conforming:
             return np.repeat(self.grid.inside[self.wedge], len(slab_rule()[1])).astype(float)
-        shapes = wedge(1).tabulate(0, slab_rule()[0])[0].reshape(-1, 15)
+        shapes: Array = wedge(1).tabulate(0, slab_rule()[0])[0].reshape(-1, 15)
         x = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
-        return self.grid.sign(x, radius)
+        return np.asarray(self.grid.sign(x, radius))
 
     def strains(self, displacement: Array) -> Array:
         """(ε11, ε22, 2 ε12) at the points of the slices, shape (cells, 3, points, 3).
@@ -111,7 +111,8 @@ class PrismForm:
         weights = slab_rule()[1].reshape(SLICES, -1)
         planar = weights / (2 * weights.sum(axis=1, keepdims=True))
         heights = np.diff(self._levels)[self.layer]
-        return self._at_points(self._volume, 1)[..., 0] / heights[:, None, None] * planar
+        volume = self._at_points(self._volume, 1)[..., 0]
+        return np.asarray(volume / heights[:, None, None] * planar)
 
     def _at_points(self, expression: fem.Expression, size: int) -> Array:
         cells = np.arange(len(self.wedge), dtype=np.int32)

@@ -99,17 +99,13 @@ class PrismModel:
         bases: dict[float, ModulusBasis | None] = {}
         results = []
         for inclusion in inclusions:
-            basis = None
+            result = None
             if isinstance(matrix, Phase) and isinstance(inclusion, Phase) and self._projects:
                 ratio = inclusion.poisson
                 if ratio not in bases:
-                    bases[ratio] = self._basis(problem, matrix, inclusion, watch)
-                basis = bases[ratio]
-            phases = matrix, inclusion
-            if basis is None:
-                result = self._solved(problem, phases, watch)
-            else:
-                result = self._projected(problem, basis, phases, watch)
+                    bases[ratio] = self._basis(problem, matrix, ratio, watch)
+                result = self._projected(problem, bases[ratio], (matrix, inclusion), watch)
+            result = result or self._solved(problem, (matrix, inclusion), watch)
             results.append(replace(result, seconds=watch.report()))
         return results
 
@@ -145,27 +141,30 @@ class PrismModel:
         return ordinary and self.moduli is not None and self.moduli[1] > self.moduli[0]
 
     def _basis(
-        self, problem: PrismProblem, matrix: Phase, inclusion: Phase, watch: Stopwatch
+        self, problem: PrismProblem, matrix: Phase, poisson: float, watch: Stopwatch
     ) -> ModulusBasis | None:
         """Solutions to project on, or None where two of them do not carry the others."""
         assert self.moduli is not None
-        low, high = self.moduli
-        if not low * (1 - ROUND_OFF) <= inclusion.modulus <= high * (1 + ROUND_OFF):
-            value, allowed = f"{inclusion.modulus:g} Pa", f"values in [{low:g}, {high:g}] Pa"
-            raise RefusedError("modulus of the particle", value, allowed, "widen `moduli`")
         with watch("solve"):
-            basis = modulus_basis(problem, matrix, inclusion.poisson, (low, high), self.loads)
+            basis = modulus_basis(problem, matrix, poisson, self.moduli, self.loads)
         return basis if basis.error <= TOLERANCE else None
 
     def _projected(
         self,
         problem: PrismProblem,
-        basis: ModulusBasis,
+        basis: ModulusBasis | None,
         phases: tuple[Phase, Phase],
         watch: Stopwatch,
-    ) -> Homogenised:
+    ) -> Homogenised | None:
+        low, high = self.moduli or (0.0, np.inf)
+        modulus = phases[1].modulus
+        if not low * (1 - ROUND_OFF) <= modulus <= high * (1 + ROUND_OFF):
+            value, allowed = f"{modulus:g} Pa", f"values in [{low:g}, {high:g}] Pa"
+            raise RefusedError("modulus of the particle", value, allowed, "widen `moduli`")
+        if basis is None:
+            return None
         with watch("solve"):
-            strains = basis.project(phases[1].modulus)
+            strains = basis.project(modulus)
         result = self._result(problem, strains, phases, basis.error, watch)
         reason = "projected on solutions at two moduli of the particle"
         return replace(result, iterations=basis.iterations, reason=reason)

@@ -75,7 +75,8 @@ def modulus_basis(
     Raises:
         ConvergenceError: A linear solve stopped early.
     """
-    solver, systems, forces, solved = None, [], [], []
+    systems, forces, solved = [], [], []
+    solver: LinearSolver | None = None
     nodes = tuple(ends[0] + share * (ends[1] - ends[0]) for share in _CHEBYSHEV)
     for modulus in nodes:
         problem.assemble((matrix.stiffness, Phase(modulus, poisson).stiffness))
@@ -89,13 +90,15 @@ def modulus_basis(
         np.array([[[v.dot(w) for w in side] for v in vectors] for side in sides])
         for sides in (images, forces)
     )
-    rest = np.zeros((len(problem.form.node), 2))
+    rest: Array = np.zeros((len(problem.form.node), 2))
+    none: Array = np.zeros(3)
     fields = [(strain, rest) for strain in strains]
-    fields += [(np.zeros(3), problem.field(v)) for v in vectors]
+    fields += [(none, problem.field(v)) for v in vectors]
     means = problem.slice_strains(fields)
     iterations = sum((solutions.iterations for solutions in solved), ())
     basis = ModulusBasis((nodes[0], nodes[1]), stiffness, loads, means, iterations)
     scale = CELL_AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
+    assert solver is not None
     left = [_left_out(basis, e, images, forces, solver) for e in (ends[0], sum(ends) / 2, ends[1])]
     return replace(basis, error=float((np.array(left) / scale).max()))
 
@@ -112,7 +115,8 @@ def _left_out(
     low, high = basis.shares(modulus)
     for k, column in enumerate(coefficients.T):
         residual = low * forces[0][k] + high * forces[1][k]
-        residual.maxpy([*(-low * column), *(-high * column)], [*images[0], *images[1]])
+        shares = np.concatenate([-low * column, -high * column])
+        residual.maxpy(shares.tolist(), images[0] + images[1])
         answer = residual.duplicate()
         solver.ksp.pc.apply(residual, answer)
         energies.append(residual.dot(answer))

@@ -76,7 +76,7 @@ def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
         mass[: layers + 1, layers + 1 :],
         mass[layers + 1 :, layers + 1 :],
     )
-    shift = np.linalg.solve(hats, between)
+    shift: Array = np.asarray(np.linalg.solve(hats, between), float)
     return ThetaMass(
         hats.diagonal(), bubbles.diagonal(), _inverse_root(hats),
         _inverse_root(bubbles - between.T @ shift), shift,
@@ -159,7 +159,7 @@ class ThetaPreconditioner:
     @staticmethod
     def _solved(solvers: list[PlaneSolver], rows: Array) -> Array:
         """Solutions of this rank's blocks, one for each row."""
-        solutions = [solver(row) for solver, row in zip(solvers, rows, strict=True)]
+        solutions = [solver(rows[k]) for k, solver in enumerate(solvers)]
         return np.array(solutions).reshape(rows.shape)
 
     def _injected(self, corners: Array) -> Array:

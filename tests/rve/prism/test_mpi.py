@@ -68,6 +68,6 @@ def test_any_number_of_ranks_gives_the_same_means_iterations_and_errors(alone, r
 
 def test_only_one_rank_prints_and_the_command_shares_a_cell():
     solve = ["-m", "rve", "solve", "cases/paper.toml", "--method", "prism", "--json", "-"]
-    one, two = (json.loads(run(n, *solve, "--mesh-size", "0.4")) for n in (1, 2))
+    one, two = (json.loads(run(n, *solve, "--set", "mesh.size=0.4")) for n in (1, 2))
     assert two["E_GPa"] == pytest.approx(one["E_GPa"], rel=1e-10)
     assert two["unknowns"] == one["unknowns"]
