@@ -34,7 +34,9 @@ def bulk_modulus(stiffness: Array) -> Array:
     return np.asarray((stiffness[..., 0, 0] + stiffness[..., 1, 1] + 2 * stiffness[..., 0, 1]) / 4)
 
 
-def hashin_shtrikman_bulk(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> tuple[Array, Array]:
+def hashin_shtrikman_bulk(
+    fraction: Array, matrix: AnyPhase, inclusion: AnyPhase
+) -> tuple[Array, Array]:
     """Bounds of the in-plane bulk modulus, in Pa (Hashin & Rosen 1964; Hashin 1965)."""
     bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
     shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
