@@ -1,19 +1,16 @@
 """Exact propagator by eigenvalues: every mode runs on its own.
 
-Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, marched over the segments
-between samples and nodes, in which the record is linear. Powers of the whole transfer matrix are
+Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, a recursion in time. Powers of the whole transfer matrix are
 never formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from math import factorial
-
 import numpy as np
+from scipy.signal import lfilter
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
-from alphacut.frame.dynamics.record_load import SAME, Segments
+from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures import modes as natural
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 
@@ -23,10 +20,6 @@ CONDITION = 1e9
 """Condition of the eigenvectors above which the modes are too near to critical damping to stand for
 the structure.
 """
-
-
-KEPT = 64
-"""Lengths of segments whose exponentials are kept; commensurate steps have few."""
 
 
 class NearlyCriticalError(RuntimeError):
@@ -50,9 +43,6 @@ def spectral_trajectory(
             coincide.
     """
     deep = matrices.mass.directions > 0
-    undamped = None if deep else natural.classical_modes(matrices, rows)
-    if undamped is not None:
-        return _superposed(undamped, ground=ground, step=step, steps=steps)
     rate, right, left = natural.eigenvectors(natural.state_matrix(matrices))
     if (
         float((np.abs(right.value).sum(-2).max(-1) * np.abs(left.value).sum(-2).max(-1)).max())
@@ -83,19 +73,6 @@ def spectral_trajectory(
     return parts[0] if len(parts) == 1 else parts[0] + parts[1]
 
 
-def _superposed(
-    modes: natural.ClassicalModes, *, ground: Accelerogram | None, step: float, steps: int
-) -> Jet:
-    """As `spectral_trajectory`, from modes that damping does not couple."""
-    out = np.zeros((len(modes.rate), steps + 1, modes.start.shape[-1]))
-    if modes.start.any():
-        time = np.arange(steps + 1) * step
-        out += (np.exp(modes.rate[:, None, :] * time[:, None]) @ modes.start).real
-    if ground is not None:
-        out += (responses(modes.rate, ground, step, steps)[0] @ modes.load).real
-    return Jet.constant(out, 0)
-
-
 def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:
     """Re Σ_k C_k w(λ_k) from w, w' and w'', each (S, T, K); C has V = (S, K, m)."""
     d, (samples, _, m) = rate.directions, share.value.shape
@@ -121,58 +98,26 @@ def _summed(rate: Jet, share: Jet, waves: list[Array]) -> Jet:
 def responses(
     rate: Array, ground: Accelerogram, step: float, steps: int, *, derivatives: bool = False
 ) -> list[Array]:
-    """R and its derivatives by λ at all nodes, each shape (S, steps + 1, K), for λ (S, K)."""
-    cut = Segments.of(ground, step, steps)
-    lengths, alike = _alike(cut.length, step)
-    cached = lru_cache(maxsize=KEPT)(lambda i: _advance(rate, float(lengths[i]), derivatives))
-    orders = 3 if derivatives else 1
-    out: list[Array] = [
-        np.zeros((len(rate), steps + 1, rate.shape[1]), complex) for _ in range(orders)
-    ]
-    now = [np.zeros(rate.shape, complex) for _ in range(orders)]
-    for j, index, first, last in zip(cut.step, alike, cut.first, cut.last, strict=True):
-        h, (E, old, new) = lengths[index], cached(index)
-        moved = [E * now[0]]
-        if derivatives:
-            moved += [E * (now[1] + h * now[0]), E * (now[2] + 2 * h * now[1] + h**2 * now[0])]
-        now = [x + first * a + last * b for x, a, b in zip(moved, old, new, strict=True)]
-        for whole, x in zip(out, now, strict=True):
-            whole[:, j + 1] = x  # the last segment of the step remains
-    return out
+    """R and its derivatives by λ at all nodes, each shape (S, steps + 1, K), for λ (S, K).
 
-
-def _alike(length: Array, step: float) -> tuple[Array, Array]:
-    """Means of lengths that differ by rounding alone, and which of them each one is."""
-    order = np.argsort(length)
-    group = np.cumsum(np.diff(length[order], prepend=length[order[0]]) > SAME * step)
-    index = np.empty(len(length), int)
-    index[order] = group
-    return np.bincount(index, length) / np.bincount(index), index
-
-
-def _advance(rate: Array, step: float, derivatives: bool) -> tuple[Array, list[Array], list[Array]]:
-    """exp(λ h), and what accelerations at both ends of a segment add to R and its derivatives."""
-    f = phi(rate * step, 4 if derivatives else 2)
-    slopes = [[f[k]] for k in (1, 2)]
+    From node to node R is multiplied by exp(λ h), and what the record adds within the step is a sum
+    over points (`LoadRule`): a recursion of order one in time.
+    """
+    flat = rate.ravel()
+    fastest = float(np.abs(flat).max())
+    rule = load_rule(ground, step, steps, parts_of(fastest, step))
+    wave, decay = np.exp(rule.tau[:, None] * flat), np.exp(step * flat)
+    out = [_recursion(decay, rule.weight @ wave)]
     if derivatives:
-        for k, row in zip((1, 2), slopes, strict=True):
-            row.append(step * (f[k] - k * f[k + 1]))
-            row.append(step**2 * (f[k] - 2 * k * f[k + 1] + k * (k + 1) * f[k + 2]))
-    old = [step * (a - b) for a, b in zip(*slopes, strict=True)]
-    return f[0], old, [step * b for b in slopes[1]]
+        for order, wave in ((1, rule.tau[:, None] * wave), (2, rule.tau[:, None] ** 2 * wave)):
+            before = [np.vstack([0 * x[:1], x[:-1]]) for x in out]
+            carried = step * order * before[-1] + (order - 1) * step**2 * before[0]
+            out.append(_recursion(decay, rule.weight @ wave + decay * carried))
+    shaped = [np.vstack([np.zeros_like(x[:1]), x]).reshape(-1, *rate.shape) for x in out]
+    return [np.moveaxis(x, 0, 1) for x in shaped]
 
 
-def phi(z: Array, top: int) -> list[Array]:
-    """φ_0 … φ_top of exponential integrators to round-off."""
-    z = np.asarray(z, complex)
-    small = np.abs(z) < 1
-    inner, outer = np.where(small, z, 0), np.where(small, 1, z)
-    series = np.zeros_like(z)
-    for j in range(20, -1, -1):  # Horner; 1/24! is below round-off
-        series = series * inner + 1 / factorial(j + top)
-    near, far = [series], [np.exp(outer)]
-    for k in range(top - 1, -1, -1):
-        near.insert(0, near[0] * inner + 1 / factorial(k))
-    for k in range(top):
-        far.append((far[-1] - 1 / factorial(k)) / outer)
-    return [np.where(small, a, b) for a, b in zip(near, far, strict=True)]
+def _recursion(decay: Array, added: Array) -> Array:
+    """x[j + 1] = decay x[j] + added[j] from rest, shape (steps, K)."""
+    columns = [lfilter([1.0], [1.0, -d], x) for d, x in zip(decay, added.T, strict=True)]
+    return np.stack(columns, 1)
