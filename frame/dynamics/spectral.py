@@ -1,7 +1,7 @@
 """Exact propagator by eigenvalues: every mode runs on its own.
 
-Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, a recursion in time. Powers of the whole transfer matrix are
-never formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
+Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, a recursion in time. Powers
+of the whole transfer matrix are never formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
 """
 
 from __future__ import annotations
@@ -109,10 +109,11 @@ def responses(
     wave, decay = np.exp(rule.tau[:, None] * flat), np.exp(step * flat)
     out = [_recursion(decay, rule.weight @ wave)]
     if derivatives:
-        for order, wave in ((1, rule.tau[:, None] * wave), (2, rule.tau[:, None] ** 2 * wave)):
+        for order in (1, 2):
             before = [np.vstack([0 * x[:1], x[:-1]]) for x in out]
             carried = step * order * before[-1] + (order - 1) * step**2 * before[0]
-            out.append(_recursion(decay, rule.weight @ wave + decay * carried))
+            turned = rule.tau[:, None] ** order * wave
+            out.append(_recursion(decay, rule.weight @ turned + decay * carried))
     shaped = [np.vstack([np.zeros_like(x[:1]), x]).reshape(-1, *rate.shape) for x in out]
     return [np.moveaxis(x, 0, 1) for x in shaped]
 

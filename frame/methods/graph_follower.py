@@ -108,7 +108,7 @@ class GraphFollower:
         begun = time.perf_counter()
         followed = self.follow(flow, progress)
         missed, count = beyond(flow, followed.bounds)
-        apart = parted(followed.storage.held.models(0, np.s_[:, :, :])[1], followed.bounds[0])
+        apart = parted(followed.storage.steepest, followed.bounds[0])
         error = followed.left.max(-1) + SAFETY * missed[:, None]
         notes = (f"stopped at the budget of {self.budget} trajectories",) * followed.exhausted
         return flow.envelope(

@@ -27,6 +27,7 @@ class Storage:
         top: The best value at each place.
         best: Which graph has it, the first where several do.
         held: Derivatives of that graph.
+        steepest: Largest slope of any graph along a coordinate, shape (m,).
     """
 
     flow: UnitFlow
@@ -36,10 +37,12 @@ class Storage:
     top: Array = field(init=False)
     best: Index = field(init=False)
     held: HeldModels = field(init=False)
+    steepest: Array = field(init=False)
 
     def __post_init__(self) -> None:
         d, shape = len(self.flow.boxes.names), (len(self.flow.time), len(self.flow.outputs), 2)
         self.points, self.top = np.empty((0, d)), np.full(shape, -np.inf)
+        self.steepest = np.zeros(shape[1])
         self.best, self.held = np.zeros(shape, np.int64), HeldModels.empty((0,), shape, d)
 
     def __len__(self) -> int:
@@ -52,6 +55,7 @@ class Storage:
     def add(self, points: Array) -> Places:
         """Computes and stores the graphs at unit coordinates (S, d); places where one is best."""
         jet, top = self.flow.taylor(points), self.top.reshape(-1)
+        self.steepest = np.maximum(self.steepest, np.abs(jet.first).max((0, 1, 2)))
         holder = np.full(top.shape, -1)
         for s, value in enumerate(jet.value):
             signed = np.stack([-value, value], -1).ravel()

@@ -85,7 +85,7 @@ class ImprovedFollower:
         missed, count = beyond(flow, bounds)
         small = self.tolerance / 2 * flow.scale
         error = SAFETY * (promised.max(-1) + small + apart + missed[:, None])
-        parts = parted(first.held.models(0, np.s_[:, :, :])[1], bounds[0])
+        parts = parted(np.maximum(first.steepest, second.steepest), bounds[0])
         notes = (f"stopped at the budget of {self.budget} trajectories",)
         return flow.envelope(
             bounds,
@@ -152,6 +152,7 @@ class Pursuit:
         correction: What the final models still promise, at most the tolerance.
         open_gain: What they promise above the tolerance when the budget ends the search.
         held: Models of the graphs that attain the bounds.
+        steepest: Largest slope of any graph along a coordinate, shape (m,).
     """
 
     flow: UnitFlow
@@ -165,6 +166,7 @@ class Pursuit:
     correction: Array
     open_gain: Array
     held: HeldModels
+    steepest: Array = field(default_factory=lambda: np.zeros(1))
     lower: Array = field(default_factory=lambda: np.zeros(0))
     upper: Array = field(default_factory=lambda: np.zeros(0))
     tolerance: float = 0.0
@@ -178,7 +180,7 @@ class Pursuit:
         low, at = np.full(shape, -np.inf), np.zeros((*shape, d))
         many, where = np.zeros((levels, *shape)), np.zeros((levels, *shape, d))
         grids = (low, at, low.copy(), at.copy(), many, where, many.copy(), many.copy())
-        held = HeldModels.empty((0,) + (-1, 1) * beside, shape, d)
+        held = HeldModels.empty((0,) * (levels > 1) + (-1, 1) * beside, shape, d)
         return cls(flow, np.zeros((0, d)), *grids, held)
 
     def enter(self, lower: Array, upper: Array, method: ImprovedFollower) -> None:
@@ -203,6 +205,7 @@ class Pursuit:
         """Computes graphs, updates the bounds at all nodes and asks their models."""
         jet = self.flow.taylor(points)
         self.points = np.vstack([self.points, points])
+        self.steepest = np.maximum(self.steepest, np.abs(jet.first).max((0, 1, 2)))
         self._ask(points, jet)
 
     def _ask(self, points: Array, jet: Jet) -> None:

@@ -39,8 +39,7 @@ def sample(d: int, level: int) -> Array:
     return np.concatenate([inside, np.clip(2 * wide, -1, 1), ends])
 
 
-def parted(slopes: Array, bounds: Array) -> bool:
-    """Whether trajectories part: slopes (T, m, 2, d) beside the range of the bounds (T, m, 2)."""
-    turn = np.abs(slopes).max((0, 2, 3))
+def parted(steepest: Array, bounds: Array) -> bool:
+    """Whether trajectories part: their steepest slopes (m,) beside the range of (T, m, 2)."""
     width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
-    return bool((turn > PARTED * width).any())
+    return bool((steepest > PARTED * width).any())

@@ -32,7 +32,7 @@ from alphacut.frame.modal.first_pass import exchange, first_optima
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, best_of_few, best_of_pool
+from alphacut.frame.modal.optima import Optima, Response, best_of_few, best_of_pool
 from alphacut.frame.modal.starting_points import fresh_points, trajectories
 from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
@@ -102,16 +102,21 @@ class Search:
             flow.flow, flow.boxes, tolerance=tolerance / 10, budget=self.budget, scale=flow.scale
         )
         exact = _exact(model, flow)
+        # what leads: polynomials where they are as good as is asked for, or the exact motions
+        enough = bool((model.error / flow.scale).max() <= SMALL * tolerance)
+        way = exact.model if enough else exact
         levels, found = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
             tick = share(progress, done / levels, (done + 1) / levels)
             within = found[-1][0] if found else None
-            found.append(self._level(exact, *flow.boxes.unit(level), tolerance, within, tick))
+            found.append(self._level(way, *flow.boxes.unit(level), tolerance, within, tick))
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         scale = flow.scale[:, None]
-        bounds = np.stack([optima.value for optima, _ in found[::-1]]).reshape(shape) * scale
+        values = [x.side * exact.value_at(x.point, x.node, x.output) for x, _ in found[::-1]]
+        bounds = np.maximum.accumulate(np.stack(values)[::-1])[::-1].reshape(shape) * scale
         at = np.stack([optima.point for optima, _ in found[::-1]]).reshape(*shape, -1)
         missed = np.stack([error for _, error in found[::-1]]).reshape(shape) * scale
+        missed += 2 * enough * model.error.max(0)[:, None]
         error = np.maximum(missed.max(-1), _rounding(model, np.abs(bounds).max((0, 1, 3))))
         facts = {
             "degree": model.degree,
@@ -125,7 +130,7 @@ class Search:
 
     def _level(
         self,
-        exact: ExactResponse,
+        way: Response,
         lower: Array,
         upper: Array,
         tolerance: float,
@@ -133,55 +138,55 @@ class Search:
         tick: Progress,
     ) -> tuple[Optima, Array]:
         """Optima in a box, and what they may miss, shape (N,)."""
-        optima = first_optima(exact.model, lower, upper, SMALL * tolerance)
-        every, grid = np.arange(len(optima.value)), _grid(exact, optima)
+        optima = first_optima(_polynomials(way), lower, upper, SMALL * tolerance)
+        every, grid = np.arange(len(optima.value)), _grid(way, optima)
         optima.value[:] = -np.inf
-        optima.offer(exact, optima.point.copy(), every)
+        optima.offer(way, optima.point.copy(), every)
         if within is not None:
-            optima.offer(exact, within.point, every)
+            optima.offer(way, within.point, every)
         tick(0.2)
         if not (upper > lower).any():
             return optima, np.zeros(len(every))
         box = lower, upper, SMALL * tolerance
-        refine(exact, optima, every, *box)
-        _follow(exact, optima, grid, box)
+        refine(way, optima, every, *box)
+        _follow(way, optima, grid, box)
         tick(0.5)
         gains = list[Array]()
         for count in range(self.passes):
             before = optima.value.copy()
             rng = np.random.default_rng((self.seed, count, len(every)))
-            self._pass(exact, optima, box, DRAWN * 2**count, rng)
+            self._pass(way, optima, box, DRAWN * 2**count, rng)
             gains.append((optima.value - before).reshape(len(grid), -1))
             tick(0.5 + 0.5 * (1 - 0.6 ** (count + 1)))
             if count and max(gain.max() for gain in gains[-2:]) <= QUIET * tolerance:
                 break
-        return optima, optima.left + _missed(gains, exact, QUIET * tolerance).ravel()
+        return optima, optima.left + _missed(gains, len(way.outputs), QUIET * tolerance).ravel()
 
     def _pass(
         self,
-        exact: ExactResponse,
+        way: Response,
         optima: Optima,
         box: tuple[Array, Array, float],
         count: int,
         rng: np.random.Generator,
     ) -> None:
         """Solve `count` bounds anew from fresh points, and follow what is better."""
-        grid, m = _grid(exact, optima), len(exact.outputs)
+        grid, m = _grid(way, optima), len(way.outputs)
         size = int(np.clip(VALUES / (len(grid) * m), 64, FRESH))
         pool = fresh_points(rng, *box[:2], size)
         nodes = np.sort(rng.permutation(len(grid))[: max(1, count // (2 * m))])
-        values = trajectories(exact.model, pool, nodes)
+        values = trajectories(_polynomials(way), pool, nodes)
         rivals = [best_of_pool(pool, values, nodes, 1)[0]]
         rivals += [best_of_few(pool, values, nodes, few, rng) for few in FEW]
         improved = np.zeros(len(optima.value), bool)
         for rival in rivals:
             own = np.arange(len(rival.value))
             rival.value[:] = -np.inf
-            rival.offer(exact, rival.point.copy(), own)
-            refine(exact, rival, own, *box)
-            improved[optima.offer(exact, rival.point, grid[nodes].ravel())] = True
+            rival.offer(way, rival.point.copy(), own)
+            refine(way, rival, own, *box)
+            improved[optima.offer(way, rival.point, grid[nodes].ravel())] = True
         if improved.any():
-            _follow(exact, optima, grid, box)
+            _follow(way, optima, grid, box)
 
 
 def _exact(model: ModalModel, flow: UnitFlow) -> ExactResponse:
@@ -189,26 +194,28 @@ def _exact(model: ModalModel, flow: UnitFlow) -> ExactResponse:
     return ExactResponse.of(model, flow.scale, bent=not (model.error.max(0) > ROUGH * peak).any())
 
 
-def _grid(exact: ExactResponse, optima: Optima) -> Rows:
+def _polynomials(way: Response) -> ModalModel:
+    return way.model if isinstance(way, ExactResponse) else way
+
+
+def _grid(way: Response, optima: Optima) -> Rows:
     """Numbers of all bounds, node by node."""
-    return np.arange(len(optima.value)).reshape(len(exact.time), -1)
+    return np.arange(len(optima.value)).reshape(len(way.time), -1)
 
 
-def _follow(
-    exact: ExactResponse, optima: Optima, grid: Rows, box: tuple[Array, Array, float]
-) -> None:
+def _follow(way: Response, optima: Optima, grid: Rows, box: tuple[Array, Array, float]) -> None:
     """Try at every node what is best near by, and refine it, until nothing improves."""
     for _ in range(ROUNDS):
-        better = exchange(exact, optima, grid)
+        better = exchange(way, optima, grid)
         if not len(better):
             return
-        refine(exact, optima, better, *box)
+        refine(way, optima, better, *box)
 
 
-def _missed(gains: list[Array], exact: ExactResponse, quiet: float) -> Array:
+def _missed(gains: list[Array], outputs: int, quiet: float) -> Array:
     """What bounds may miss by the gains (T, 2 m) of the last passes, each as if of all bounds."""
     last = np.max(gains[-2:], axis=0)
-    by_output = last.reshape(len(last), len(exact.outputs), 2).max((0, 2))
+    by_output = last.reshape(len(last), outputs, 2).max((0, 2))
     return np.asarray(UNSEEN * np.maximum(quiet, np.repeat(by_output, 2)) + 0 * last)
 
 

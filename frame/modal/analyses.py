@@ -25,7 +25,7 @@ def analyse(
     chosen: Array | None = None,
     *,
     states: bool = False,
-    bent: bool = True,
+    order: int = 2,
 ) -> Modes:
     """Eigen-analyses with derivatives at unit coordinates (S, d), of the integrator.
 
@@ -35,7 +35,7 @@ def analyse(
         unit: Where to analyse, shape (S, d).
         chosen: Indices of the modes wanted; all when None.
         states: Whether to observe the whole state [q; v] in place of the outputs.
-        bent: Whether to differentiate twice.
+        order: Highest order of derivatives, 0, 1 or 2.
 
     Raises:
         ModalError: The structure has no such modes, or the integrator mixes them.
@@ -46,12 +46,15 @@ def analyse(
             " take the absolute ones, a1 …"
         )
     points = boxes.to_physical(unit)
-    matrices, rows = evaluate(flow.system, flow.names, points, derivatives=True, bent=bent)
+    depth = {"derivatives": order > 0, "bent": order > 1}
+    matrices, rows = evaluate(flow.system, flow.names, points, **depth)
     if states:
         size = rows.value.shape[-1]
         rows = rows.like(np.broadcast_to(np.eye(size), (len(unit), size, size)))
     found = modes(matrices, rows, chosen)
     rate = _discrete(found.eigenvalue, flow)
+    if not order:
+        return Modes(rate, found.coefficient, found.load, found.of)
     return Modes(
         boxes.in_unit(rate), boxes.in_unit(found.coefficient), boxes.in_unit(found.load), found.of
     )

@@ -77,20 +77,22 @@ class ExactResponse:
 
     def value_at(self, unit: Array, node: Rows, output: Rows) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
-        return self._sloped(unit, node, output)[0]
+        return self._sloped(unit, node, output, 0)[0]
 
     def at(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array, Array]:
         """Values (N,) and gradients (N, d), exact; Hessians (N, d, d) of the polynomials, or 0."""
-        f, g = self._sloped(unit, node, output)
+        f, g = self._sloped(unit, node, output, 1)
         if self.bent:
             return f, g, self.model.at(unit, node, output)[2]
         return f, g, np.zeros((*unit.shape, unit.shape[1]))
 
-    def _sloped(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
+    def _sloped(self, unit: Array, node: Rows, output: Rows, order: int) -> tuple[Array, Array]:
         f, g = np.empty(len(unit)), np.empty(unit.shape)
         for rows, points, own in pieces(unit):
-            modes = analyse(self.model.flow, self.model.boxes, points, bent=False)
-            f[rows], g[rows] = self._of(modes, own, node[rows], output[rows])
+            modes = analyse(self.model.flow, self.model.boxes, points, order=order)
+            f[rows], slope = self._of(modes, own, node[rows], output[rows])
+            if order:
+                g[rows] = slope
         return f, g
 
     def _of(self, modes: Modes, own: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:

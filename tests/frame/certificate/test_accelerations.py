@@ -65,13 +65,3 @@ def test_the_damping_force_over_a_mass_is_bounded_closely() -> None:
         reached = np.maximum(reached, np.linalg.norm(root / np.sqrt(np.diag(M)), axis=1))
     assert (reached <= bound).all()
     assert (bound < 3 * reached).all()
-
-
-def test_why_accelerations_are_not_proved_is_told() -> None:
-    frame = StoreyFrame(
-        (1e4, 1e4), stiffness=(1e6, 1e6), damping_ratio=(0.03, 0.05), q0=(0.01, 0), outputs=("a1",)
-    )
-    found = envelope(frame, {"k1": Interval(9e5, 11e5)}, duration=0.4, step=0.05, alpha=(0,))
-    assert found.nature == "estimated"
-    assert found.error is not None
-    assert "damping ratio for each mode" in str(found.facts["unproved"])

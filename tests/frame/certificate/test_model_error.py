@@ -20,7 +20,6 @@ from alphacut.frame import (
     MatrixStructure,
     Midpoint,
     StoreyFrame,
-    envelope,
 )
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
@@ -149,17 +148,6 @@ def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(squared, root) -> No
     assert 1 - 1e-9 <= bound / true <= 1.8
 
 
-def test_a_damping_ratio_is_proved_under_a_record() -> None:
-    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
-    damped = replace(SHAKEN, damping_ratio=0.03, dampers=())
-    found = envelope(damped, inputs, duration=5, step=0.1, relative=True, tolerance=1e-3)
-    assert found.nature == "guaranteed"
-    ratios = replace(damped, damping_ratio=(0.03, 0.04, 0.05))
-    other = envelope(ratios, inputs, duration=5, step=0.1, relative=True, tolerance=1e-3)
-    assert other.nature == "estimated"
-    assert "for each mode" in str(other.facts["unproved"])
-
-
 def stretched(polynomial: Polynomial) -> Polynomial:
     """The same with its constant and its first slope a thousandth too large."""
     coefficients = polynomial.coefficients.copy()
@@ -219,30 +207,6 @@ def test_structures_that_may_gain_energy_or_are_no_polynomials_are_refused() -> 
         degrees(object(), box)  # type: ignore[arg-type]
 
 
-def test_certificate_says_why_it_is_only_sampled() -> None:
-    inputs = {"m": Interval(1.9, 2.1), "k": Interval(75, 85)}
-    stretched = replace(
-        CHAIN,
-        stiffness=[(lambda p: p["k"], np.array([[2.0, -1.0], [-1.0, 1.0]])), (3.0, np.eye(2))],
-    )
-    proved, sampled = (
-        envelope(s, inputs, duration=4, step=0.5, alpha=(0,), method="modal", certify=1e-4)
-        for s in (CHAIN, stretched)
-    )
-    assert proved.nature == "guaranteed"
-    assert "energy" in str(proved.facts["proof"])
-    assert sampled.nature == "verified by sampling"
-    assert sampled.facts["unproved"] in sampled.facts["proof"]
-    assert "stiffness has a factor that is a function" in str(sampled.facts["proof"])
-    assert np.abs(proved.upper - sampled.upper).max() < 1e-4
-
-
-def test_no_certificate_of_a_scheme_that_is_not_the_motion() -> None:
-    inputs, way = {"k": Interval(75, 85)}, {"duration": 4, "step": 0.5, "method": "modal"}
-    with pytest.raises(ValueError, match="integrator 'midpoint' nothing is proved"):
-        envelope(CHAIN, inputs, certify=1e-4, integrator="midpoint", **way)
-
-
 @pytest.mark.parametrize(("lower", "upper"), [(3.96, 4.04), (3.0, 5.0), (1.0, 4.0)])
 def test_degree_of_the_inverse_cube_reaches_round_off_and_not_far_beyond(lower, upper) -> None:
     degree = inverse_cube_degree(lower, upper)
@@ -282,42 +246,6 @@ def test_comparison_holds_over_the_box() -> None:
             and np.sqrt(y @ np.linalg.solve(A, y)) <= found.sup_dual(y[None])
             for y in x
         )
-
-
-def test_gap_is_shared_out_by_the_size_of_outputs_with_other_units() -> None:
-    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
-    both = replace(FRAME, outputs=("q3", "base_shear"))
-    found = envelope(both, inputs, duration=2, step=0.25, alpha=(0,), method="modal", certify=1e-5)
-    assert found.nature == "guaranteed"
-    assert found.inner_upper is not None
-    length, force = (found.upper - found.inner_upper)[0].max(0)
-    ratio = np.abs(found.upper[0, :, 1]).max() / np.abs(found.upper[0, :, 0]).max()
-    assert 1e-6 < length <= 1e-5
-    assert 1e-6 * ratio < force < 2e-5 * ratio
-
-
-def test_what_branch_and_bound_does_not_cover_is_refused_at_once() -> None:
-    seven = {name: Interval(0.99 * x, 1.01 * x) for name, x in list(FRAME.parameters.items())[:7]}
-    with pytest.raises(ValueError, match="7 uncertain parameters"):
-        envelope(FRAME, seven, duration=2, step=0.1, alpha=(0,), method="modal", certify=1e-5)
-
-
-def test_envelope_under_a_record_is_certified_and_contains_every_trajectory() -> None:
-    inputs = {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}
-    shaken = replace(SHAKEN, outputs=("q3", "base_shear"))
-    found = envelope(
-        shaken, inputs, duration=5, step=0.05, alpha=(0,), method="modal", certify=1e-5
-    )
-    assert found.nature == "guaranteed"
-    assert float(found.facts["gap"]) <= 1e-5
-    flow = LinearFlow(shaken, tuple(inputs), 5, 0.05, Exact())
-    low, high = np.array([number.cut(0) for number in inputs.values()]).T
-    share = np.vstack(
-        [np.random.default_rng(4).random((1500, 2)), [[0, 0], [0, 1], [1, 0], [1, 1]]]
-    )
-    values = flow.values(low + (high - low) * share)
-    assert (values <= found.upper[0]).all()
-    assert (values >= found.lower[0]).all()
 
 
 def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:

@@ -138,7 +138,7 @@ def test_certificates_at_several_steps_agree_and_hold_under_a_cut_record() -> No
     )
     inputs = {"E": Interval(24e9, 26e9), "m1": Interval(1.9e3, 2.1e3)}
     found = [
-        envelope(frame, inputs, duration=4, step=h, alpha=(0,), method="modal", certify=1e-5)
+        envelope(frame, inputs, duration=4, step=h, alpha=(0,), method="proof", gap=1e-5)
         for h in (0.2, 0.08, 0.05)
     ]
     times = [np.round(e.time, 9) for e in found]

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import evaluate, frequencies
-from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame(
     (2e4, 1e4, 5e3), (2.5, 2.7, 2.7), 25e9, 1e-6, q0=(0.01, 0.03, 0.08), v0=(0, -0.5, -0.5)
@@ -163,18 +162,6 @@ def test_modal_superposition_gives_the_same_motion(record):
     truth = modal @ shape.T
     mine = LinearFlow(model, ("E",), 5, 0.05, Exact()).values(np.array([[FRAME.modulus]]))[0]
     assert np.abs(mine - truth).max() < (1e-3 if record else 1e-10) * np.abs(truth).max()
-
-
-def test_envelopes_with_a_fuzzy_ratio_contain_its_trajectories():
-    model = replace(FRAME, damping_ratio=0.05)
-    inputs = {"E": Triangular(24e9, 25e9, 26e9), "zeta": Triangular(0.03, 0.05, 0.08)}
-    found = envelope(model, inputs, duration=8, step=0.05, alpha=(0, 1), tolerance=1e-6)
-    assert found.method == "modal"
-    points = np.random.default_rng(1).uniform([24e9, 0.03], [26e9, 0.08], (2000, 2))
-    values = LinearFlow(model, ("E", "zeta"), 8, 0.05, Exact()).values(points)
-    assert (values.max(0) - found.upper[0]).max() < 2e-6
-    assert (found.lower[0] - values.min(0)).max() < 2e-6
-    assert (found.upper[0] - values.max(0)).max() < 0.02  # and no wider than they are
 
 
 def test_group_and_messages():

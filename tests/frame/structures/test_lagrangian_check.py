@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from alphacut.frame import LagrangianSystem, envelope
-from alphacut.frame.calculus.jet import exp
+from alphacut.frame import LagrangianSystem
 from alphacut.frame.structures import matrix
-from alphacut.fuzzy import Interval
 
 GIVEN: dict[str, Any] = {
     "coordinates": 1,
@@ -81,42 +79,6 @@ GIVEN: dict[str, Any] = {
 def test_functions_that_cannot_be_meant(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         LagrangianSystem(**{**GIVEN, **changes})
-
-
-def test_an_integrator_of_linear_structures_is_refused_with_those_that_go() -> None:
-    with pytest.raises(
-        ValueError,
-        match=(
-            "'exact' is unknown to a general Lagrangian system; known are midpoint,"
-            " composition4, rk4"
-        ),
-    ):
-        envelope(
-            LagrangianSystem(**GIVEN),
-            {"k": Interval(1, 2)},
-            duration=1.0,
-            step=0.1,
-            integrator="exact",
-        )
-
-
-def test_smooth_functions_beyond_arithmetic_go() -> None:
-    import sympy
-
-    system = LagrangianSystem(
-        **{
-            **GIVEN,
-            "lagrangian": lambda q, v, p: (
-                p["m"] * v[0] ** 2 / 2
-                - p["k"] * (exp(q[0]) - q[0])
-                - sympy.log(1 + q[0] ** 2) ** 1.5
-            ),
-        }
-    )
-    found = envelope(
-        system, {"k": Interval(1, 2)}, duration=1.0, step=0.1, alpha=(0,), method="vertex"
-    )
-    assert np.isfinite(found.upper).all()
 
 
 @pytest.mark.parametrize("file", ["lagrangian_check.py", "lagrangian.py", "matrix.py"])

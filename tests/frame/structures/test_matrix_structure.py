@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
-from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame, envelope
-from alphacut.fuzzy import Crisp, Triangular
+from alphacut.frame import Exact, LinearFlow, MatrixStructure, StoreyFrame
 
 STOREY = StoreyFrame(
     (3.0, 2.0),
@@ -47,15 +45,6 @@ def test_matrices_and_storeys_give_the_same_trajectories_with_derivatives() -> N
             np.abs(getattr(a, part) - getattr(b, part)).max()
             < 1e-11 * np.abs(getattr(b, part)).max()
         )
-
-
-def test_envelope_of_given_matrices() -> None:
-    inputs = {"E": Triangular(4.8, 5, 5.2), "m1": Triangular(2.9, 3, 3.1)}
-    a, b = (
-        envelope(system, inputs, duration=4, step=0.1, alpha=(0,), method="modal")
-        for system in (MATRIX, STOREY)
-    )
-    assert np.abs(a.upper - b.upper).max() < 1e-6
 
 
 def test_matrices_that_do_not_fit_are_refused() -> None:
@@ -96,30 +85,6 @@ def test_arrays_that_are_not_symmetric_are_refused(kind: str) -> None:
     even = lower - np.diag([1.0 + 1e-12], 1)
     taken = getattr(replace(MATRIX, **{kind: [(1.0, even)]}), kind)[0][1]
     assert (taken == taken.T).all()
-
-
-@pytest.mark.parametrize(
-    ("kind", "least"), [("stiffness", "-1"), ("damping", "-0.1")], ids=["stiffness", "damping"]
-)
-def test_motions_that_may_grow_are_warned_of(kind: str, least: str) -> None:
-    changed = replace(MATRIX, **{kind: [("m1", np.diag([float(least) / 3, 1.0]))]})
-    told = rf"{kind}: the matrix has the negative eigenvalue {least} beside 3 at E = [^,]*, m1 = 3,"
-    inputs = {"E": Triangular(4.8, 5, 5.2), "m1": Crisp(3.0)}
-    asked = {"duration": 0.6, "step": 0.01, "alpha": (0,), "method": "vertex"}
-    with pytest.warns(UserWarning, match=told) as seen:
-        envelope(changed, inputs, **asked)
-    assert len(seen) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        envelope(MATRIX, inputs, **asked)
-
-
-@pytest.mark.parametrize(
-    "model", [replace(STOREY, q0=(), v0=()), replace(MATRIX, q0=None, v0=None)]
-)
-def test_a_structure_at_rest_is_refused(model: Any) -> None:
-    with pytest.raises(ValueError, match=r"nothing moves the structure: .*; give q0 or v0"):
-        envelope(model, {"E": Triangular(4.8, 5, 5.2)}, duration=0.2, step=0.1)
 
 
 def test_the_odd_one_among_arrays_is_named() -> None:

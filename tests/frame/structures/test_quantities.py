@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import MatrixStructure, Output, StoreyFrame, envelope, pendulum
+from alphacut.frame import Output, StoreyFrame
 from alphacut.frame.structures.quantities import OF_STOREY_FRAME, of_storey_frame
-from alphacut.fuzzy import Triangular
 
 FRAME = StoreyFrame((1.0, 2.0), (1.0, 1.0), 1.0, 1.0, q0=(1.0, 0.0))
 
@@ -36,21 +35,6 @@ def test_a_given_unit_goes_along_with_the_name() -> None:
         "displacement of floor 12 (q12)",
         "base shear",
     )
-
-
-def test_every_structure_gives_units_of_its_outputs() -> None:
-    eye = np.eye(2)
-    rows = {Output("turn", "rad"): np.array([1.0, 0.0]), "q2": np.array([0.0, 1.0])}
-    matrix = MatrixStructure(
-        parameters={"k": 1.0}, mass=[(1.0, eye)], stiffness=[("k", eye)], observed=rows, q0=[1, 0]
-    )
-    assert [name.unit for name in matrix.outputs] == ["rad", "m"]
-    assert [name.unit for name in pendulum().outputs] == ["N", "rad"]
-    assert [name.unit for name in replace(FRAME, outputs=("a1", "q2")).outputs] == ["m/s^2", "m"]
-    inputs = {"k": Triangular(0.9, 1.0, 1.1)}
-    found = envelope(matrix, inputs, duration=1.0, step=0.1, alpha=(0,), method="vertex")
-    assert "rad" in repr(found)
-    assert found.to_dataset()["lower"].attrs["units"] == "SI, by output"
 
 
 @pytest.mark.parametrize("kind", OF_STOREY_FRAME)

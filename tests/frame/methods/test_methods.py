@@ -1,0 +1,224 @@
+"""Every method keeps what its nature promises, on structures of all kinds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut import frame
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.result import Nature
+
+FRAME = StoreyFrame(
+    (20e3, 15e3, 10e3),
+    (4.0, 3.5, 3.0),
+    25e9,
+    1e-4,
+    (9e3, 5e3, 0.0),
+    q0=(0.1, 0.2, 0.25),
+    v0=(0.0, 0.5, 0.0),
+    outputs=("q3", "v1", "drift2", "base_shear"),
+)
+RECORD = Accelerogram(0.05, 3 * np.random.default_rng(8).standard_normal(120))
+SHAKEN = replace(FRAME, ground=RECORD, damping_ratio=0.03, dampers=(), outputs=("q3", "a3", "ar1"))
+CHAIN = MatrixStructure(
+    {"m": 2.0, "k": 80.0, "zeta": 0.04},
+    [("m", np.eye(2))],
+    [("k", np.array([[2.0, -1.0], [-1.0, 1.0]]))],
+    {"top": np.array([0.0, 1.0])},
+    q0=np.array([0.0, 0.1]),
+    ratios=["zeta"],
+)
+COLUMNS = StoreyFrame((2e4,) * 2, (3.0,) * 2, 25e9, 1e-4, q0=(0.02, 0.03), columns=(4, 4))
+KINDS = {
+    "dampers": (FRAME, {"E": Triangular(24e9, 25e9, 26e9), "m2": Interval(14e3, 16e3)}),
+    "record": (SHAKEN, {"E": Triangular(24e9, 25e9, 26e9), "m1": Triangular(19e3, 20e3, 21e3)}),
+    "matrices": (CHAIN, {"k": Triangular(75, 80, 85), "zeta": Triangular(0.02, 0.04, 0.05)}),
+    "columns": (COLUMNS, {"c1": Interval(3.8, 4.2), "l2": Triangular(2.9, 3.0, 3.1)}),
+}
+MOTION = {"duration": 4.0, "step": 0.05, "alpha": (0, 0.5, 1), "relative": True, "progress": False}
+
+
+def trajectories(system, inputs, points, step=0.05, duration=4.0):
+    """Exact motions, relative to the ground where outputs are, at the nodes of `MOTION`."""
+    flow = frame.LinearFlow(system, tuple(inputs), duration, step, frame.Exact())
+    return flow.values(points)
+
+
+def drawn(inputs, alpha, count=600):
+    """Random points of a cut, and its corners."""
+    low, high = np.array([number.cut(alpha) for number in inputs.values()]).T
+    share = np.random.default_rng(4).random((count, len(inputs)))
+    corners = np.array(np.meshgrid(*[(0, 1)] * len(inputs))).reshape(len(inputs), -1).T
+    return low + (high - low) * np.vstack([share, corners])
+
+
+def attained(found, system, inputs):
+    """Largest distance of stated from true values at the points given, of some nodes."""
+    worst, rng = 0.0, np.random.default_rng(2)
+    of = found.inner or found
+    for node in rng.integers(len(found.time), size=5):
+        for k in range(len(found.outputs)):
+            for value, at in ((of.lower, found.lower_at), (of.upper, found.upper_at)):
+                true = trajectories(system, inputs, at[:, node, k])[:, node, k]
+                worst = max(worst, np.abs(true - value[:, node, k]).max())
+    return worst
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(kind):
+    system, inputs = KINDS[kind]
+    found = envelope(system, inputs, method=frame.Proof(tolerance=1e-4), **MOTION)
+    peak = np.abs(found.upper).max((0, 1))
+    assert found.nature is Nature.GUARANTEED
+    assert (found.error.max((0, 1)) <= 1e-4 * peak * 1.3).all()
+    assert attained(found, system, inputs) <= 1e-4 * peak.max()
+    for level, alpha in enumerate(found.alpha):
+        values = trajectories(system, inputs, drawn(inputs, alpha))
+        assert (values <= found.upper[level] + 1e-12 * peak).all()
+        assert (values >= found.lower[level] - 1e-12 * peak).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_happens_between_nodes_is_in_the_bound_of_that(kind):
+    system, inputs = KINDS[kind]
+    found = envelope(system, inputs, method=frame.Proof(tolerance=1e-3), **MOTION)
+    fine = trajectories(system, inputs, drawn(inputs, 0.0, 60), step=0.005)
+    ends = np.maximum(found.upper[0, 1:], found.upper[0, :-1]) + found.between[1:]
+    top = fine[:, 1:].reshape(len(fine), -1, 10, len(found.outputs)).max((0, 2))
+    assert (top <= ends + 1e-9).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_search_attains_its_bounds_and_its_error_covers_the_proof(kind):
+    system, inputs = KINDS[kind]
+    proof = envelope(system, inputs, method=frame.Proof(tolerance=1e-6), **MOTION)
+    found = envelope(system, inputs, method=frame.Search(1e-4), **MOTION)
+    peak = np.abs(proof.upper).max((0, 1))
+    assert found.nature is Nature.ESTIMATED
+    assert attained(found, system, inputs) <= 1e-9 * peak.max()
+    assert (found.upper <= proof.upper + 1e-9 * peak).all()
+    assert (found.upper + found.error >= proof.inner.upper - 1e-9 * peak).all()
+    assert (found.lower - found.error <= proof.inner.lower + 1e-9 * peak).all()
+    assert (found.error.max((0, 1)) <= 5e-3 * peak).all()
+
+
+@pytest.mark.parametrize("method", [frame.GraphFollower(tolerance=1e-3),
+                                    frame.GraphFollower(order=1, tolerance=1e-3),
+                                    frame.ImprovedFollower(tolerance=1e-3)], ids=repr)  # fmt: skip
+@pytest.mark.parametrize("kind", ["dampers", "matrices"])
+def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(kind, method):
+    system, inputs = KINDS[kind]
+    proof = envelope(system, inputs, method=frame.Proof(tolerance=1e-5), **MOTION)
+    found = envelope(system, inputs, method=method, **MOTION)
+    assert found.nature is Nature.ESTIMATED
+    off = np.maximum(np.abs(found.upper - proof.upper), np.abs(found.lower - proof.lower))
+    assert (off <= found.error + proof.error).mean() > 0.995
+    both = frame.beside(found, proof)
+    assert (both.attained.upper <= both.proved.upper + 1e-9).all()
+    wrong = replace(proof, lower=proof.lower / 2, upper=proof.upper / 2, inner=None)
+    with pytest.raises(FailedError, match="outside the proved ones"):
+        frame.beside(found, wrong)
+
+
+def test_a_wide_box_is_proved_in_parts_where_the_degree_is_limited():
+    inputs = {"k": Interval(40, 120)}
+    found = envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2, budget=14), **MOTION)
+    assert found.facts["parts"] > 1
+    values = trajectories(CHAIN, inputs, drawn(inputs, 0.0, 4000))
+    assert (values <= found.upper[0]).all()
+    assert (values >= found.lower[0]).all()
+    assert found.error.max() <= 1.1e-2 * np.abs(found.upper).max()
+    with pytest.raises(UnprovedError, match="too much of the gap"):
+        envelope(CHAIN, inputs, method=frame.Proof(tolerance=1e-2, budget=14, parts=1), **MOTION)
+
+
+def test_auto_takes_the_proof_else_the_search_else_the_follower_and_says_why():
+    each = replace(CHAIN, ratios=["zeta", 0.03])
+    two = {"k": Interval(78, 82)}
+    many = {name: Interval(0.995 * x, 1.005 * x) for name, x in [*FRAME.parameters.items()][:8]}
+    swing = {"l": Interval(0.99, 1.01)}
+    cases = (
+        (CHAIN, two, Nature.GUARANTEED, "proof"),
+        (each, two, Nature.ESTIMATED, "search; unproved: a damping ratio for each mode"),
+        (FRAME, many, Nature.ESTIMATED, "search; unproved: proofs are affordable up to 6"),
+        (frame.pendulum(), swing, Nature.ESTIMATED, "improved-graph-follower: not linear"),
+    )
+    for system, inputs, nature, why in cases:
+        found = envelope(system, inputs, method="auto", tolerance=1e-3, **{**MOTION, "step": 0.02})
+        assert found.nature is nature
+        assert found.notes[0].startswith(why)
+
+
+def test_more_inputs_than_a_proof_takes_are_searched_to_their_error():
+    """Against what Newton's method on exact motions reaches from a thousand starts of its own."""
+    names = ["k1", "k2", "k3", "m1", "m2", "m3", "zeta"]
+    system = StoreyFrame(
+        (2e4,) * 3, stiffness=(8e6,) * 3, damping_ratio=0.03, q0=(0.01, 0.02, 0.03)
+    )
+    inputs = {x: Interval(0.9 * system.parameters[x], 1.1 * system.parameters[x]) for x in names}
+    found = envelope(system, inputs, method=frame.Search(1e-3), **{**MOTION, "alpha": (0,)})
+    values = trajectories(system, inputs, drawn(inputs, 0.0, 20_000))
+    assert (values <= found.upper[0] + found.error[0]).all()
+    corners = values[-(2 ** len(names)) :]
+    assert (corners <= found.upper[0] + found.error[0]).all()
+    assert found.error.max() <= 1e-2 * np.abs(found.upper).max()
+
+
+def test_a_pendulum_is_followed_to_its_error():
+    system = frame.pendulum()
+    inputs = {"l": Triangular(0.95, 1, 1.05), "phi_0": Triangular(1.4, 1.5, 1.6)}
+    motion = {**MOTION, "relative": False, "step": 0.01, "duration": 5.0}
+    found = envelope(system, inputs, method=frame.ImprovedFollower(1e-2), **motion)
+    flow = frame.LagrangianFlow(system, tuple(inputs), 5.0, 0.01)
+    values = flow.values(drawn(inputs, 0.0, 2000))
+    assert (values <= found.upper[0] + found.error[0]).all()
+    assert (values >= found.lower[0] - found.error[0]).all()
+    off = np.maximum(found.upper[0] - values.max(0), values.min(0) - found.lower[0])
+    assert off.max() <= 0.05 * np.abs(found.upper).max()
+
+
+def test_where_neighbouring_motions_part_bounds_are_attained_and_no_more():
+    def lagrangian(q, v, p):
+        return p["m"] * v[0] ** 2 / 2 + p["k"] * q[0] ** 2 / 2 - q[0] ** 4 / 4
+
+    well = frame.LagrangianSystem(
+        1,
+        {"m": 1.0, "k": 1.0, "x": 0.0},
+        lagrangian,
+        lambda p: ([p["x"]], [0 * p["x"]]),
+        {"q": lambda q, v, p: q[0]},
+    )
+    found = envelope(well, {"x": Interval(-0.1, 0.1)}, duration=8, step=0.02, alpha=(0,))
+    assert found.nature is Nature.ATTAINED
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"method": frame.Proof(tolerance=1e-3), "integrator": "midpoint"}, "midpoint"),
+        ({"method": "vertex"}, "method is vertex; allowed: auto, proof"),
+        ({"method": "proof", "order": 2}, "option of proof is order; allowed: gap, tolerance"),
+        ({"method": "auto", "tolerance": 0.0}, "tolerance is 0.0; allowed: a positive number"),
+        ({"method": frame.Auto(), "seed": 1}, "none beside a method that is no name"),
+        ({"integrator": "euler"}, "integrator is euler; allowed: midpoint, rk4, exact"),
+        ({"integrator": "rk4", "step": 1.0}, "at most 0.1"),
+        ({"step": 0.07}, "duration is 4 s; allowed: 1 to .* whole steps of 0.07 s"),
+        ({"alpha": (1.0, 0.0)}, "levels that rise within"),
+        ({"inputs": {}}, "fuzzy numbers by name"),
+        ({"inputs": {"E": Interval(-1e9, 26e9)}}, "support of E is .*; allowed: positive"),
+        ({"inputs": {"E": Interval(24, 26)}}, "give both in SI units"),
+        ({"inputs": {"zeta": Interval(0.01, 1.0)}}, "zeta"),
+        ({"model": 5}, "model is int; allowed: a StoreyFrame"),
+        ({"model": replace(FRAME, q0=(), v0=())}, "a start or a record that moves something"),
+    ],
+)  # fmt: skip
+def test_what_has_no_meaning_is_refused(changes, message):
+    call = {**MOTION, "inputs": {"E": Interval(24e9, 26e9)}, "model": FRAME, **changes}
+    with pytest.raises((RefusedError, FailedError, ValueError), match=message):
+        envelope(call.pop("model"), call.pop("inputs"), **call)
