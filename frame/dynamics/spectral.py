@@ -1,7 +1,8 @@
 """Exact propagator by eigenvalues: every mode runs on its own.
 
 Each mode's answer to the ground is R(t; λ) = ∫ exp(λ (t − s)) a(s) ds, a recursion in time. Powers
-of the whole transfer matrix are never formed, and overdamped modes are as good as others: all 2n eigenvalues are kept.
+of the whole transfer matrix are never formed, and overdamped modes are as good as others: all 2n
+eigenvalues are kept.
 """
 
 from __future__ import annotations
