@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-from scipy.signal import oaconvolve
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
@@ -97,6 +96,8 @@ def _convolved(kernel: Array, size: Array) -> Array:
         kernel: Its maxima over the intervals, shape (…, J, n).
         size: ∫ |a| over them, shape (J,).
     """
+    from scipy.signal import oaconvolve  # which takes time to import
+
     count = len(size)
     record = size.reshape((1,) * (kernel.ndim - 2) + (-1, 1))
     whole = oaconvolve(kernel, record, axes=-2)[..., :count, :]
