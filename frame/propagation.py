@@ -17,6 +17,7 @@ from alphacut.frame.checks.step_error import (
     step_error_at_bounds,
     with_step_error,
 )
+from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -143,7 +144,7 @@ def _flow(
 def _integrator(value: str | Integrator | None, way: Method) -> Integrator:
     """The time stepping of a linear structure."""
     if value is None:
-        return Exact() if isinstance(way, Auto | Proof | Search) else Midpoint()
+        return Exact() if isinstance(way, Auto | Proof | DualProof | Search) else Midpoint()
     if not isinstance(value, str):
         return value
     if value not in INTEGRATORS:

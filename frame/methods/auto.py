@@ -1,4 +1,7 @@
-"""Auto: the proof; where there is none, the search; where there is none either, the follower."""
+"""Auto: the proof; where there is none, the search; where there is none either, the follower.
+
+With more than six fuzzy inputs the proof is the dual bound, whose gap is what it states.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.certificate.remainder import MOST_PARAMETERS
+from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.improved_follower import ImprovedFollower
@@ -46,9 +51,13 @@ class Auto:
         if not isinstance(flow.flow, LinearFlow):
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
         stage(progress, "proof")
-        try:
+        many = len(flow.boxes.names) > MOST_PARAMETERS
+        proof: Proof | DualProof = DualProof(workers=self.workers)
+        if not many:
             proof = Proof(tolerance=self.tolerance, patient=False, workers=self.workers)
-            return _noted(proof.run(flow, progress), "proof: the structure is linear")
+        try:
+            why = "dual: many inputs" if many else "proof: the structure is linear"
+            return _noted(proof.run(flow, progress), why)
         except (UnprovedError, ModalError) as error:
             why = f"unproved: {error}"
         stage(progress, f"search ({why})")

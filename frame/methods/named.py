@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any, ClassVar, Protocol
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.graph_follower import GraphFollower
@@ -28,7 +29,7 @@ class Method(Protocol):
 
 
 METHODS: dict[str, type[Any]] = {
-    x.name: x for x in (Auto, Proof, Search, GraphFollower, ImprovedFollower, Sampled)
+    x.name: x for x in (Auto, Proof, DualProof, Search, GraphFollower, ImprovedFollower, Sampled)
 }
 
 

@@ -1,0 +1,311 @@
+"""Eigenpairs K x = λ M x over the whole box, with proved bounds of what their expansions miss.
+
+In coordinates in which the middle of the box has M = I and K = diag λ, perturbation theory gives
+polynomials λ̃_k(u) and x̃_k(u) of some degree N, x̃_k with 1 in entry k. They need no proof;
+what they miss, R = K x̃ − λ̃ M x̃, has parts of higher degree alone, and is bounded over the box
+by the sums of magnitudes of coefficients. An eigenvector x = x̃ + y with y_k = 0 obeys, o being
+all entries but k,
+
+    T y = −R_o + δ (M x̃)_o,   δ = (x̃·R + R_o·y) / (x̃·M x̃ + (M x̃)_o·y),   T = (K − (λ̃ + δ) M)_oo.
+
+1. T is bounded away from singular: its diagonal from zero as expansions of K_jj − λ̃ M_jj, in
+   which what moves all frequencies alike cancels, so that with the bounds of the others it is an
+   M-matrix.
+2. Where bounds |y| ≤ Y and |δ| ≤ L give themselves back through these equations, Brouwer's
+   theorem gives an eigenpair there, at every u of the box.
+3. T keeps its k − 1 negative eigenvalues over the box and over |δ| ≤ L, since it is nowhere
+   singular; the determinant of K − λ M over that of T falls with λ. So this is the only
+   eigenvalue there, and the k-th from below, whatever the others do.
+
+Modes that cannot be enclosed so are left in a group, which is known by what all modes are
+together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from scipy.linalg import eigh
+
+from alphacut.frame.dual import homogeneous
+from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, symmetric
+from alphacut.frame.dual.homogeneous import Series, packed, tensor
+from alphacut.frame.dual.structure import Classical, UncoveredError
+from alphacut.fuzzy.arrays import Array
+
+MOST_MONOMIALS = 33_000
+"""Monomials of the series' highest degree, at most."""
+DEGREES = (4, 10)
+"""Least and greatest degree of the series."""
+ROUGH = 0.03
+"""Doubt of λ, as a share of it, above which a mode is better left in the group."""
+ROUNDS = 60
+"""Most rounds in which the bounds of an eigenpair are widened until they hold."""
+REFINED = 8
+"""Rounds that improve bounds of single entries by those of the others."""
+CLOSE = 1e-9
+"""Distance of two λ, as a share of the greatest, below which both modes are left in the group."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """One mode over the box, the k-th by rising frequency.
+
+    Args:
+        squared: λ = ω², one function, in 1/s².
+        shape: x, with 1 in entry k.
+        moved: M x.
+        norm: xᵀ M x, one function.
+    """
+
+    squared: Series
+    shape: Series
+    moved: Series
+    norm: Series
+
+    def cut(self, degree: int) -> Mode:
+        """The same to a lower degree."""
+        parts = (self.squared, self.shape, self.moved, self.norm)
+        return Mode(*(part.cut(degree) for part in parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """All modes over the box.
+
+    Args:
+        single: Those that are enclosed one by one, by number from below.
+        basis: Shapes in the middle of the box, shape (n, n): displacements are basis @ x.
+        mass: M in these coordinates, V = (n, n).
+        low: Least λ_k of all modes, shape (n,), in 1/s².
+        high: Greatest.
+    """
+
+    single: dict[int, Mode]
+    basis: Array
+    mass: Expansion
+    low: Array
+    high: Array
+
+
+def modes(structure: Classical) -> Modes:
+    """All modes, each single or left in the group.
+
+    Raises:
+        UncoveredError: The box is so wide that the structure may lose its mass or stiffness.
+    """
+    middle, basis = eigh(structure.stiffness.parts[0], structure.mass.parts[0])
+    mass, stiffness = (_seen(x, basis) for x in (structure.mass, structure.stiffness))
+    heavy, stiff = _form(mass, np.ones(len(middle))), _form(stiffness, middle**-0.5)
+    if not (heavy < 1 and stiff < 1):
+        raise UncoveredError("dual: the structure may lose its stiffness", "take narrower inputs")
+    used = np.flatnonzero(sum(x.parts[1] != 0 for x in (mass, stiffness)).any((0, 1)))
+    of_mass, of_stiffness = (x.on(used) for x in (mass, stiffness))
+    enclosed = {k: _enclosed(k, of_mass, of_stiffness, used) for k in range(len(middle))}
+    single = {
+        k: mode
+        for k, mode in enclosed.items()
+        if mode is not None and mode.squared.rest[0] < ROUGH * middle[k]
+    }
+    low, high = middle * (1 - stiff) / (1 + heavy), middle * (1 + stiff) / (1 - heavy)
+    return Modes(single, basis, mass, low, high)
+
+
+def _seen(matrix: Expansion, basis: Array) -> Expansion:
+    """The symmetric matrix in coordinates `basis`."""
+    parts = tuple(
+        np.einsum("ia,ij...,jb->ab...", basis, part, basis, optimize=True) for part in matrix.parts
+    )
+    return Expansion(parts, np.abs(basis.T) @ matrix.rest @ np.abs(basis))
+
+
+def _form(matrix: Expansion, scale: Array) -> float:
+    """Bound of the norm of a form's variation over the box: that of Σ_α |V_α|, as forms."""
+    weight = scale[:, None] * scale
+    low = sum(_form_norm(part, weight) for part in matrix.parts[1:3])
+    return low + float(np.linalg.norm(weight * (matrix.sizes()[3] + matrix.rest), 2))
+
+
+def _form_norm(part: Array, weight: Array) -> float:
+    """Bound of the norm of weight * Σ_α u^α V_α: that of Σ_α |V_α|, in the order of forms."""
+    each = np.moveaxis(part.reshape(*weight.shape, -1), -1, 0)
+    value, vector = np.linalg.eigh(each[np.abs(each).any((1, 2))] * weight)
+    total = np.einsum("aij,aj,akj->ik", vector, np.abs(value), vector, optimize=True)
+    return float(np.linalg.norm(total, 2))
+
+
+def _series(k: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array], ...]:
+    """Perturbation series of mode k: (Λ − λ₀) x_m = λ_m e_k − what lower degrees have put there.
+
+    Returns:
+        Homogeneous polynomials of degree 0 to N, packed, of λ̃ (monomials, 1), of x̃ and of M x̃.
+    """
+    middle, d = np.diag(stiffness.parts[0]), mass.inner
+    apart = middle - middle[k]
+    apart[k] = np.inf
+    heavy, stiff = ([packed(part, a) for a, part in enumerate(x.parts)] for x in (mass, stiffness))
+    unit = np.eye(len(middle))[k][None]
+    rate, shape, moved = [np.full((1, 1), middle[k])], [unit], [unit]
+    for m in range(1, _degree(d) + 1):
+        lower = range(1, min(m, 3) + 1)
+        of_mass = sum(homogeneous.product(heavy[b], shape[m - b], (b, m - b), d) for b in lower)
+        right = middle[k] * of_mass
+        right -= sum(homogeneous.product(stiff[a], shape[m - a], (a, m - a), d) for a in lower)
+        for a in range(1, m):
+            column = moved[m - a][:, :, None]
+            right += homogeneous.product(column, rate[a], (m - a, a), d)
+        rate.append(-right[:, k : k + 1])
+        shape.append(right / apart)
+        moved.append(of_mass + shape[m])
+    return rate, shape, moved
+
+
+def _degree(d: int) -> int:
+    """The greatest degree whose monomials are affordable."""
+    degree = DEGREES[0]
+    while degree < DEGREES[1] and comb(d + degree, degree + 1) <= MOST_MONOMIALS:
+        degree += 1
+    return degree
+
+
+def _sizes(part: Array) -> Array:
+    """Bounds of polynomials (monomials, …) over the box."""
+    return np.asarray(np.abs(part).sum(0))
+
+
+def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Array) -> Mode | None:
+    """Mode k proved, or None where it is not enclosed."""
+    n = len(mass.rest)
+    middle = np.diag(stiffness.parts[0])
+    if np.abs(np.delete(middle, k) - middle[k]).min(initial=np.inf) <= CLOSE * middle.max():
+        return None
+    rate, shape, moved = _series(k, mass, stiffness)
+    N, o = len(rate) - 1, np.delete(np.arange(n), k)
+    pencil, x = _Pencil.of(rate, mass, stiffness), [_sizes(part) for part in shape]
+    t = pencil.sizes
+    missed = t[-1] @ sum(x) + ROUND_OFF * stiffness.size().max(1)
+    for m in range(1, N + 1):
+        missed = missed + t[m] @ sum((x[j] for j in range(N + 1 - m, N + 1)), np.zeros(n))
+    own = float(missed @ sum(x))
+    of_m = [*mass.sizes(), mass.rest]
+    beyond = of_m[4] @ sum(x)  # what M x̃ has above degree N
+    for b in range(1, 4):
+        beyond = beyond + of_m[b] @ sum((x[j] for j in range(N + 1 - b, N + 1)), np.zeros(n))
+    x_series, moved_series = Series(shape, np.zeros(n), used), Series(moved, beyond, used)
+    norm = (x_series * moved_series).through(np.ones((1, n)))
+    side = sum(_sizes(part) for part in moved) + beyond
+    heavy = mass.size()
+    comparison = _Comparison.of(pencil, np.abs(middle - middle[k]), o)
+    least, L, Y = (
+        float(2 * norm.parts[0][0, 0] - sum(norm.sizes())[0] - norm.rest[0]),
+        0.0,
+        np.zeros(n - 1),
+    )
+    for _ in range(ROUNDS):
+        below = least - float(side[o] @ Y)
+        solved = comparison.solved(missed[o] + L * side[o], L * heavy[np.ix_(o, o)])
+        if solved is None or below <= 0:
+            return None
+        L_new = float(own + missed[o] @ Y) / below
+        if (solved <= Y).all() and L_new <= L:
+            break
+        Y, L = 1.02 * np.maximum(solved, Y), 1.02 * max(L_new, L)
+    else:
+        return None
+    off = np.insert(Y, k, 0.0)
+    wrong = float(2 * side @ off + off @ heavy @ off)
+    return Mode(
+        Series(rate, np.array([L]), used),
+        Series(shape, off, used),
+        Series(moved, beyond + heavy @ off, used),
+        Series(norm.parts, norm.rest + wrong, used),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Comparison:
+    """Bounds of solutions of T y = r by the larger diagonal, or in the norm √Σ D y²; the lesser.
+
+    Args:
+        distance: D = |λ_j − λ_k| in the middle of the box, shape (n − 1,).
+        diagonal: Bound of |T_jj| from below.
+        off: Bounds of |T_jl|, j ≠ l, from above, shape (n − 1, n − 1).
+        turned: Bound of the norm of D^-½ (T − T₀) D^-½.
+    """
+
+    distance: Array
+    diagonal: Array
+    off: Array
+    turned: float
+
+    @classmethod
+    def of(cls, pencil: _Pencil, distance: Array, o: Array) -> _Comparison:
+        total = sum(pencil.sizes[1:])[np.ix_(o, o)]
+        diagonal = distance[o] - np.diag(total)
+        scale = distance[o] ** -0.5
+        turned = sum(pencil.norm(m, o, scale) for m in range(1, len(pencil.sizes)))
+        return cls(distance[o], diagonal, total - np.diag(np.diag(total)), turned)
+
+    def solved(self, right: Array, more: Array) -> Array | None:
+        """Bounds of |y| where |r| ≤ right, T off by `more` besides; None if it may be singular."""
+        scale = self.distance**-0.5
+        known, y = False, np.full(len(right), np.inf)
+        left = 1 - self.turned - float(np.linalg.norm(scale[:, None] * more * scale, 2))
+        if left > 0:
+            known, y = True, scale * np.linalg.norm(scale * right) / left
+        comparison = np.diag(self.diagonal) - self.off - more
+        inverse = np.linalg.inv(comparison)
+        if (inverse >= 0).all():
+            known, y = True, np.minimum(y, inverse @ right)
+        if not known:
+            return None
+        diagonal, off = np.diag(comparison), self.off + more - np.diag(np.diag(more))
+        for _ in range(REFINED):
+            own = (right + off @ y) / np.where(diagonal > 0, diagonal, 1.0)
+            y = np.where(diagonal > 0, np.minimum(y, own), y)
+        return y
+
+
+@dataclass(frozen=True, eq=False)
+class _Pencil:
+    """Parts of K − λ̃ M of degree 1 to N, and all that is left.
+
+    Args:
+        sizes: Bounds of degree 0 (none) to N, and of the rest, each (n, n).
+        parts: Coefficients of degree 1 and 2, in which what moves all frequencies alike cancels.
+    """
+
+    sizes: list[Array]
+    parts: dict[int, Array]
+
+    @classmethod
+    def of(cls, rate: list[Array], mass: Expansion, stiffness: Expansion) -> _Pencil:
+        N = len(rate) - 1
+        size = [float(_sizes(part)[0]) for part in rate]
+        of_k, of_m = ([*x.sizes(), x.rest] for x in (stiffness, mass))
+        out = [np.zeros_like(mass.rest) for _ in range(N + 2)]
+        for m in range(1, 4):
+            out[m] = out[m] + of_k[m]
+        for a in range(N + 1):
+            for b in range(5):
+                place = min(a + b, N + 1) if b < 4 else N + 1
+                if (a, b) != (0, 0):
+                    out[place] = out[place] + size[a] * of_m[b]
+        out[-1] = out[-1] + of_k[4]
+        parts = {}
+        for m in (1, 2):
+            pairs = [
+                np.multiply.outer(mass.parts[m - a], tensor(rate[a][:, 0], mass.inner, a))
+                for a in range(m + 1)
+            ]
+            parts[m] = stiffness.parts[m] - sum(symmetric(pair, m) for pair in pairs)
+            out[m] = np.minimum(out[m], np.abs(parts[m]).sum(tuple(range(2, 2 + m))))
+        return cls(out, parts)
+
+    def norm(self, m: int, o: Array, scale: Array) -> float:
+        """Bound of the norm of one part of the block o, scaled."""
+        block, weight = np.ix_(o, o), scale[:, None] * scale
+        least = float(np.linalg.norm(self.sizes[m][block] * weight, 2))
+        return min(least, _form_norm(self.parts[m][block], weight)) if m in self.parts else least

@@ -1,0 +1,219 @@
+"""Homogeneous polynomials of d variables, packed: one coefficient a monomial.
+
+A monomial u_i u_j … of degree m is a rising list of m variables; its place among all of that
+degree is Σ_k C(i_k + k, k + 1), k = 0 … m − 1. A vector polynomial is an array of shape
+(monomials, n). The sum of magnitudes of its coefficients bounds it over the unit box, and is
+small where terms cancel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations_with_replacement
+from math import comb, factorial
+
+import numpy as np
+from numba import njit
+
+from alphacut.frame.dual.expansion import Expansion
+from alphacut.fuzzy.arrays import Array
+
+MOST = 24
+"""Greatest degree that places are counted for."""
+
+
+@cache
+def monomials(d: int, degree: int) -> Array:
+    """All rising lists of `degree` out of d variables by place, shape (monomials, degree)."""
+    every = list(combinations_with_replacement(range(d), degree))
+    rows = np.array(every, np.int64).reshape(len(every), degree)
+    return rows[np.argsort(places(rows, d))]
+
+
+@cache
+def binomials(d: int) -> Array:
+    """C(i + k, k + 1) for variables i and k, shape (d, MOST)."""
+    return np.array([[comb(i + k, k + 1) for k in range(MOST)] for i in range(d)], np.int64)
+
+
+def places(lists: Array, d: int) -> Array:
+    """Places of rising lists (N, m), shape (N,)."""
+    table = binomials(d)
+    return np.asarray(
+        sum((table[lists[:, k], k] for k in range(lists.shape[1])), np.zeros(len(lists), int))
+    )
+
+
+@njit(cache=True)
+def multiply(a, b, of_a, of_b, table, out):
+    """Adds products: out[monomial of both, i] += a[α, i, j] b[β, j].
+
+    Args:
+        a: Matrix polynomial, shape (monomials, n, l).
+        b: Vector polynomial, shape (monomials, l).
+        of_a: Monomials of a.
+        of_b: Monomials of b.
+        table: `binomials`.
+        out: Vector polynomial, shape (monomials, n).
+    """
+    m, q = of_a.shape[1], of_b.shape[1]
+    n, width = a.shape[1], a.shape[2]
+    for x in range(len(a)):
+        used = False
+        for i in range(n):
+            for j in range(width):
+                used = used or a[x, i, j] != 0.0
+        if not used:
+            continue
+        for y in range(len(b)):
+            place, i, j = 0, 0, 0
+            for k in range(m + q):
+                if j == q or (i < m and of_a[x, i] <= of_b[y, j]):
+                    place += table[of_a[x, i], k]
+                    i += 1
+                else:
+                    place += table[of_b[y, j], k]
+                    j += 1
+            for i in range(n):
+                total = 0.0
+                for j in range(width):
+                    total += a[x, i, j] * b[y, j]
+                out[place, i] += total
+
+
+def product(a: Array, b: Array, degrees: tuple[int, int], d: int) -> Array:
+    """Matrix polynomial (monomials, n, l) times vector polynomial (monomials, l)."""
+    out = np.zeros((comb(d + sum(degrees) - 1, sum(degrees)), a.shape[1]))
+    multiply(a, b, monomials(d, degrees[0]), monomials(d, degrees[1]), binomials(d), out)
+    return out
+
+
+@njit(cache=True)
+def multiply_each(a, b, of_a, of_b, table, out):
+    """Adds products entry by entry: out[monomial of both, i] += a[α, i] b[β, i]."""
+    m, q = of_a.shape[1], of_b.shape[1]
+    for x in range(len(a)):
+        for y in range(len(b)):
+            place, i, j = 0, 0, 0
+            for k in range(m + q):
+                if j == q or (i < m and of_a[x, i] <= of_b[y, j]):
+                    place += table[of_a[x, i], k]
+                    i += 1
+                else:
+                    place += table[of_b[y, j], k]
+                    j += 1
+            for i in range(a.shape[1]):
+                out[place, i] += a[x, i] * b[y, i]
+
+
+def each(a: Array, b: Array, degrees: tuple[int, int], d: int) -> Array:
+    """Products of vector polynomials (monomials, n), or (monomials, 1), entry by entry."""
+    n = max(a.shape[1], b.shape[1])
+    out = np.zeros((comb(d + sum(degrees) - 1, sum(degrees)), n))
+    a, b = (np.ascontiguousarray(np.broadcast_to(x, (len(x), n))) for x in (a, b))
+    multiply_each(a, b, monomials(d, degrees[0]), monomials(d, degrees[1]), binomials(d), out)
+    return out
+
+
+def packed(tensor: Array, degree: int) -> Array:
+    """Coefficients (monomials, …) of a symmetric tensor (…, d, …, d)."""
+    d = tensor.shape[-1] if degree else 1
+    lists = monomials(d, degree)
+    values = tensor[(..., *lists.T)] if degree else tensor[..., None]
+    return np.moveaxis(values * orders(lists), -1, 0)
+
+
+def tensor(coefficients: Array, d: int, degree: int) -> Array:
+    """Symmetric tensor (…, d, …, d) of coefficients (monomials, …)."""
+    if degree == 0:
+        return np.asarray(coefficients[0])
+    lists = monomials(d, degree)
+    every = np.sort(np.indices([d] * degree).reshape(degree, -1).T, axis=1)
+    values = np.moveaxis(coefficients, 0, -1) / orders(lists)
+    return np.asarray(values[..., places(every, d)].reshape(*coefficients.shape[1:], *[d] * degree))
+
+
+def orders(lists: Array) -> Array:
+    """In how many orders each list may be written, shape (N,)."""
+    degree = lists.shape[1]
+    if degree == 0:
+        return np.ones(1)
+    run, repeats = np.ones(len(lists)), np.ones(len(lists))
+    for k in range(1, degree):
+        run = np.where(lists[:, k] == lists[:, k - 1], run + 1, 1.0)
+        repeats = repeats * run
+    return np.asarray(factorial(degree) / repeats)
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A vector of n functions of the box, to a degree N of three or more.
+
+    Args:
+        parts: Homogeneous polynomials of degree 0 to N, packed, shapes (monomials, n).
+        rest: Bound of what they leave out, shape (n,).
+        inputs: Which of all inputs they depend on, shape (d,).
+    """
+
+    parts: list[Array]
+    rest: Array
+    inputs: Array
+
+    def sizes(self) -> list[Array]:
+        """Bounds of the parts over the box, each (n,)."""
+        return [np.asarray(np.abs(part).sum(0)) for part in self.parts]
+
+    def through(self, rows: Array) -> Series:
+        """Rows @ self for numbers `rows` (m, n); what cancels in the sums is not counted."""
+        parts = [np.ascontiguousarray(part @ rows.T) for part in self.parts]
+        return Series(parts, np.abs(rows) @ self.rest, self.inputs)
+
+    def cut(self, degree: int) -> Series:
+        """The same to a lower degree, with the sizes of the others in the rest."""
+        rest = self.rest + sum(self.sizes()[degree + 1 :])
+        return Series(self.parts[: degree + 1], np.asarray(rest), self.inputs)
+
+    def __getitem__(self, which: slice) -> Series:
+        """Some of the functions."""
+        return Series([part[:, which] for part in self.parts], self.rest[which], self.inputs)
+
+    def __mul__(self, other: Series) -> Series:
+        """Products, entry by entry, or with one function."""
+        N, d = len(self.parts) - 1, len(self.inputs)
+        parts = [
+            sum(each(self.parts[i], other.parts[m - i], (i, m - i), d) for i in range(m + 1))
+            for m in range(N + 1)
+        ]
+        s, t = self.sizes(), other.sizes()
+        high = sum(s[i] * sum(t[N + 1 - i :]) for i in range(1, N + 1))
+        rest = high + self.rest * (sum(t) + other.rest) + sum(s) * other.rest
+        return Series(parts, np.asarray(rest), self.inputs)
+
+    def over(self, one: Series) -> Series:
+        """Quotients by one positive function.
+
+        c̃ is the quotient's series, and what c̃ times the function leaves of the dividend is bounded.
+        """
+        N, d = len(self.parts) - 1, len(self.inputs)
+        first, parts = one.parts[0][0], list[Array]()
+        for m in range(N + 1):
+            lower = sum(each(parts[m - j], one.parts[j], (m - j, j), d) for j in range(1, m + 1))
+            parts.append((self.parts[m] - lower) / first)
+        t = one.sizes()
+        least = first - sum(t[1:]) - one.rest
+        if not (least > 0).all():
+            return Series(parts, np.full(len(self.rest), np.inf), self.inputs)
+        sizes = [np.abs(part).sum(0) for part in parts]
+        high = sum(sizes[i] * sum(t[N + 1 - i :]) for i in range(1, N + 1))
+        return Series(parts, (high + self.rest + sum(sizes) * one.rest) / least, self.inputs)
+
+    def expansion(self, d: int) -> Expansion:
+        """The same in all d inputs, to third degree."""
+        own, rest = len(self.inputs), self.rest + sum(self.sizes()[4:])
+        parts = []
+        for m, part in enumerate(self.parts[:4]):
+            whole = np.zeros(part.shape[1:] + (d,) * m)
+            whole[(..., *np.ix_(*[self.inputs] * m))] = tensor(part, own, m)
+            parts.append(whole)
+        return Expansion(tuple(parts), np.asarray(rest))

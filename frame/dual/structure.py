@@ -1,0 +1,197 @@
+"""Structures with classical modes as expansions over the unit box: M(u), K(u), outputs, damping.
+
+Covered is M q̈ + D q̇ + K q = −M ι a(t) with D = a M + b K + 2 M Φ diag(ζ_k ω_k) Φᵀ M, whose
+undamped modes uncouple the motion; what else a structure has is refused with the word why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import singledispatch
+
+import numpy as np
+
+from alphacut.frame.dual.expansion import Expansion, product, stacked
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.matrix import MatrixStructure, Terms
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.arrays import Array
+
+Inputs = Mapping[str, Expansion]
+
+
+class UncoveredError(UnprovedError):
+    """A structure that the dual bound does not cover."""
+
+
+@dataclass(frozen=True, eq=False)
+class Classical:
+    """A structure over a box of d inputs, n unknowns, m outputs.
+
+    Args:
+        mass: M, V = (n, n).
+        stiffness: K, V = (n, n).
+        rows: What outputs take of the displacements, shape (m, n).
+        factor: What they are multiplied by, V = (m,).
+        order: Which derivative of the motion they take it of, shape (m,); of order 2 with the
+            ground's acceleration added.
+        start: Initial displacements and velocities, V = (2, n).
+        pattern: ι, how the unknowns move with the ground, shape (n,).
+        rayleigh: a and b, V = (2,).
+        ratio: ζ_k of the modes by rising frequency, V = (n,).
+    """
+
+    mass: Expansion
+    stiffness: Expansion
+    rows: Array
+    factor: Expansion
+    order: Array
+    start: Expansion
+    pattern: Array
+    rayleigh: Expansion
+    ratio: Expansion
+
+
+@singledispatch
+def classical(system: LinearSystem, p: Inputs) -> Classical:
+    """The structure with all its parameters as expansions, each V = ().
+
+    Raises:
+        UncoveredError: Its modes are not known to be classical.
+    """
+    del p
+    raise UncoveredError(
+        f"dual: a {type(system).__name__} is not covered", "take a StoreyFrame or a MatrixStructure"
+    )
+
+
+@classical.register
+def _(system: StoreyFrame, p: Inputs) -> Classical:
+    n = system.floors
+    links = _springs(system, p)
+    elastic = links - _softening(system, p) if system.gravity else links
+    _refuse_dashpots(system, p)
+    below = np.eye(n) - np.eye(n, k=-1)  # drifts from displacements
+    rows, factor, order = [], [], []
+    for name in system.outputs:
+        kind, z = system._output(name)
+        row = (below if kind in ("drift", "shear") else np.eye(n))[z]
+        rows.append(row)
+        factor.append(links[z] if kind == "shear" else p["rayleigh_mass"] * 0.0 + 1.0)
+        order.append({"v": 1, "a": 2}.get(kind, 0))
+    rayleigh = stacked([p["rayleigh_mass"], p["rayleigh_stiffness"]])
+    start = stacked([_of_floors(system, p, f"{x}{{}}_0") for x in "qv"])
+    ratios = [p[name] for name in system.ratios]
+    return Classical(
+        combined(_of_floors(system, p, "m{}"), np.eye(n)[:, :, None] * np.eye(n)[:, None]),
+        combined(elastic, below[:, :, None] * below[:, None]),
+        np.array(rows),
+        stacked(factor),
+        np.array(order),
+        start,
+        np.ones(n),
+        rayleigh,
+        _of_modes(ratios, n, rayleigh),
+    )
+
+
+@classical.register
+def _(system: MatrixStructure, p: Inputs) -> Classical:
+    if system.damping:
+        raise UncoveredError(
+            "dual: a damping matrix couples the modes", "give damping ratios in its place"
+        )
+    n = system.size
+    nothing = next(iter(p.values())) * 0.0
+    rows = [np.append(row, np.zeros(2 * n - len(row))) for row in system.observed.values()]
+    of_speed = np.array([bool(row[n:].any()) for row in rows])
+    if any(fast and row[:n].any() for fast, row in zip(of_speed, rows, strict=True)):
+        raise UncoveredError(
+            "dual: an output mixes displacements and velocities", "observe them apart"
+        )
+    start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (system.q0, system.v0)]
+    ratios = [nothing + p[x] if isinstance(x, str) else nothing + x for x in system.ratios]
+    factors = stacked([nothing, nothing])
+    return Classical(
+        _total(system.mass, p, n),
+        _total(system.stiffness, p, n),
+        np.array([row[:n] + row[n:] for row in rows]),
+        spread(nothing + 1.0, np.ones(len(rows))),
+        of_speed.astype(int),
+        spread(nothing + 1.0, np.array(start)),
+        np.ones(n) if system.pattern is None else np.asarray(system.pattern, float),
+        factors,
+        _of_modes(ratios, n, factors),
+    )
+
+
+def _of_floors(system: StoreyFrame, p: Inputs, pattern: str) -> Expansion:
+    """Values of all floors, V = (n,), named as `pattern`."""
+    return stacked([p[pattern.format(z + 1)] for z in range(system.floors)])
+
+
+def _springs(system: StoreyFrame, p: Inputs) -> Expansion:
+    """k_z, V = (n,), as given or 12 c E I / l³."""
+    if system.stiffness:
+        return _of_floors(system, p, "k{}")
+    own = _of_floors(system, p, "c{}") * _of_floors(system, p, "l{}") ** -3.0
+    inertia = _of_floors(system, p, "I{}") if len(system.moments) > 1 else stacked([p["I"]])
+    return own * inertia * stacked([p["E"] * 12.0])
+
+
+def _softening(system: StoreyFrame, p: Inputs) -> Expansion:
+    """P_z / l_z of the weight above, V = (n,)."""
+    n = system.floors
+    above = product(
+        Expansion.constant(system.gravity * np.triu(np.ones((n, n))), p["m1"].inner),
+        _of_floors(system, p, "m{}"),
+        "ij,j->i",
+    )
+    return above * _of_floors(system, p, "l{}") ** -1.0
+
+
+def _refuse_dashpots(system: StoreyFrame, p: Inputs) -> None:
+    if any(p[name].size() > 0 for name in system.group("d")):
+        raise UncoveredError(
+            "dual: dashpots couple the modes", "give a damping ratio or Rayleigh's factors"
+        )
+    if system.gravity and p["rayleigh_stiffness"].size() > 0:
+        raise UncoveredError(
+            "dual: Rayleigh's damping by the springs without the weights couples the modes",
+            "give a damping ratio, or leave gravity out",
+        )
+
+
+def _of_modes(ratios: list[Expansion], n: int, like: Expansion) -> Expansion:
+    """ζ_k, V = (n,): one for all, one for each, or none."""
+    each = ratios or [like[0] * 0.0]
+    return stacked(each * n if len(each) == 1 else each)
+
+
+def _total(terms: Terms, p: Inputs, n: int) -> Expansion:
+    """Sum of arrays times factors, V = (n, n)."""
+    out = spread(next(iter(p.values())) * 0.0, np.zeros((n, n)))
+    for factor, array in terms:
+        value = p[factor] if isinstance(factor, str) else factor
+        try:
+            value = factor(p) if callable(factor) else value
+        except (TypeError, AttributeError) as failure:
+            raise UncoveredError(
+                f"dual: a factor is not arithmetic ({failure})", "write it with + − * and powers"
+            ) from None
+        out = out + (spread(value, array) if isinstance(value, Expansion) else value * array)
+    return out
+
+
+def spread(one: Expansion, array: Array) -> Expansion:
+    """One function times an array of numbers, V = the array's shape."""
+    parts = tuple(np.multiply.outer(np.asarray(array, float), part) for part in one.parts)
+    return Expansion(parts, np.multiply.outer(np.abs(array), one.rest))
+
+
+def combined(values: Expansion, arrays: Array) -> Expansion:
+    """Sum of functions V = (e,) times arrays of numbers (e, …)."""
+    parts = tuple(np.tensordot(arrays, part, (0, 0)) for part in values.parts)
+    return Expansion(parts, np.tensordot(np.abs(arrays), values.rest, (0, 0)))

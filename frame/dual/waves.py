@@ -1,0 +1,255 @@
+"""What one oscillator does, over tables of frequency and damping, with the tables' proved error.
+
+An oscillator with decay g and frequency ω (σ = −g + iω) answers a unit of its share by
+
+    load       e = −Im(σ^ν ρ) / ω,   ρ(σ; t) = ∫₀ᵗ exp(σ τ) a(t − τ) dτ,
+    velocity   e = Im(σ^ν exp(σ t)) / ω,
+    start      e = Re(σ^ν exp(σ t)) + (g/ω) Im(σ^ν exp(σ t)),
+
+ν the derivative of the motion that an output takes (ν = 2 under a load: the absolute
+acceleration). All are read off one function G(σ) = σ^ν ρ that is analytic, so one complex
+derivative bounds all real ones. Tables stand on ω × q, q = g/ω; within a cell a function strays
+from the bilinear one through the corners by at most h_ω²/8 sup|∂²e/∂ω²| + h_q²/8 sup|∂²e/∂q²|,
+and these follow from sup |G|, |G'|, |G''|. sup |G''| itself is its largest value at the corners,
+and what it strays between them, which |G''''| bounds; that in turn follows from integrals of τⁿ
+exp(−g τ) |a|.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb, perm
+
+import numba
+import numpy as np
+
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.fuzzy.arrays import Array
+
+TERMS = 40
+"""Terms of a power series in σ h; at |σ h| ≤ `LONGEST` they leave less than round-off."""
+LONGEST = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Responses of oscillators on a grid of W frequencies and Q quotients g/ω at T nodes.
+
+    Args:
+        omega: Frequencies, shape (W,), in rad/s.
+        quotient: g/ω, shape (Q,).
+        value: Responses, shape (T, Q, W).
+        error: What they stray from bilinear interpolation at most, shape (T,).
+        stray: What they stray from straight lines in the step to each node at most, shape (T,).
+    """
+
+    omega: Array
+    quotient: Array
+    value: Array
+    error: Array
+    stray: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A box of ω and q = g/ω with its points."""
+
+    omega: Array
+    quotient: Array
+
+    @property
+    def sigma(self) -> Array:
+        """σ of all points, shape (Q, W)."""
+        return np.asarray((-self.quotient[:, None] + 1j) * self.omega)
+
+
+class Oscillators:
+    """Analytic functions ρ and exp(σ t) on a grid, from which all responses are read."""
+
+    def __init__(self, grid: Grid, ground: Accelerogram | None, time: Array) -> None:
+        self.grid, self.ground, self.time = grid, ground, time
+        sigma = grid.sigma.ravel()
+        self.free = np.exp(sigma * time[:, None])
+        decay = float((grid.quotient[:, None] * grid.omega).min())
+        fade = np.exp(-decay * time)
+        self.free_bounds = np.stack([time**n * fade for n in range(5)])
+        if ground is not None:
+            self.load = loaded(sigma, ground, time)
+            self.load_bounds = absolute_moments(decay, ground, time)
+
+    def waves(self, source: str, order: int) -> Waves:
+        """The response to a unit share of `source`: load, velocity or start."""
+        g = self.grid
+        sigma = g.sigma.ravel()
+        if source == "load":
+            rho, bounds = self.load, self.load_bounds
+        else:
+            t = self.time[:, None]
+            rho, bounds = np.stack([self.free, t * self.free, t * t * self.free]), self.free_bounds
+        G = _with_power(sigma, rho, order)
+        omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
+        if source == "start":
+            value = G[0].real + quotient * G[0].imag
+        else:
+            value = G[0].imag / omega * (-1.0 if source == "load" else 1.0)
+        shape = (len(self.time), len(g.quotient), len(g.omega))
+        error, size = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
+        stray = self._stray(size, source, order)
+        return Waves(g.omega, g.quotient, value.reshape(shape), error, stray)
+
+    def _error(
+        self, largest: Array, bounds: Array, order: int, *, start: bool
+    ) -> tuple[Array, Array]:
+        """What responses stray from bilinear interpolation at most, and sup |G|, each (T,).
+
+        Along ω at constant q, dσ = (−q + i) dω; along q, dσ = −ω dq.
+        """
+        g = self.grid
+        low, high, q = g.omega[0], g.omega[-1], g.quotient[-1]
+        h, k = (np.diff(x).max(initial=0.0) for x in (g.omega, g.quotient))
+        turn = 1 + q**2
+        fourth = sum(
+            comb(4, j) * perm(order, j) * (high * turn**0.5) ** (order - j) * bounds[4 - j]
+            for j in range(order + 1)
+        )
+        between = (turn * h**2 + high**2 * k**2) / 8  # half the diagonal of a cell is √(2 between)
+        second = largest[2] + between * fourth
+        first = largest[1] + np.sqrt(2 * between) * second
+        zero = largest[0] + between * second
+        if start:  # Re G + q Im G
+            along = turn**1.5 * second
+            across = high**2 * (1 + q) * second + 2 * high * first
+        else:  # Im G / ω
+            along = turn * second / low + 2 * turn**0.5 * first / low**2 + 2 * zero / low**3
+            across = high * second
+        return np.asarray((h**2 * along + k**2 * across) / 8), np.asarray(zero)
+
+    def _stray(self, size: Array, source: str, order: int) -> Array:
+        """What responses stray from straight lines in the step to each node at most, (T,).
+
+        It is h²/8 sup |ë|; ρ̇ = σ ρ + a, so that under a load ë has a and its slope besides; where
+        the record ends on another value than zero, e has a kink.
+        """
+        g, h = self.grid, np.diff(self.time, prepend=self.time[0])
+        low, fast = g.omega[0], float(np.abs(g.sigma).max())
+        before = np.append(size[:1], size[:-1])
+        if source == "start":
+            return np.asarray(h**2 / 8 * fast**2 * before * (1 + g.quotient[-1]))
+        if self.ground is None or source != "load":
+            return np.asarray(h**2 / 8 * fast**2 * before / low)
+        largest, slope, jump = self.ground.extremes
+        power = fast**order
+        bend = fast**2 * (before + h * power * largest) + power * (fast * largest + slope)
+        end = (len(self.ground.acceleration) - 1) * self.ground.step
+        kinked = (self.time - h <= end * (1 + 1e-9)) & (self.time >= end * (1 - 1e-9))
+        kink = np.where(kinked & (order > 0), h / 4 * power * jump, 0.0)
+        return np.asarray((h**2 / 8 * bend + kink) / low)
+
+
+def _with_power(sigma: Array, rho: Array, order: int) -> Array:
+    """G = σ^ν ρ with two derivatives, shape (3, T, S)."""
+    first = order * sigma ** max(order - 1, 0)
+    second = float(order * (order - 1))
+    power = sigma**order
+    return np.stack(
+        [
+            power * rho[0],
+            first * rho[0] + power * rho[1],
+            second * rho[0] + 2 * first * rho[1] + power * rho[2],
+        ]
+    )
+
+
+def absolute_moments(decay: float, ground: Accelerogram, time: Array) -> Array:
+    """Bounds of ∫ τⁿ exp(−g τ) |a(t − τ)| dτ at nodes for n = 0 … 4, shape (5, T)."""
+    a, h = np.abs(np.asarray(ground.acceleration)), ground.step
+    largest = np.append(np.maximum(a[1:], a[:-1]), 0.0)
+    last = np.minimum((time / h * (1 + 1e-12)).astype(int), 10**9)
+    out, state = np.zeros((5, len(time))), np.zeros(5)
+    node = 0
+    for i in range(int(last.max()) + 1):
+        size = largest[i] if i < len(largest) else 0.0
+        while node < len(time) and last[node] == i:
+            out[:, node] = _moved(state, decay, max(time[node] - i * h, 0.0), size)
+            node += 1
+        state = _moved(state, decay, h, size)
+    return out
+
+
+def _moved(state: Array, decay: float, h: float, size: float) -> Array:
+    """Moments a time h later, under an acceleration of at most `size`."""
+    turned = [
+        np.exp(-decay * h) * sum(comb(n, j) * h ** (n - j) * state[j] for j in range(n + 1))
+        + size * h ** (n + 1) / (n + 1)
+        for n in range(5)
+    ]
+    return np.array(turned)
+
+
+def phases_of(ground: Accelerogram, time: Array) -> tuple[Array, ...]:
+    """The record and the nodes within it.
+
+    Returns:
+        Accelerations at both ends of all intervals, (I,) each; the interval of each node, (T,);
+        all different times since a node's interval began, in s, (P,), and which is a node's, (T,).
+    """
+    a, h = np.asarray(ground.acceleration, float), ground.step
+    last = (time / h * (1 + 1e-12)).astype(np.int64)
+    count = int(last.max()) + 1
+    left, right = np.zeros(count), np.zeros(count)
+    left[: len(a) - 1], right[: len(a) - 1] = a[:-1][:count], a[1:][:count]
+    since = np.maximum(time - last * h, 0.0)
+    since[since < 1e-9 * h] = 0.0
+    phases, which = np.unique(np.round(since / h, 9), return_inverse=True)
+    return left, right, last, phases * h, which
+
+
+def loaded(sigma: Array, ground: Accelerogram, time: Array) -> Array:
+    """ρ(σ; t) and its two derivatives by σ at nodes, shape (3, T, S)."""
+    left, right, last, phases, which = phases_of(ground, time)
+    out = np.empty((3, len(time), len(sigma)), complex)
+    _march(sigma, left, right, ground.step, phases, which, last, out)
+    return out
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def step_integrals(sigma, h, out):
+    """∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3."""
+    z = sigma * h
+    for n in range(4):
+        term = 1.0 + 0.0j
+        total = term / (n + 1)
+        for k in range(1, TERMS):
+            term *= z / k
+            total += term / (n + 1 + k)
+        out[n] = total * h ** (n + 1)
+
+
+@numba.njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+def _march(sigma, left, right, h, phases, which, last, out):
+    for s in numba.prange(len(sigma)):
+        whole = np.empty(4, np.complex128)
+        step_integrals(sigma[s], h, whole)
+        turn = np.exp(sigma[s] * h)
+        parts = np.empty((len(phases), 4), np.complex128)
+        turns = np.empty(len(phases), np.complex128)
+        for j in range(len(phases)):
+            step_integrals(sigma[s], phases[j], parts[j])
+            turns[j] = np.exp(sigma[s] * phases[j])
+        r0 = r1 = r2 = 0.0 + 0.0j
+        node = 0
+        for i in range(len(left)):
+            a, slope = left[i], (right[i] - left[i]) / h
+            while node < len(last) and last[node] == i:
+                j = which[node]
+                x, J, w = phases[j], parts[j], turns[j]
+                end = a + slope * x
+                out[0, node, s] = w * r0 + end * J[0] - slope * J[1]
+                out[1, node, s] = w * (r1 + x * r0) + end * J[1] - slope * J[2]
+                out[2, node, s] = w * (r2 + 2 * x * r1 + x * x * r0) + end * J[2] - slope * J[3]
+                node += 1
+            end = right[i]
+            J = whole
+            r2 = turn * (r2 + 2 * h * r1 + h * h * r0) + end * J[2] - slope * J[3]
+            r1 = turn * (r1 + h * r0) + end * J[1] - slope * J[2]
+            r0 = turn * r0 + end * J[0] - slope * J[1]
