@@ -20,10 +20,9 @@ from alphacut.io.files import leave as leave
 from alphacut.io.files import open_streams, rank, ranks, say, standard_output
 from alphacut.io.netcdf import finished
 from alphacut.io.output_paths import check_destinations
-from alphacut.io.problem import BadInput, missing
+from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.io.provenance import door, own_version
 from alphacut.rve.interruption import stoppable
-from alphacut.rve.solver.options import OptionError
 
 NAMES = "run", "check", "microstructure", "cell", "modulus", "envelope", "identify", "report"
 
@@ -128,8 +127,8 @@ def main(
             check_destinations(made[options.command], options)
             with standard_output(getattr(options, "json", None) == "-") as out, plain_warnings():
                 return int(commands[options.command].run(options, petsc, out))
-        except (BadInput, OptionError, RefusedError) as error:
-            for problem in getattr(error, "problems", [error]):
+        except (BadInput, RefusedError) as error:
+            for problem in getattr(error, "problems", None) or [Problem.of(error)]:
                 say(str(problem))
             return 2
         except KeyboardInterrupt:

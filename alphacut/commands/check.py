@@ -8,20 +8,20 @@ from dataclasses import asdict
 from math import pi
 from typing import TextIO
 
-from alphacut.case.case import Case
-from alphacut.case.key import Section, keys_of
+from alphacut.case.content import Content
+from alphacut.case.keys import quantity_of
 from alphacut.case.load import load
+from alphacut.case.types import Section
 from alphacut.commands.options import add_common, answer
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
 from alphacut.io.text_table import text_table
 from alphacut.io.units import engineering
-from alphacut.stages.material.modulus import stand_in
-from alphacut.stages.vibration.structure import structure
+from alphacut.stages.cell import CellChoice, solve
 
-ABOUT = "check a case without computing anything, and print what it was read as"
-SHAPES = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
+ABOUT = "check a case, and print what it was read as and its first natural period"
+KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
 
@@ -33,59 +33,55 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Checks and reports; with ``--json`` the problems as data."""
     try:
-        case = load(options.case, options.set)
-        period = first_period(case)
+        content = load(options.case, options.set).content
     except BadInput as error:
         problems = [asdict(problem) for problem in error.problems]
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
-    rows = list(values(case))
+    rows, period = list(rows_of("", content)), first_period(content)
     document = {
         "case": options.case,
         "ok": True,
         "problems": [],
-        "stages": list(case.stages),
+        "stages": list(content.stages),
         "period_s": period,
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
     text = text_table(("key", "value", "kind"), rows)
-    text += f"first natural period {period:.4g} s\n" if period else ""
+    text += f"first natural period: {period:.4g} s\n" if period else ""
     answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 
 
-def first_period(case: Case) -> float | None:
-    """First natural period in s at the modal values; None of a nonlinear structure, or of none."""
-    if "envelope" not in case.stages:
+def first_period(content: Content) -> float | None:
+    """First natural period in s at the modal values; None where no linear structure vibrates.
+
+    A modulus that is yet to be computed is that of the series at the modal values.
+    """
+    if "envelope" not in content.stages or content.frame is None:
         return None
-    if case.sections.frame and case.frame.modulus is None and case.frame.stiffness is None:
-        if (number := stand_in(case)) is None:
+    number = None
+    if not content.frame.is_whole:
+        if content.round is None or content.radius is None:
             return None
-    else:
-        number = stand_in(case)
-    linear = structure(case, number).linear
+        number = Crisp(solve(content.radius, content.round, CellChoice(tolerance=1e-4)).modulus)
+    linear = content.frame.structure(number).linear
     return None if linear is None else 2 * pi / float(frequencies(linear)[0])
 
 
-def values(case: Case) -> Iterator[Row]:
-    """Key, value and kind of every quantity of the case."""
-    for section in ("radius", "cell", "picture", "frame", "pendulum", "envelope"):
-        content = getattr(case.sections, section)
-        if content is not None:
-            yield from rows_of("cell" if section == "picture" else section, content)
-
-
-def rows_of(name: str, section: Section) -> Iterator[Row]:
-    """Key, value and kind of every quantity of a section."""
-    for key, about in keys_of(type(section)).items():
-        content = getattr(section, key, None)
+def rows_of(prefix: str, section: Section) -> Iterator[Row]:
+    """Key, value and kind of every quantity of a section, and of those below it."""
+    for key, info in type(section).model_fields.items():
+        content, unit = getattr(section, key), quantity_of(info)
         several = content if isinstance(content, tuple) else (content,)
         for number, one in enumerate(several, start=1):
-            place = f"{name}.{key}" + (f"[{number}]" if len(several) > 1 else "")
-            if isinstance(one, FuzzyNumber):
-                yield place, _numbers(one, about.unit), SHAPES.get(type(one), "fuzzy")
-            elif isinstance(one, float) and about.unit:
-                yield place, engineering(one, about.unit), "number"
+            place = f"{prefix}{key}" + (f"[{number}]" if len(several) > 1 else "")
+            if isinstance(one, Section):
+                yield from rows_of(f"{place}.", one)
+            elif isinstance(one, FuzzyNumber) and unit and section.names(key):
+                yield place, _numbers(one, unit.si), KINDS.get(type(one), "fuzzy")
+            elif isinstance(one, float) and unit and unit.si and section.names(key):
+                yield place, engineering(one, unit.si), "number"
 
 
 def _numbers(number: FuzzyNumber, unit: str) -> str:

@@ -9,9 +9,9 @@ from typing import TextIO
 
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, add_workers, answer, require_workers
-from alphacut.io.progress import progress
-from alphacut.io.provenance import attributes, fingerprint, versions
-from alphacut.stages.material import microstructure
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stages import microstructure
+from alphacut.stages.store import Store
 
 ABOUT = "from particles, packed or measured, to the random radius and its fuzzy map"
 
@@ -27,18 +27,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Computes the map, writes it and prints the section [radius]."""
-    from alphacut.stochastic.microstructure_summary import fragment, summary
-
     require_workers(options.workers)
     case = load(options.case, options.set)
-    with progress("Microstructure", quiet=options.quiet) as tick:
-        map_of = microstructure.compute(case, workers=options.workers, progress=tick)
-    files: list[str] = []
+    section, cell = case.content.microstructure, case.content.round
+    if section is None:
+        raise RefusedError("microstructure", None, "a section [microstructure]")
+    spheres = cell is not None and cell.particles == "spheres"
+    stage = microstructure.stage(section, spheres=spheres)
     if options.out:
-        key = fingerprint({"case": case.sections}, ("stochastic",))
-        facts = attributes(case.text_of_file, key)
-        files = microstructure.write(map_of, Path(options.out), facts)
-    section = fragment(map_of)
-    document = {**summary(map_of), "fragment": section, "files": files, "versions": versions()}
-    answer(options, document, out, section)
+        folder = Path(options.out)
+        data = Store(folder, case.text, True, options.quiet, options.workers).take(stage)
+    else:
+        data = stage.once(workers=options.workers, quiet=options.quiet)
+    fragment = str(data.attrs["radius"])
+    answer(options, microstructure.document(data) | {"fragment": fragment}, out, fragment)
     return 0

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-from alphacut.case.case import Case
 from alphacut.case.load import load
 from alphacut.commands import options as common
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document
-from alphacut.io.progress import progress
-from alphacut.io.provenance import attributes, fingerprint
+from alphacut.io.netcdf import write_dataset
+from alphacut.io.provenance import attributes
 from alphacut.io.text_table import text_table
 from alphacut.io.units import fixed
-from alphacut.stages.image import bounds
-from alphacut.stages.image import document as image
-from alphacut.stages.image.reading import study_of
-from alphacut.stages.material import modulus
-from alphacut.stages.material.campaign import campaign
-from alphacut.stages.material.references import references
-from alphacut.stages.tolerance import require_modulus
+from alphacut.stages import cell, image, modulus
+from alphacut.stages.store import Stage
+
+if TYPE_CHECKING:
+    from alphacut.case.content import Content
 
 ABOUT = "fuzzy effective modulus of the cell or of the image"
 KEYS = {
@@ -37,9 +35,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_common(parser)
     common.add_keys(parser, KEYS)
     common.add_workers(parser)
-    parser.add_argument("--out", metavar="FILE.nc", help="write α-cuts and samples as NetCDF")
     parser.add_argument(
-        "--store", metavar="FILE", help="keep every sample; the same command goes on from there"
+        "--out",
+        metavar="FILE.nc",
+        help="write α-cuts and samples as NetCDF; samples.db beside it goes on after a stop",
     )
 
 
@@ -47,44 +46,42 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Computes and reports."""
     common.require_workers(options.workers)
     case = load(options.case, common.changes(options, KEYS))
-    if case.sections.picture:
-        return run_image(options, case, out, alpha=case.modulus.alpha)
-    store = Path(options.store) if options.store else None
-    task = campaign(case, petsc=petsc, store=store)
-    with progress("Fuzzy modulus", quiet=options.quiet) as tick:
-        result = modulus.compute(task, workers=options.workers, progress=tick)
-    require_modulus(case, sum(result.error.values()))
-    document = {
-        **result.document(),
-        "model": task.task.choice.words,
-        "references": references(case),
-    }
-    if options.out:
-        key = fingerprint({"case": case.sections}, ("stochastic", "rve", "fuzzy"))
-        modulus.write(result, options.out, case_text=case.text_of_file, key=key)
+    content, path = case.content, Path(options.out) if options.out else None
+    stage = stage_of(content, petsc)
+    kept = path.parent if path else None
+    data = stage.once(workers=options.workers, quiet=options.quiet, kept=kept)
+    if path:
+        write_dataset(data, path, attributes(case.text, stage.key))
+    if content.picture is not None:
+        document: Document = json.loads(data.attrs["document"])
+        common.answer(options, document, out, image_table(document))
+        return 0
+    assert content.radius is not None
+    assert content.round is not None
+    modulus.require_tolerance(data, content.modulus.tolerance)
+    beside = cell.references(content.radius, content.round)
+    document = modulus.document(data) | {"references": beside}
     common.answer(options, document, out, summary(document))
     return 0
 
 
-def run_image(
-    options: argparse.Namespace, case: Case, out: TextIO, *, alpha: Sequence[float]
-) -> int:
-    """Proves bounds of an image's modulus at some levels, and reports."""
-    study = replace(study_of(case), alpha=tuple(alpha))
-    path = getattr(options, "out", None)
-    partial = Path(path).with_suffix(".partial") if path else None
-    with progress("Image", quiet=options.quiet) as tick:
-        result = bounds.compute(study, progress=tick, kept=partial)
-    if path and partial:
-        content = {"case": case.sections, "files": case.digests(case.picture)}
-        key = fingerprint(content, ("stochastic", "rve", "fuzzy"))
-        image.write(result, Path(path), attributes(case.text_of_file, key), partial)
-    document = image.document(result)
-    common.answer(options, document, out, image_summary(document))
-    return 0
+def stage_of(content: Content, petsc: Mapping[str, str]) -> Stage:
+    """The stage of the cell that a case has.
+
+    Raises:
+        RefusedError: It has none.
+    """
+    if content.picture is not None:
+        return image.stage(content.picture, content.modulus.alpha, content.modulus.average)
+    if content.round is None or content.radius is None:
+        raise RefusedError("radius", None, "sections [radius] and [cell]")
+    samples = modulus.campaign(
+        content.radius, content.round, content.mesh, content.modulus, petsc=petsc
+    )
+    return modulus.stage(samples)
 
 
-def image_summary(document: Document) -> str:
+def image_table(document: Document) -> str:
     """The proved α-cuts as a table, and the phases."""
     cuts = document["cuts"]
     ends = (cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"])
@@ -93,12 +90,13 @@ def image_summary(document: Document) -> str:
         for a, low, high, nature in zip(cuts["alpha"], *ends, cuts["nature"], strict=True)
     ]
     table = text_table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows)
-    return table + "".join(f"{line}\n" for line in document["phases"])
+    shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
+    return table + "".join(shares)
 
 
 def summary(document: Document) -> str:
     """The α-cuts as a table, and what they cost."""
-    columns = [document[key][side] for key in ("E_GPa", "nu") for side in ("lower", "upper")]
+    columns = [document[key][side] for key in ("E_GPa", "nu_cuts") for side in ("lower", "upper")]
     rows = [
         (f"{alpha:g}", *(fixed(float(x), 5) for x in ends))
         for alpha, *ends in zip(document["alpha"], *columns, strict=True)

@@ -106,7 +106,7 @@ def modulus_option(text: str | None) -> FuzzyNumber | None:
     if text is None:
         return None
     if text.endswith(".nc"):
-        from alphacut.stages.material.modulus import read_number
+        from alphacut.stages.modulus import read_number
 
         return read_number(text)
     allowed = "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc"

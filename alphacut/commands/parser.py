@@ -7,8 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import NoReturn
 
-from alphacut.case.values import nearest
-from alphacut.io.problem import BadInput, Problem
+from alphacut.io.problem import BadInput, Problem, suggestion
 
 PETSC_PREFIX = "-rve_"
 
@@ -23,8 +22,8 @@ class Parser(argparse.ArgumentParser):
         )
         if choice:
             known = [name.strip(" '") for name in choice[2].split(",")]
-            close = nearest(choice[1], known)
-            raise BadInput.of("command", "unknown command", choice[1], ", ".join(known), close)
+            close = suggestion(choice[1], known)
+            raise BadInput.of("command", "", choice[1], ", ".join(known), close)
         raise BadInput.of(self.prog.removeprefix("alphacut "), f"{message}; see --help")
 
     def refuse(self, words: Sequence[str]) -> NoReturn:
@@ -33,7 +32,9 @@ class Parser(argparse.ArgumentParser):
         here = self.prog.removeprefix("alphacut ")
         raise BadInput(
             [
-                Problem(here, f"unknown option {word}", "", ", ".join(known), nearest(word, known))
+                Problem(
+                    here, f"has no option {word}", "", ", ".join(known), suggestion(word, known)
+                )
                 for word in words
             ]
         )

@@ -6,22 +6,21 @@ import argparse
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
+from alphacut.case.case import Case
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.figures.showing import Showing
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import as_json, rank, say, write_text
-from alphacut.io.netcdf import fingerprint_of, stored
 from alphacut.io.output_paths import alone, unwritable
 from alphacut.io.problem import refuse
-from alphacut.io.provenance import door
-from alphacut.stages import summary
-from alphacut.stages import width_shares as shares
-from alphacut.stages.pipeline import Chain
+from alphacut.io.provenance import FORMAT, command, door, versions
+from alphacut.stages import shares
+from alphacut.stages.chain import Chain
+from alphacut.stages.store import Store
 from alphacut.stages.words import run_tables
 
 ABOUT = "run every stage of a case: files, figures, summary"
@@ -41,33 +40,45 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     common.require_workers(options.workers)
     case, folder = load(options.case, options.set), folder_of(options)
     refuse(unwritable("--out", folder, folder=True))
-    chain = Chain(case, folder, options.workers, options.fresh, options.quiet, petsc)
+    store = Store(folder, case.text, options.fresh, options.quiet, options.workers)
     with alone("--out", folder) if rank() == 0 else nullcontext():
-        return computed(options, chain, out)
-
-
-def computed(options: argparse.Namespace, chain: Chain, out: TextIO) -> int:
-    """The numbers and figures of a chain, and its answer."""
-    start = time.perf_counter()
-    with pool(chain.workers) as executor:
-        showing = Showing(chain, not options.no_figures, executor)
-        results = replace(chain, executor=executor, meanwhile=showing.begin).run()
-        drawn, driving = showing.drawn(results), showing.driving()
-    document: dict[str, Any] = {
-        **summary.summary(results),
-        "shares": shares.mean_shares(driving),
-        **({"changes": options.set} if options.set else {}),
-        "sections": chain.case.traces(),
-        "figures": drawn,
-        "seconds": time.perf_counter() - start,
-    }
-    document["fingerprints"] = {x: fingerprint_of(chain.file(x)) for x in stored(document)}
-    write_text(chain.file("summary.json"), as_json(document, indent=2))
+        document = computed(case, store, petsc, figures=not options.no_figures)
     common.answer(options, document, out, run_tables(document))
     if options.json != "-" and not options.quiet:
-        say(f"results are in {chain.folder}, after {document['seconds']:.0f} s")
-        say(f"next: {door('report', chain.folder)}")
+        say(f"results are in {folder}, after {document['seconds']:.0f} s")
+        say(f"next: {door('report', folder)}")
     return 0
+
+
+def computed(
+    case: Case, store: Store, petsc: Mapping[str, str], *, figures: bool
+) -> dict[str, Any]:
+    """The numbers and figures of a case; summary.json is written last."""
+    start = time.perf_counter()
+    with pool(store.workers) as executor:
+        showing = Showing(store, figures, executor)
+        chain = Chain(case.content, store, petsc, figures, executor, showing.begin)
+        results = chain.run()
+        drawn = showing.drawn(results)
+    assert results.shares is not None
+    document: dict[str, Any] = {
+        "format_version": FORMAT,
+        "case": case.name,
+        "title": case.content.title,
+        "about": case.content.about,
+        "case_text": case.text,
+        "command": command(),
+        "versions": versions(),
+        **results.document(),
+        "shares": shares.means(results.shares),
+        "changes": list(case.changes),
+        "sections": case.traces(),
+        "figures": drawn,
+        "seconds": time.perf_counter() - start,
+        "fingerprints": {x: data.attrs["fingerprint"] for x, data in results.datasets.items()},
+    }
+    write_text(store.file("summary.json"), as_json(document, indent=2))
+    return document
 
 
 def folder_of(options: argparse.Namespace) -> Path:

@@ -13,9 +13,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import as_json, say, write_text
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.provenance import digest
-from alphacut.stages.material.modulus import listed
-from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration.decision import decision_document
+from alphacut.stages.modulus import listed
 
 if TYPE_CHECKING:
     import xarray
@@ -23,10 +21,6 @@ if TYPE_CHECKING:
 BY_OUTPUT = "SI, by output"
 KEPT = ".kept.json"  # digests of the tables that a report wrote into a folder, by name
 MOST = 500_000  # rows of a table; spreadsheets end at twice that
-LIMIT = {"limit value": "limit", "limit unit": "unit"}
-OF_LIMIT = LIMIT | {"verdict": "verdict", "nature": "nature", "between nodes": "between_nodes"}
-OF_EVENT = {"output": "output", **LIMIT, "more between nodes (estimated)": "between_nodes"}
-"""Columns of an event or a limit, and the names of their values in its document."""
 
 
 def write_tables(results: Iterable[Path], folder: Path) -> list[Path]:
@@ -54,9 +48,6 @@ def write_tables(results: Iterable[Path], folder: Path) -> list[Path]:
             tables[f"{path.stem}-attained"] = _csv(dataset[["lower_at", "upper_at"]])
             peaks += _peaks(path.stem.removeprefix("envelope_"), dataset)
             continue
-        if "curve" in dataset:
-            tables[f"{path.stem}-curve"] = _curves(dataset)
-            dataset = dataset.drop_vars([x for x in ("curve", "limits") if x in dataset])
         widest = next((v.dims for v in dataset.data_vars.values() if v.dims), ())
         for axes, part in _by_axes(dataset):
             own = [] if axes == widest else ["by", *axes]  # the first bears the name alone
@@ -98,18 +89,9 @@ def with_worth(dataset: xarray.Dataset) -> xarray.Dataset:
     """The dataset with coordinates, columns later, that say what its numbers are worth."""
     facts, count = dataset.attrs, dataset.sizes.get("alpha", 0)
     told: dict[str, tuple[str, list[object]]] = {}
-    if "possibility" in dataset:
-        found = decision_document(dataset)
-        told["nature of peaks"] = "alpha", [found["peaks"]] * count
-        rows = [{**found["margins"].get(x, {}), **one} for x, one in found["limits"].items()]
-        told |= {x: ("limit", [row.get(key, "") for row in rows]) for x, key in OF_LIMIT.items()}
-    elif "nature" in facts:
+    if "nature" in facts and count:
         own = json.loads(facts["document"])["cuts"] if "document" in facts else {}
         told["nature"] = "alpha", own.get("nature", [facts["nature"]] * count)
-    if "exceedance" in dataset and "output" in facts:
-        rows = outcomes.each_event(outcomes.exceedances_document(dataset))
-        over, rows = ("event", rows) if "event" in dataset.dims else ("alpha", rows * count)
-        told |= {x: (over, [row[key] for row in rows]) for x, key in OF_EVENT.items()}
     if "error_name" in dataset.dims:
         error = sum(listed(dataset, "error").values())
         told["declared relative error of E"] = "alpha", [error] * count
@@ -148,19 +130,6 @@ def _peaks(study: str, dataset: xarray.Dataset) -> Iterator[str]:
             cells = (repr(float(level)), low, more[0], high, more[1])
             nature = str(dataset.attrs.get("nature", ""))
             yield ",".join([study, name, Output(name).unit, *cells, nature])
-
-
-def _curves(dataset: xarray.Dataset) -> str:
-    """Probabilities over the limit, a row for each event, limit and level."""
-    rows = ["place,output,limit,unit,alpha,lower,upper,nature"]
-    for one in outcomes.events(dataset):
-        output, nature = one.attrs["output"], one.attrs.get("nature", "")
-        unit, curve = outcomes.event_unit(output), one["curve"].transpose("limit", "alpha", "bound")
-        for place, limit in enumerate(one["limit"].values):
-            for level, ends in zip(one["alpha"].values, curve.values[place], strict=True):
-                limited, *told = (repr(float(x)) for x in (limit, level, *ends))
-                rows.append(",".join([str(place), output, limited, unit, *told, f'"{nature}"']))
-    return "\n".join([*rows, ""])
 
 
 def _by_axes(dataset: xarray.Dataset) -> Iterator[tuple[tuple[str, ...], xarray.Dataset]]:

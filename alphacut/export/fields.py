@@ -7,28 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.case import Case
 from alphacut.io.files import whole_file
 from alphacut.io.problem import BadInput
 from alphacut.rve.cell import LOADS, Phase
-from alphacut.stages.material.cell import modal_parts
+from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     import meshio
 
     from alphacut.rve.prism.fields import CellFields
-    from alphacut.stochastic import RadiusMap
 
-
+Cell = tuple[RadiusMap, Phase, Phase]
+"""Radius map, matrix and inclusion."""
 # From Basix's order of a wedge's edges to meshio's, Abaqus's and Gmsh's reader's: lower triangle,
 # upper triangle, vertical edges.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 # from there to VTK's: the lower triangle seen from outside
 MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
-# from Basix's order of a quadratic tetrahedron to meshio's, VTK's and Abaqus's
-TETRAHEDRON = [0, 1, 2, 3, 9, 6, 8, 7, 5, 4]
-FINEST = 0.02  # mesh size of a sphere's cell: some millions of tetrahedra
 # names of the element sets, where a format has sets in place of data
 PHASES = ("MATRIX", "PARTICLE")
 VTK_ORDER = {".vtu", ".vtk", ".xdmf"}
@@ -37,49 +33,23 @@ FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".msh": "gmsh", ".inp"
 FIELDLESS = {".inp"}
 
 
-def prism_mesh(case: Case) -> meshio.Mesh:
-    """Quadratic wedges at the modal radius map, with phases (0 matrix, 1 particle)."""
+def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
+    """Quadratic wedges at a radius map, with phases (0 matrix, 1 particle)."""
     import meshio
     from meshio._mesh import topological_dimension
 
     from alphacut.rve.mesh.prism_grid import PrismGrid
     from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 
-    radius, _, _ = modal_parts(case)
-    plane = triangulate(size=case.mesh.size, radius=reference_radius(radius))
-    grid = PrismGrid(plane, case.mesh.layers, case.mesh.interface == "conforming")
+    radius, _, _ = cell
+    plane = triangulate(size=size, radius=reference_radius(radius))
+    grid = PrismGrid(plane, layers)
     phase = np.tile(plane.inside.astype(np.int64), grid.layers)
     # meshio 5.3 reads and writes this cell but has forgotten its dimension
     topological_dimension.setdefault("wedge15", 3)
     return meshio.Mesh(
         grid.positions(radius), [("wedge15", grid.cells[:, ORDER])], cell_data={"phase": [phase]}
     )
-
-
-def sphere_mesh(case: Case, radius: float) -> meshio.Mesh:
-    """Curved quadratic tetrahedra of the periodic cell with its sphere, phases as of `prism_mesh`.
-
-    Args:
-        case: Gives the mesh size.
-        radius: Over half the cell's side.
-
-    Raises:
-        BadInput: Spheres nearly touch, or the mesh size is below 0.02.
-    """
-    import meshio
-
-    from alphacut.rve.mesh.curved import TouchingError
-    from alphacut.rve.spheres.fem.octant import whole_cell
-
-    if case.mesh.size < FINEST:
-        what = "a cell of a sphere would have tens of millions of elements"
-        raise case.refuse("mesh.size", what, f"{FINEST:g} or more")
-    try:
-        points, cells, inside = whole_cell(radius, size=case.mesh.size)
-    except TouchingError as error:
-        raise BadInput.of("radius", str(error)) from None
-    phase = inside.astype(np.int64)
-    return meshio.Mesh(points, [("tetra10", cells[:, TETRAHEDRON])], cell_data={"phase": [phase]})
 
 
 def check_ending(path: Path, *, fields: bool = False) -> None:
@@ -129,7 +99,7 @@ COMPONENTS = ("11", "22", "12")
 SIZES = (("displacement", 2), ("stress", 3))
 
 
-def cell_fields(case: Case) -> meshio.Mesh:
+def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     """Total displacements and stresses under both loads at modal values.
 
     Stresses are means over the wedges of one phase that meet in a node; nodes on the interface
@@ -137,9 +107,6 @@ def cell_fields(case: Case) -> meshio.Mesh:
     stresses jump there. Point data: ``displacement_1_in_half_sides``,
     ``displacement_2_in_half_sides`` (halves of the cell's side) and ``stress_1_11_Pa`` … under ε11
     = ε22 = 0.01 (load 1) and ε12 = 0.01 (load 2); cell data: ``phase``.
-
-    Raises:
-        BadInput: The mesh does not follow the interface.
     """
     import meshio
     from meshio._mesh import topological_dimension
@@ -147,26 +114,14 @@ def cell_fields(case: Case) -> meshio.Mesh:
     from alphacut.rve.prism import fields as prism
     from alphacut.rve.prism.model import PrismModel
 
-    require_conforming(case)
-    radius, matrix, inclusion = modal_parts(case)
-    model = PrismModel(case.mesh.size, case.mesh.layers)
+    radius, matrix, inclusion = cell
+    model = PrismModel(size, layers)
     fields = prism.cell_fields(model, radius, matrix, inclusion)
     data = point_data(fields.displacement, fields.stress)
     topological_dimension.setdefault("wedge15", 3)  # see alphacut.export.fields
     errors = relative_errors(fields, radius, (matrix, inclusion), data)
     wedges = [("wedge15", fields.cells[:, ORDER])]
     return meshio.Mesh(fields.points, wedges, data, {"phase": [fields.phase]}, info=errors)
-
-
-def require_conforming(case: Case) -> None:
-    """Refuse a mesh that does not follow the interface.
-
-    Raises:
-        BadInput: It does not.
-    """
-    if case.mesh.interface != "conforming":
-        what = "fields need a mesh that follows the interface"
-        raise case.refuse("mesh.interface", what, "conforming")
 
 
 def point_data(displacement: Array, stress: Array) -> dict[str, Array]:

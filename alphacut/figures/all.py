@@ -25,9 +25,10 @@ from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.files import as_json, write_text
 from alphacut.io.progress import Tick, progress
-from alphacut.stages.material import microstructure
-from alphacut.stages.pipeline import Results
-from alphacut.stages.vibration.exceedance import events
+from alphacut.questions.table import QUESTIONS
+from alphacut.stages import microstructure
+from alphacut.stages.cell import modal_parts
+from alphacut.stages.results import Results
 
 if TYPE_CHECKING:
     import xarray
@@ -40,36 +41,39 @@ Drawing = tuple[str, Callable[[], "Figure"]]
 
 def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
-    if results.case.sections.radius:
+    if results.content.radius:
         yield from radius_drawings(results)
     yield from material_drawings(results)
     if results.envelopes:
         yield "fig20-mapping", lambda: figure_modulus.mapping(results)
     yield from structure_drawings(results)
-    if results.envelopes and results.case.sections.envelope:
+    if results.envelopes:
         yield from follower_drawings(results)
     yield from update_drawings(results)
     yield from question_drawings(results)
-    for study in results.studies:
+    for study in results.tasks:
         yield from figure_envelope.drawings(study, results.envelopes[study.name])
 
 
 def radius_drawings(results: Results) -> Iterator[Drawing]:
     """The map of radii; the stage microstructure draws the first two from its particles."""
-    if "microstructure" not in results.case.stages:
-        if results.case.is_paper:
-            yield "fig11-radii", lambda: figure_radius.radii(results.case)
-        yield "fig13-p-box", lambda: figure_radius.p_box(results.case)
-    yield "fig14-cone", lambda: figure_radius.cone(results.case)
+    radius = results.content.radius
+    assert radius is not None
+    if results.microstructure is None:
+        if results.is_paper:
+            yield "fig11-radii", lambda: figure_radius.radii(radius)
+        yield "fig13-p-box", lambda: figure_radius.p_box(radius)
+    yield "fig14-cone", lambda: figure_radius.cone(radius)
 
 
 def material_drawings(results: Results) -> Iterator[Drawing]:
     """Fuzzy modulus, image, response of the stress."""
+    frame = results.content.frame
     if (modulus := results.modulus) is not None:
         yield "fig16-stress-curves", lambda: figure_modulus.stress_curves(modulus)
         yield "fig17-mean-stress", lambda: figure_modulus.mean_stress(modulus)
-        yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, results.case)
-        if results.case.is_paper:
+        yield "fig18-modulus", lambda: figure_modulus.fuzzy_modulus(modulus, frame)
+        if results.is_paper:
             yield "fig19-membership", lambda: figure_modulus.membership(modulus)
     if (picture := results.image) is not None:
         yield "image", lambda: figure_image.image(picture)
@@ -79,10 +83,10 @@ def material_drawings(results: Results) -> Iterator[Drawing]:
 
 def structure_drawings(results: Results) -> Iterator[Drawing]:
     """The structure whose envelopes were computed, and its record."""
-    structure = results.structure
-    if results.envelopes and results.case.sections.frame:
-        yield "fig26-frame", lambda: figure_frame.frame(results.case)
-        yield "fig27-chain", lambda: figure_frame.chain(results.case)
+    structure, frame = results.structure, results.content.frame
+    if results.envelopes and frame is not None:
+        yield "fig26-frame", lambda: figure_frame.frame(frame)
+        yield "fig27-chain", lambda: figure_frame.chain(frame)
     model = None if structure is None else structure.linear
     if model is not None and (shaken := model.ground) is not None:
         yield "record", lambda: figure_envelope.record(shaken)
@@ -90,20 +94,16 @@ def structure_drawings(results: Results) -> Iterator[Drawing]:
 
 def follower_drawings(results: Results) -> Iterator[Drawing]:
     """How the Graph Follower walks, for the study of most fuzzy inputs."""
-    if results.case.envelope.method == "graph-follower":
-        richest = max(results.studies, key=lambda study: len(study.task.fuzzy))
+    richest = max(results.tasks, key=lambda study: len(study.fuzzy))
+    if richest.section.method == "graph-follower":
         yield "fig21-25-graph-follower", lambda: figure_follower.follower(results, richest)
 
 
 def question_drawings(results: Results) -> Iterator[Drawing]:
-    """Exceedance of each limit, decisions, and the hull of several outputs."""
-    if results.exceedance is not None:
-        for limited in events(results.exceedance):
-            several = "event" in results.exceedance.dims
-            stem = f"exceedance-{str(limited.attrs['output']).replace(' ', '-')}"
-            yield stem if several else "exceedance", partial(figure_envelope.exceedance, limited)
-    if (decided := results.decision) is not None:
-        yield "decision", lambda: figure_questions.decision(decided)
+    """Answers to the questions of the case."""
+    for question in QUESTIONS:
+        if question.key in results.answers:
+            yield question.key, partial(question.figure, results.answers[question.key])
 
 
 def update_drawings(results: Results) -> Iterator[Drawing]:
@@ -126,12 +126,12 @@ def draw_shares(driving: xarray.Dataset, results: Results) -> list[str]:
 
 def file_stem(name: str, results: Results) -> str:
     """The figure's name; the paper's number leads it in the paper's case alone."""
-    return name if results.case.is_paper else re.sub(r"^fig[\d-]+-", "", name)
+    return name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
 
 
 def draw(
     results: Results,
-    driving: Callable[[], xarray.Dataset],
+    driving: xarray.Dataset,
     meshes: Mapping[str, Future[bool]],
     *,
     executor: Executor | None = None,
@@ -141,22 +141,26 @@ def draw(
 
     Args:
         results: Of the run.
-        driving: Waits for what drives the widths, whose figures come last.
+        driving: What drives the widths.
         meshes: Pictures of the mesh under way, see `begin_meshes`.
         executor: Processes that draw side by side; None: this one draws.
         quiet: No progress.
     """
     names = drawn_in_parts(results, executor, quiet=quiet)
-    names += submitted(executor, draw_shares, driving(), results).result()
+    names += submitted(executor, draw_shares, driving, results).result()
     names += [name for name, made in meshes.items() if made.result()]
     return [*particle_pictures(results), *names]
 
 
 def begin_meshes(results: Results, executor: Executor | None) -> dict[str, Future[bool]]:
     """Pictures of the mesh under way, by their files; False where there is no display."""
+    content, pictures = results.content, mesh_pictures(results)
+    if not pictures or content.radius is None or content.round is None:
+        return {}
+    cell, mesh = modal_parts(content.radius, content.round), content.mesh
     return {
-        name: submitted(executor, draw_mesh, results.case, results.folder / name, kind)
-        for name, kind in mesh_pictures(results).items()
+        name: submitted(executor, draw_mesh, cell, mesh, results.folder / name, kind)
+        for name, kind in pictures.items()
     }
 
 
@@ -232,17 +236,13 @@ def drawn_now(todo: Iterable[Drawing], results: Results) -> list[str]:
 
 def particle_pictures(results: Results) -> list[str]:
     """Names of the figures of the microstructure stage, where the case has it."""
-    found = (
-        microstructure.pictures(results.folder) if "microstructure" in results.case.stages else []
-    )
+    found = [] if results.microstructure is None else microstructure.pictures(results.folder)
     return [str(path.relative_to(results.folder)) for path in found]
 
 
 def mesh_pictures(results: Results) -> dict[str, str]:
     """Files and kinds of fig. 15 and of the stress on slices, where prisms gave the modulus."""
-    if results.modulus is None or results.case.modulus.method != "prism":
+    if results.modulus is None or results.content.modulus.method != "prism":
         return {}
-    pictures = {f"figures/{file_stem('fig15-prism-mesh', results)}.png": "mesh"}
-    if results.case.mesh.interface == "conforming":
-        pictures["figures/stress-on-slices.png"] = "stress"
-    return pictures
+    mesh = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
+    return {mesh: "mesh", "figures/stress-on-slices.png": "stress"}

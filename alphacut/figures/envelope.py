@@ -13,16 +13,17 @@ from alphacut.figures import style as look
 from alphacut.figures.captions import INPUTS
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.quantities import Output
-from alphacut.io.units import MINUS, axis_prefix, engineering
-from alphacut.stages.vibration.exceedance import event_unit, event_words
-from alphacut.stages.vibration.studies import Study
+from alphacut.io.units import engineering
+from alphacut.stages.envelope import EnvelopeTask
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
 
-def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def drawings(
+    study: EnvelopeTask, dataset: xarray.Dataset
+) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Name and function of each figure of a study."""
     outputs = [study.output] if study.output else [str(name) for name in dataset["output"].values]
     for index, output in enumerate(outputs):
@@ -30,7 +31,7 @@ def drawings(study: Study, dataset: xarray.Dataset) -> Iterator[tuple[str, Calla
         yield f"{number}envelope-{study.name}-{output}", partial(envelope, dataset, output, study)
 
 
-def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
+def envelope(dataset: xarray.Dataset, output: str, study: EnvelopeTask) -> Figure:
     """Nested bands between lower and upper envelope, and the modal trajectory."""
     drawn, axes = look.figure(7.2, 3.6)
     shown = dataset.sel(output=output)
@@ -46,33 +47,9 @@ def envelope(dataset: xarray.Dataset, output: str, study: Study) -> Figure:
     axes.set_xlim(time[0], time[-1])
     # letters mean something else in a pendulum
     known = INPUTS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
-    words = ", ".join(known.get(name, name) for name in study.task.fuzzy)
+    words = ", ".join(known.get(name, name) for name in study.fuzzy)
     title = f"{Output(output).words}; fuzzy: {words}"
     axes.set_title(fill(title, 84), loc="left", fontsize=10)
-    look.alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
-
-
-def exceedance(found: xarray.Dataset) -> Figure:
-    """The probability between its bounds on each level, and the case's limit."""
-    drawn, axes = look.figure(7.2, 3.6)
-    alpha, limits = found["alpha"].values, found["limit"].values
-    curves = found["curve"].transpose("alpha", "bound", "limit").values
-    for (lower, upper), shade in zip(curves[:-1], look.colours(alpha), strict=False):
-        axes.fill_between(limits, lower, upper, color=shade, lw=0)
-    axes.plot(limits, curves[-1].T, color=look.INK, lw=1)
-    output = str(found.attrs["output"])
-    limit, unit = float(found.attrs["limit"]), event_unit(output)
-    if limit <= 2 * limits[-1]:
-        axes.axvline(limit, color=look.ORANGE, lw=1.2, ls="--")
-    where = " (dashed)" if limit <= 2 * limits[-1] else ", far off"
-    axes.set_title(f"limit {engineering(limit, unit)}{where}", loc="left", fontsize=10)
-    factor, prefixed = axis_prefix(max(limits[-1], limit if limit <= 2 * limits[-1] else 0.0), unit)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
-    words = f"limit of {event_words(output)}, {prefixed}" if unit else "all limits, over the case's"
-    axes.set_xlabel(words.replace("^2", "²"))
-    axes.set_ylabel("probability of exceeding it")
-    axes.set_ylim(0, 1.02)
     look.alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn
 

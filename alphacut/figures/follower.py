@@ -8,8 +8,8 @@ from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.follower_record import FollowerRecord, record_flow
 from alphacut.frame.structures.quantities import Output
-from alphacut.stages.pipeline import Results
-from alphacut.stages.vibration.studies import Study
+from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ TITLES = (
 )
 
 
-def follower(results: Results, study: Study) -> Figure:
+def follower(results: Results, study: EnvelopeTask) -> Figure:
     """Five panels: from the first guess to the envelope, for one output at the lowest level."""
     import matplotlib.pyplot as plt
 
@@ -54,7 +54,7 @@ def follower(results: Results, study: Study) -> Figure:
         panels[4].plot(found.time, final, color=INK, lw=1.3)
     for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
         panel.set_title(
-            f"{f'Fig. {20 + number}' if results.case.is_paper else number}: {title}",
+            f"{f'Fig. {20 + number}' if results.is_paper else number}: {title}",
             loc="left",
             fontsize=9,
         )
@@ -81,20 +81,23 @@ def base(
         panel.axvline(found.time[node], color=INK, lw=0.8, ls=":")
 
 
-def recorded(results: Results, study: Study) -> tuple[FollowerRecord, str]:
+def recorded(results: Results, study: EnvelopeTask) -> tuple[FollowerRecord, str]:
     """A run of the Graph Follower that keeps every step, and the output it followed."""
     wanted = results.structure
     assert wanted is not None
-    cuts = boxes(wanted.inputs(study.task.fuzzy), (0.0,))
+    cuts = boxes(wanted.inputs(study.fuzzy), (0.0,))
     steps = max(
-        1, min(round(DURATION / study.task.step), round(study.task.duration / study.task.step))
+        1, min(round(DURATION / study.section.step), round(study.duration / study.section.step))
     )
     flow = UnitFlow(
-        wanted.flow(cuts.names, steps * study.task.step, study.task.step), cuts, study.task.relative
+        wanted.flow(cuts.names, steps * study.section.step, study.section.step),
+        cuts,
+        not study.tolerance(wanted).unit,
     )
     output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
-        found = record_flow(flow, output=output, tolerance=share * study.task.resolution)
+        fine = share * study.section.gain * study.tolerance(wanted).value
+        found = record_flow(flow, output=output, tolerance=fine)
         if any(step.found >= 0 for step in found.steps):
             break
     return found, flow.outputs[output]

@@ -6,35 +6,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.case import Case
+from alphacut.case.structures import Frame
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, figure
 from alphacut.fuzzy import Crisp
-from alphacut.stages.vibration.structure import per_floor
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def frame(case: Case) -> Figure:
+def frame(section: Frame) -> Figure:
     """Fig. 26: floors, columns with their lengths, displacements."""
-    known = case.frame.lengths or (Crisp(3.0),)  # not to scale where only stiffnesses are given
-    lengths = [length.modal for length in per_floor(case.frame, known)]
-    masses = [mass.modal for mass in per_floor(case.frame, case.frame.masses)]
+    known = section.lengths or (Crisp(3.0),)  # not to scale where only stiffnesses are given
+    lengths = [length.modal for length in section.per_floor(known)]
+    masses = [mass.modal for mass in section.per_floor(section.masses)]
     height = sum(lengths)
     span, level = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height, 0.0
     high = min(9.0, 1.4 + 0.5 * height, 4.4 * 1.13 * height / (2.15 * span))
     drawn, axes = figure(high * 2.15 * span / (1.13 * height), high)
     ground(axes, 0.0, span)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
-        given = case.frame.stiffness
-        stiff = None if given is None else per_floor(case.frame, given)[floor - 1].modal
+        given = section.stiffness
+        stiff = None if given is None else section.per_floor(given)[floor - 1].modal
         columns(axes, floor, level, length, span, stiff)
         level += length
         beam(axes, floor, level, mass, span)
     axes.set_xlim(-0.6 * span, 1.55 * span)
     axes.set_ylim(-0.05 * height, 1.08 * height)
-    told = (*case.frame.masses, *known, *(case.frame.stiffness or ()))
+    told = (*section.masses, *known, *(section.stiffness or ()))
     if any(number.support.width > 0 for number in told):
         axes.set_title("fuzzy numbers by their modal value", fontsize=8)
     axes.set_aspect("equal")
@@ -83,15 +82,15 @@ MOST = 5
 """Most masses of a chain that are drawn."""
 
 
-def chain(case: Case) -> Figure:
+def chain(section: Frame) -> Figure:
     """Fig. 27: the frame as masses on springs, with its dampers if it has any.
 
     Of more than `MOST` floors those between the third and the last are left out.
     """
-    floors = len(case.frame.masses)
+    floors = len(section.masses)
     names = range(1, floors + 1) if floors <= MOST else (1, 2, 3, 0, floors)
-    damped = case.frame.damper_placement is not None and case.frame.damped
-    placement = case.frame.damper_placement if damped else "none"
+    damped = section.damper_placement is not None and section.damped
+    placement = section.damper_placement if damped else "none"
     slots = len(names)
     wide = min(7.2, 2.2 + 1.5 * slots)
     drawn, axes = figure(wide, 2.15 * wide / (1.6 * slots + 0.5) + 0.1)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures.style import BLUE, INK, figure
-from alphacut.stages.material.cell import GPA
+from alphacut.stages.cell import GPA
 
 if TYPE_CHECKING:
     import xarray

@@ -13,8 +13,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.case.case import Case
-from alphacut.export.fields import cell_fields, prism_mesh, write_mesh
+from alphacut.case.material import Mesh
+from alphacut.export.fields import Cell, cell_fields, prism_mesh, write_mesh
 from alphacut.io.files import say, whole_file
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ EDGES = [
 ]
 
 
-def draw_mesh(case: Case, path: Path, kind: str = "mesh") -> bool:
+def draw_mesh(cell: Cell, mesh: Mesh, path: Path, kind: str = "mesh") -> bool:
     """Draw the mesh of a case, or the stress in it; returns whether a picture was made.
 
     Where there is no display, Xvfb makes one for the time of drawing. Where there is none of both,
@@ -67,10 +67,10 @@ def draw_mesh(case: Case, path: Path, kind: str = "mesh") -> bool:
             return False
         command = ["xvfb-run", "-a", *command]
     with tempfile.TemporaryDirectory() as folder, whole_file(path) as partial:
-        mesh = Path(folder) / "mesh.vtu"
-        write_mesh(cell_fields(case) if kind == "stress" else prism_mesh(case), mesh)
+        file, make = Path(folder) / "mesh.vtu", cell_fields if kind == "stress" else prism_mesh
+        write_mesh(make(cell, mesh.size, mesh.layers), file)
         done = subprocess.run(
-            [*command, str(mesh), str(partial)], capture_output=True, text=True, check=False
+            [*command, str(file), str(partial)], capture_output=True, text=True, check=False
         )
         if done.returncode or not partial.is_file():
             raise RuntimeError(

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.case import Case
+from alphacut.case.structures import Frame
 from alphacut.figures import style as look
 from alphacut.frame.structures.quantities import Output
-from alphacut.stages.material.cell import GPA
-from alphacut.stages.material.modulus import AVERAGE
-from alphacut.stages.pipeline import Results
+from alphacut.stages.cell import GPA
+from alphacut.stages.results import Results
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -80,7 +79,14 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
     return drawn
 
 
-def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
+AVERAGE = {
+    "cylinders": "eq. 16",
+    "isotropic": "isotropic average",
+    "spheres": "Hill's isotropic average",
+}
+
+
+def fuzzy_modulus(dataset: xarray.Dataset, frame: Frame | None) -> Figure:
     """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes, and below it fuzzy ν."""
     import matplotlib.pyplot as plt
 
@@ -89,7 +95,7 @@ def fuzzy_modulus(dataset: xarray.Dataset, case: Case) -> Figure:
     )
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
     look.shaded_cuts(axes, alpha, ends[:, 0], ends[:, 1])
-    quoted = case.frame.modulus if case.sections.frame else None
+    quoted = frame.modulus if frame else None
     if quoted is not None:
         left, right = zip(*(quoted.cut(level) for level in (0.0, 1.0)), strict=True)
         x = np.array([*left, *right[::-1]]) / GPA
@@ -138,16 +144,16 @@ def membership(dataset: xarray.Dataset) -> Figure:
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
-    study = next((s for s in results.studies if len(s.task.fuzzy) > 1), results.studies[0])
+    study = next((s for s in results.tasks if len(s.fuzzy) > 1), results.tasks[0])
     dataset = results.envelopes[study.name].isel(alpha=0)
     output = str(dataset["output"].values[-1 if "q" in str(dataset["output"].values[-1]) else 0])
     wanted = results.structure
     assert wanted is not None
-    inputs = wanted.inputs(study.task.fuzzy)
-    end = min(duration, study.task.duration)
-    end = round(end / study.task.step) * study.task.step
-    scheme = study.task.scheme if wanted.linear else study.task.integrator
-    flow = wanted.flow(tuple(inputs), end, study.task.step, scheme)
+    inputs = wanted.inputs(study.fuzzy)
+    end = min(duration, study.duration)
+    end = round(end / study.section.step) * study.section.step
+    scheme = study.section.integrator or ("exact" if wanted.linear else None)
+    flow = wanted.flow(tuple(inputs), end, study.section.step, scheme)
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
@@ -163,8 +169,8 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
             lw=1.3,
             label="envelope" if side == "lower" else None,
         )
-    rest = f", the first {end:g} of {study.task.duration:g}"
-    axes.set_xlabel("time t, s" + rest * bool(end < study.task.duration))
+    rest = f", the first {end:g} of {study.duration:g}"
+    axes.set_xlabel("time t, s" + rest * bool(end < study.duration))
     look.prefix_axis(axes, output, Output(output).unit)
     axes.set_title(
         f"Fuzzy mapping of {output} at α = {float(dataset['alpha']):g}", loc="left", fontsize=10

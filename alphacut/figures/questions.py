@@ -10,54 +10,17 @@ from alphacut.figures.style import (
     BLUE,
     GREY,
     INK,
-    ORANGE,
-    colours,
     figure,
     prefix_axis,
 )
+from alphacut.frame.identify.possibility import widest
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.units import MINUS
-from alphacut.stages.vibration.decision import PASSED, degree
-from alphacut.stages.vibration.update import Learned, prior_support
+from alphacut.stages.identify import Learned
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
-
-
-def decision(found: xarray.Dataset) -> Figure:
-    """Peak of each limited output over its limit, a bar for each level, and both degrees."""
-    names, alpha = [str(name) for name in found["output"].values], found["alpha"].values
-    drawn, axes = figure(7.2, 1.1 + 0.75 * len(names))
-    share = 1 - found["margin"] / found["allowed"]
-    places, verdicts = np.arange(len(names))[::-1], found.attrs["verdict"].split(", ")
-    for place, name, verdict in zip(places, names, verdicts, strict=False):
-        ends, sure = share.sel(output=name), verdict.startswith(PASSED)
-        wide, high = ends.sel(bound="upper").values, ends.sel(bound="lower").values
-        low = np.maximum(wide, 1.0) if sure else wide  # every motion exceeds the limit
-        for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
-            height = 0.66 - 0.4 * float(level)
-            axes.barh(place, right - left, left=left, height=height, color=shade, lw=0)
-        left_out = low[0] - wide[0]
-        axes.barh(place, left_out, left=wide[0], height=0.66, fc="none", ec=GREY, hatch="///", lw=0)
-        axes.plot([low[-1], high[-1]], [place, place], color=INK, lw=2)
-        words, across = degrees(found.sel(limit=name)), axes.get_yaxis_transform()
-        words += ": exceeded for sure" + ", not where hatched" * int(left_out > 0) if sure else ""
-        axes.text(0.01, place + 0.38, words, fontsize=8, transform=across)
-    axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
-    axes.set_ylim(-0.5, len(names) - 0.2)
-    least, right = float(share.min()), axes.get_xlim()[1]
-    left = max(0.0, least - 0.05 * (right - least))
-    axes.set_xlim(left, max(right, 1 + 0.1 * (1 - left)))
-    axes.set_yticks(places, names)
-    axes.set_xlabel("peak over its limit (dashed), the darker the higher α")
-    return drawn
-
-
-def degrees(found: xarray.Dataset) -> str:
-    """Bounds of possibility and necessity of exceeding one limit."""
-    possible, necessary = (degree(*found[x].values) for x in ("possibility", "necessity"))
-    return f"exceeding is possible to {possible}, necessary to {necessary}"
 
 
 def _ticks(factor: float, value: float, _: int) -> str:
@@ -94,7 +57,7 @@ def boxes(learned: Learned) -> Figure:
     assert found is not None
     drawn, axes = figure(7.2, 0.9 + 0.32 * len(found.names))
     places = np.arange(len(found.names))[::-1]
-    prior = np.array([prior_support(number) for number in learned.prior.values()])
+    prior = np.array([widest(number) for number in learned.prior.values()])
     nominal = np.array([number.modal for number in learned.prior.values()])
     axes.barh(
         places,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.case import Case
+from alphacut.case.material import RadiusMap
 from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure
 from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.radius_map import CaseMap
@@ -19,28 +19,28 @@ if TYPE_CHECKING:
 SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ in [-3, 3]
 
 
-def law(case: Case) -> ThetaLaw:
+def law(section: RadiusMap) -> ThetaLaw:
     """Law of θ."""
-    return case.radius.distribution
+    return section.distribution
 
 
-def maps(case: Case, alpha: float) -> list[CaseMap]:
+def maps(section: RadiusMap, alpha: float) -> list[CaseMap]:
     """The radius maps at the corners of an α-cut."""
-    numbers = case.radius.numbers
+    numbers = section.numbers
     corners = itertools.product(*(sorted(set(one.cut(alpha))) for one in numbers.values()))
-    return [case.radius.family(dict(zip(numbers, corner, strict=True))) for corner in corners]
+    return [section.family(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
-def modal_map(case: Case) -> CaseMap:
+def modal_map(section: RadiusMap) -> CaseMap:
     """The radius map at the modal values."""
-    return case.radius.family({name: one.modal for name, one in case.radius.numbers.items()})
+    return section.family({name: one.modal for name, one in section.numbers.items()})
 
 
-def radii(case: Case) -> Figure:
+def radii(section: RadiusMap) -> Figure:
     """Fig. 11: distribution of the paper's log-normal particle radii, σ_r = (ln 10)/6, median 1."""
     drawn, axes = figure()
-    theta = np.linspace(law(case).lower, law(case).upper, 400)
-    axes.plot(np.exp(SIGMA * theta), law(case).cdf(theta), color=BLUE, lw=1.8)  # eq. 11
+    theta = np.linspace(law(section).lower, law(section).upper, 400)
+    axes.plot(np.exp(SIGMA * theta), law(section).cdf(theta), color=BLUE, lw=1.8)  # eq. 11
     axes.set_xlabel("radius r over its median")
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
@@ -62,10 +62,10 @@ def distribution(radius: CaseMap, at: Array) -> Array:
     return np.asarray(np.interp(at, radii[order], share, left=0.0, right=1.0))
 
 
-def p_box(case: Case) -> Figure:
+def p_box(section: RadiusMap) -> Figure:
     """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
     drawn, axes = figure()
-    corners = maps(case, 0.0)
+    corners = maps(section, 0.0)
     low = min(radius.extremes()[0] for radius in corners)
     high = max(radius.extremes()[1] for radius in corners)
     at = np.linspace(low, high, 600)
@@ -75,7 +75,7 @@ def p_box(case: Case) -> Figure:
     )
     axes.plot(at, family.min(0), color=INK, lw=1)
     axes.plot(at, family.max(0), color=INK, lw=1)
-    axes.plot(at, distribution(modal_map(case), at), color=PURPLE, lw=1.8, label="modal map")
+    axes.plot(at, distribution(modal_map(section), at), color=PURPLE, lw=1.8, label="modal map")
     axes.set_xlabel("reduced radius r$_n$ = r/a")
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
@@ -83,14 +83,17 @@ def p_box(case: Case) -> Figure:
     return drawn
 
 
-def cone(case: Case) -> Figure:
+def cone(section: RadiusMap) -> Figure:
     """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
     import matplotlib.pyplot as plt
 
     drawn = plt.figure(figsize=(5.0, 5.4))
     axes: Any = drawn.add_subplot(projection="3d")
-    radius = modal_map(case)
-    theta, angle = np.linspace(law(case).lower, law(case).upper, 80), np.linspace(0, 2 * np.pi, 80)
+    radius = modal_map(section)
+    theta, angle = (
+        np.linspace(law(section).lower, law(section).upper, 80),
+        np.linspace(0, 2 * np.pi, 80),
+    )
     r = radius(theta)[:, None]
     axes.plot_surface(
         r * np.cos(angle),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
@@ -13,12 +14,15 @@ from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput
 from alphacut.io.provenance import FORMAT, door, own_version
 
-NEEDED = ("case", "title", "case_text", "command", "versions", "seconds")  # of summary.json
-STORED = (
-    "microstructure", "modulus", "image", "response", "update", "exceedance", "decision", "joint",
-    "shares",
-)  # fmt: skip
-
+NEEDED = (
+    "case",
+    "title",
+    "case_text",
+    "command",
+    "versions",
+    "seconds",
+    "fingerprints",
+)  # of summary.json
 if TYPE_CHECKING:
     import xarray
 
@@ -131,39 +135,20 @@ def read_summary(folder: Path) -> Document:
     return found
 
 
-def stored(summary: Document) -> list[str]:
-    """Names of the NetCDF files that hold the results of a summary."""
-    names = [name for name in STORED if summary.get(name)]
-    return [f"{x}.nc" for x in (*names, *(f"envelope_{x}" for x in summary.get("envelopes", ())))]
-
-
 def own_files(summary: Document, folder: Path) -> list[Path]:
     """The NetCDF files of a summary that are in its folder.
 
     Raises:
-        BadInput: Some are no longer those of the run that wrote the summary.
+        BadInput: Some are not those of the run that wrote the summary.
     """
-    keys: dict[str, str] = summary.get("fingerprints", {})  # older programs told none
-    files = sorted(path for x in stored(summary) if (path := folder / x).is_file())
-    told = {path.name: fingerprint_of(path, str(folder)) for path in files if path.name in keys}
-    others = [name for name, key in told.items() if key not in ("", keys[name])]
-    if not same_particles(summary, folder / "microstructure.json"):
-        others.append("microstructure.json")
-    if other := ", ".join(others):
-        what = f"not of the run that wrote summary.json, but of another run or command: {other}"
-        cure = f"results of one run, by {door('run')} CASE.toml --out {quote(str(folder))}"
-        raise BadInput.of(str(folder), what, allowed=cure)
-    return files
-
-
-def same_particles(summary: Document, path: Path) -> bool:
-    """Whether a file of numbers of a microstructure, if there, holds those of a summary."""
-    if "microstructure" not in summary or not path.is_file():
-        return True
-    try:
-        return bool(json.loads(path.read_text(encoding="utf-8")) == summary["microstructure"])
-    except ValueError:
-        return False
+    keys: dict[str, str] = summary["fingerprints"]
+    files = [folder / f"{name}.nc" for name in keys if re.fullmatch(r"[\w.+-]+", name)]
+    there = [file for file in files if file.is_file()]
+    other = [file.name for file in there if fingerprint_of(file) != keys[file.stem]]
+    if other:
+        what = f"not of the run that wrote summary.json: {', '.join(other)}"
+        raise BadInput.of(str(folder), what, allowed="results of one run")
+    return there
 
 
 def fingerprint_of(path: Path, key: str = "--out") -> str:
@@ -176,8 +161,8 @@ def fingerprint_of(path: Path, key: str = "--out") -> str:
 
     try:
         with xarray.open_dataset(path) as dataset:
-            told = dict(dataset.attrs)
+            facts = dict(dataset.attrs)
     except (OSError, ValueError):
         return ""
-    require_known(told, path, key=key)
-    return str(told.get("fingerprint", ""))
+    require_known(facts, path, key=key)
+    return str(facts.get("fingerprint", ""))

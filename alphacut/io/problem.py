@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Self
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.printable import printable
 
 
 @dataclass(frozen=True)
@@ -12,33 +16,41 @@ class Problem:
     """One thing wrong with a case file or a command line.
 
     Args:
-        key: Name of the key or option, for example ``cell.matrix_modulus``.
-        what: What is wrong, without a full stop.
-        value: The value got, as the user wrote it; empty where there is none.
-        allowed: What is allowed instead.
-        nearest: The known name that comes nearest to an unknown one.
+        key: Name of the key or option, such as ``cell.matrix_modulus``.
+        what: Statement of what is wrong; empty where `value` and `allowed` say it.
+        value: The value as the user wrote it; empty where there is none.
+        allowed: Values that are allowed instead.
+        cure: Advice where `allowed` does not give it.
         file: Case file; empty for a command line.
         line: Line in the file, from 1; 0 where it is not known.
     """
 
     key: str
-    what: str
+    what: str = ""
     value: str = ""
     allowed: str = ""
-    nearest: str = ""
+    cure: str = ""
     file: str = ""
     line: int = 0
 
+    @classmethod
+    def of(cls, error: RefusedError) -> Self:
+        """The problem of a value that a constructor refused."""
+        value = "" if error.value is None else str(error.value)
+        what = "is missing" if error.value is None else ""
+        return cls(error.key, what, value, error.allowed, error.cure)
+
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
-        text = f"{place}{self.key}" + (f" = {self.value}" if self.value else "") + f": {self.what}"
-        text += f"; allowed: {self.allowed}" if self.allowed else ""
-        text += f"; did you mean {self.nearest}?" if self.nearest else ""
-        return " ".join(text.split())
+        value = f" is {printable(self.value)}" if self.value else ""
+        what = f"{':' * bool(value)} {self.what}" if self.what else ""
+        allowed = f"; allowed: {printable(self.allowed)}" if self.allowed else ""
+        cure = f"; {self.cure}" if self.cure else ""
+        return printable(f"{place}{printable(self.key)}{value}{what}{allowed}{cure}", 1000)
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit
-    """The input cannot be used; carries every problem found, each one line long."""
+    """An input that cannot be used; carries every problem of it."""
 
     def __init__(self, problems: Problem | Sequence[Problem]) -> None:
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
@@ -48,16 +60,20 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
     def of(
         cls,
         key: str,
-        what: str,
+        what: str = "",
         value: str = "",
         allowed: str = "",
-        nearest: str = "",
+        cure: str = "",
         *,
         file: str = "",
         line: int = 0,
     ) -> Self:
         """The error of one problem, from its fields."""
-        return cls(Problem(key, what, value, allowed, nearest, file, line))
+        return cls(Problem(key, what, value, allowed, cure, file, line))
+
+    def within(self, file: str) -> Self:
+        """The error with a file in every problem that names none."""
+        return type(self)([p if p.file else replace(p, file=file) for p in self.problems])
 
 
 def refuse(problems: Iterable[Problem]) -> None:
@@ -66,8 +82,20 @@ def refuse(problems: Iterable[Problem]) -> None:
     Raises:
         BadInput: There are.
     """
-    if found := tuple(problems):
-        raise BadInput(found)
+    if every := tuple(problems):
+        raise BadInput(every)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """The known name that comes nearest to `name`; empty if none comes near."""
+    folded = {option.lower(): option for option in known}
+    close = get_close_matches(name.lower().replace("-", "_"), folded, n=1, cutoff=0.6)
+    return folded[close[0]] if close else ""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Words on the known name that comes nearest; empty if none comes near."""
+    return f"did you mean {close}?" if (close := nearest(name, known)) else ""
 
 
 EXTRAS = {"skimage": "particles", "gmsh": "mesh", "meshio": "mesh", "h5py": "mesh"}
@@ -77,10 +105,5 @@ def missing(error: ImportError) -> str:
     """Message for an import that failed, with its cure."""
     library = (error.name or "").partition(".")[0]
     if library in EXTRAS:
-        cure = f"pip install '.[{EXTRAS[library]}]' in a checkout, or run inside ./enter"
-    else:
-        cure = (
-            "DOLFINx and its libraries are in no Python index: run inside ./enter of a checkout, or"
-            " install Debian 13's python3-dolfinx or conda-forge's fenics-dolfinx"
-        )
-    return f"{error}; {cure}"
+        return f"{error}; pip install '.[{EXTRAS[library]}]', or run inside ./enter"
+    return f"{error}; run inside ./enter, or install python3-dolfinx or fenics-dolfinx"

@@ -14,6 +14,9 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import numpy as np
+from pydantic import BaseModel
+
 # 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
 FORMAT = 2
 PACKAGES = {
@@ -96,10 +99,14 @@ def digest(content: object) -> str:
 
 
 def _canonical(value: object) -> object:
+    if isinstance(value, BaseModel):
+        return [type(value).__name__, {x: getattr(value, x) for x in type(value).model_fields}]
     if is_dataclass(value) and not isinstance(value, type):
         values = {field.name: getattr(value, field.name) for field in fields(value)}
         return [type(value).__name__, values]
-    return str(value)
+    if isinstance(value, np.ndarray):
+        return [value.shape, str(value.dtype), hashlib.sha256(value.tobytes()).hexdigest()]
+    return value.name if isinstance(value, Path) else str(value)
 
 
 def door(*words: object) -> str:

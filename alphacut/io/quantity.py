@@ -1,7 +1,7 @@
-"""Reading quantities as engineers write them: "80 GPa", "[75, 80, 85] GPa", "20 t ± 5 %".
+"""Quantities as engineers write them: "80 GPa", "[75, 80, 85] GPa", "20 t ± 5 %".
 
-One number is crisp, two are an interval, three a triangle (lower, modal, upper), four a trapezoid.
-A spread "± 5 %" is an interval: nothing in it is more possible than the rest.
+One number is crisp, two are an interval, three a triangle (lower, modal, upper), four a trapezoid;
+a spread "± 5 %" is an interval.
 """
 
 from __future__ import annotations
@@ -11,126 +11,109 @@ import re
 from decimal import Decimal
 
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.units import factor, size_problem
+from alphacut.io.units import GREATEST, LEAST, factor
 
-NUMBER = r"[-+\u2212]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
-SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-|\+-)\s*({NUMBER})\s*(.*)")
-PER_CENT = re.compile(r"(?:%|per ?cent)[\s*·)]*([^\s*·)].*)")
+SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")
 SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
-ORDERS = {
-    2: "lower ≤ upper",
-    3: 'lower ≤ modal ≤ upper, as in "[90, 95, 105] GPa"',
-    4: "four values that rise",
-}
-SHAPES = {1: "crisp", 2: "interval", 3: "triangle", 4: "trapezoid"}
+SHAPES = {1: "crisp", 2: "an interval", 3: "a triangle", 4: "a trapezoid"}
+LONGEST = 1000
+"""Characters of a quantity; no longer text is read."""
 
 
 def decimal(text: str) -> Decimal:
-    """A plain finite decimal number; a typographic minus is taken as one."""
-    return Decimal(text.replace("\u2212", "-"))
+    """A plain finite decimal number; a typographic minus is taken as one.
+
+    Raises:
+        ValueError: It is none.
+    """
+    if re.fullmatch(NUMBER, text.strip()) is None:
+        raise ValueError(f'"{text.strip()}" is no number')
+    return Decimal(text.strip().replace("\u2212", "-"))
 
 
 def one(text: str, si: str) -> Decimal:
-    """A single quantity such as "80 GPa", in `si`."""
-    if comma := re.match(r"([-+\u2212]?\d+),(\d+)", text.strip()):
-        raise ValueError(f"a comma stands in the number: write {comma[1]}.{comma[2]} with a point")
+    """A single quantity such as "80 GPa", in `si`.
+
+    Raises:
+        ValueError: It begins with no number, or its unit is wrong.
+    """
     match = SINGLE.fullmatch(text.strip())
     if match is None:
         raise ValueError(f'"{text.strip()}" does not begin with a number')
+    if match[2].startswith((",", "_")):
+        raise ValueError(f'"{text.strip()}" is no number; write a point, and no _')
     return decimal(match[1]) * factor(match[2].strip(), si)
 
 
-def listed(inner: str, unit: str, si: str) -> tuple[Decimal, ...]:
-    """The numbers between brackets: the unit stands behind the bracket or behind each number."""
-    if (comma := re.search(r"(\d+),(\d+)", inner)) and re.search(r",\s", inner):
-        raise ValueError(
-            f"a comma may stand in a number: write {comma[1]}.{comma[2]} with a point, or a blank"
-            " after every comma"
-        )
-    items = [item.strip() for item in inner.split(",")]
-    for item in items:
-        if two := re.match(rf"({NUMBER})\s+({NUMBER})", item):
-            raise ValueError(f"a comma is missing: write {two[1]}, {two[2]}")
-        if SINGLE.fullmatch(item) is None:
-            raise ValueError(f'"{item}" does not begin with a number')
-    return tuple(one(f"{item} {unit}" if unit else item, si) for item in items)
-
-
-def spread(match: re.Match[str], si: str) -> tuple[Decimal, ...]:
-    """Both ends of the interval "20 t ± 5 %", "20 t ± 1 t" or "20 ± 1 t"."""
-    middle, unit, width, width_unit = match[1], match[2].strip(), match[3], match[4].strip()
-    if si and (before := PER_CENT.match(width_unit)):
-        told = f"{middle} {unit if unit[:1].isalpha() else before[1]} ± {width} %"
-        raise ValueError(f"a percentage stands before the unit: write {told}")
-    if (unit and not width_unit) or unit == width_unit == "%":
-        cure = "the ends, such as [2, 4] %" if unit == "%" else f"± {width} % or ± {width} {unit}"
-        raise ValueError(f"the spread ± {width} may mean two things: write {cure}")
-    if width_unit == "%":
-        modal = decimal(middle) * factor(unit, si)
-        half = abs(modal) * decimal(width) / 100
-    else:
-        modal = decimal(middle) * factor(unit or width_unit, si)
-        half = decimal(width) * factor(width_unit or unit, si)
-    return modal - half, modal + half
+def spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
+    """Both ends of the interval "20 t ± 5 %" or "20 t ± 1 t"."""
+    middle = one(f"{match[1]} {match[2]}", si)
+    share = match[4].strip() == "%" and (si or match[2].strip() != "%")
+    half = abs(middle) * decimal(match[3]) / 100 if share else one(f"{match[3]} {match[4]}", si)
+    return middle - half, middle + half
 
 
 def numbers(value: object, si: str) -> tuple[float, ...]:
     """Every number of a quantity, in `si`.
 
     Args:
-        value: What the TOML file holds: text with a unit, or a bare number or array where no unit
-            is needed.
+        value: Text with a unit, or a bare number or array where no unit is needed.
         si: SI unit; empty for a number without a unit.
 
     Raises:
-        ValueError: Not a quantity, its unit is missing or wrong, or it is too large or small.
+        ValueError: It is no quantity, its unit is wrong, or it is too large or small.
     """
     if isinstance(value, bool) or not isinstance(value, str | int | float | list):
-        raise ValueError("this is not a quantity")
+        raise ValueError("this is no quantity")
     if isinstance(value, list):
-        value = (
-            "[" + ", ".join(item if isinstance(item, str) else repr(item) for item in value) + "]"
-        )
-    text = str(value).strip() if isinstance(value, str) else repr(value)
+        value = "[" + ", ".join(map(str, value)) + "]"
+    text = str(value).strip()
+    if len(text) > LONGEST:
+        raise ValueError(f"a quantity of {len(text)} characters is too long")
     if match := LIST.fullmatch(text):
-        found = listed(match[1], match[2].strip(), si)
+        items = [item.strip() for item in match[1].split(",")]
+        values = tuple(one(f"{item} {match[2]}" if match[2] else item, si) for item in items)
     elif match := SPREAD.fullmatch(text):
-        found = spread(match, si)
+        values = spread(match, si)
     else:
-        found = (one(text, si),)
-    if not all(math.isfinite(float(x)) for x in found):
-        raise ValueError("the number is too large")
-    for x in found:
-        if problem := size_problem(float(x), si):
-            raise ValueError(problem)
-    return tuple(float(x) for x in found)
+        values = (one(text, si),)
+    return tuple(_sized(x) for x in values)
+
+
+def _sized(value: Decimal) -> float:
+    size = abs(float(value))
+    if not (size == 0 or LEAST <= size <= GREATEST) or not math.isfinite(size):
+        raise ValueError(f"magnitudes go from {LEAST:g} to {GREATEST:g} in SI, or are 0")
+    return float(value)
 
 
 def number(value: object, si: str) -> float:
-    """A single crisp quantity, in `si`."""
-    found = numbers(value, si)
-    if len(found) != 1:
-        raise ValueError(f"got {len(found)} values where one is wanted")
-    return found[0]
+    """A single crisp quantity, in `si`.
+
+    Raises:
+        ValueError: As of `numbers`, or there are several.
+    """
+    values = numbers(value, si)
+    if len(values) != 1:
+        raise ValueError(f"{len(values)} values stand where one is needed")
+    return values[0]
 
 
 def fuzzy(value: object, si: str) -> FuzzyNumber:
     """A crisp or fuzzy quantity, in `si`.
 
     Raises:
-        ValueError: Not a quantity, more than four values, or values that are not in rising order.
+        ValueError: As of `numbers`, more than four values, or values that do not rise.
     """
-    found = numbers(value, si)
-    if len(found) not in SHAPES:
-        raise ValueError(
-            f"got {len(found)} values; one is crisp, two an interval, three a triangle, four a"
-            " trapezoid"
-        )
-    if list(found) != sorted(found):
-        raise ValueError(f"the {SHAPES[len(found)]} is not in rising order: {ORDERS[len(found)]}")
-    if len(found) == 1:
-        return Crisp(found[0])
-    if len(found) == 2:
-        return Interval(*found)
-    return Triangular(*found) if len(found) == 3 else Trapezoidal(*found)
+    values = numbers(value, si)
+    if len(values) not in SHAPES:
+        raise ValueError(f"{len(values)} values stand where one to four are needed")
+    if list(values) != sorted(values):
+        raise ValueError(f"the values of {SHAPES[len(values)]} rise")
+    if len(values) == 1:
+        return Crisp(values[0])
+    if len(values) == 2:
+        return Interval(*values)
+    return Triangular(*values) if len(values) == 3 else Trapezoidal(*values)

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from markupsafe import Markup
 
 from alphacut.io.files import Document
-from alphacut.io.units import engineering
-from alphacut.report.envelopes import between
+from alphacut.questions.table import QUESTIONS
 from alphacut.report.figures import listed
 from alphacut.report.tables import paragraphs, percent, section, sentence, table
-from alphacut.stages.vibration import decision, update
+from alphacut.stages.words import learned as lines
 
 
 def learned(summary: Document, folder: Path) -> Markup:
-    """What measured modes or a recorded motion teach about the inputs, and what they do not."""
+    """What measured modes teach about the inputs."""
     found = summary["update"]
     title = "Learned from measured modes"
     if "refuted" in found:
         refuted = sentence(found["refuted"]) + " The envelopes rest on the priors."
         return section(title, paragraphs(refuted))
-    words = [sentence(line) for line in update.sentences(found)[len(found["inputs"]) :]]
+    words = [sentence(line) for line in [*lines(found)][len(found["inputs"]) :]]
     rows = [
         (
             name,
@@ -32,7 +32,7 @@ def learned(summary: Document, folder: Path) -> Markup:
         for after in [(ends["lower"][0], ends["upper"][0])]
     ]
     head = ("input, SI", "before", f"after, at α = {found['alpha'][0]:g}", "width left")
-    names = ["inputs", *found["envelope_width"]]
+    names = ["inputs", *found.get("envelope_width", {})]
     return section(
         title,
         paragraphs(*words),
@@ -41,26 +41,11 @@ def learned(summary: Document, folder: Path) -> Markup:
     )
 
 
-def decided(summary: Document, folder: Path) -> Markup:
-    """How possible and how necessary it is that limits are exceeded, and the safety margins."""
-    found = summary["decision"]
-    words = [sentence(line) for line in decision.sentences(found)][len(found["limits"]) :]
-    rows = []
-    for name, one in found["limits"].items():
-        allowed, margins, of = "", ["", ""], name
-        if (margin := found["margins"].get(name)) is not None:
-            unit, largest = margin["unit"], float(margin["limit"])
-            allowed, of = engineering(largest, unit), margin.get("output", name)
-            ends = (decision.margin_ends(found, name, level) for level in (0, -1))
-            margins = [between(low, high, unit, largest) for low, high in ends]
-        degrees = (decision.degree(*one[kind]) for kind in ("possibility", "necessity"))
-        verdict = f"{decision.verdict_of(found, name)} ({decision.worth(found, name)})"
-        rows.append((of, allowed, *degrees, verdict, *margins))
-    levels = (f"margin at α = {found['alpha'][level]:g}" for level in (0, -1))
-    head = ("magnitude of", "limit", "possibly exceeded", "necessarily", "verdict", *levels)
-    meaning = (
-        "Exceeding a limit at any node is possible to the degree of the highest α-cut that holds"
-        " such a motion, and necessary to one less the degree to which keeping it is possible."
-    )
-    drawn = listed(summary, folder, "decision")
-    return section("Decision", paragraphs(meaning), table(head, rows), drawn, paragraphs(*words))
+def answered(summary: Document, folder: Path) -> Iterator[Markup]:
+    """A section for each question."""
+    for question in QUESTIONS:
+        if question.key in summary:
+            found = summary[question.key]
+            drawn = listed(summary, folder, question.key)
+            rows = table(question.head, question.rows(found))
+            yield section(question.title, paragraphs(question.words(found)), rows, drawn)

@@ -10,8 +10,7 @@ from markupsafe import Markup
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
-from alphacut.report.tables import fragment, items, paragraphs, section, sentence, table
-from alphacut.stages.vibration import exceedance as outcomes
+from alphacut.report.tables import fragment, items, paragraphs, section, table
 
 
 def envelopes(summary: Document, exceedance: Markup) -> Markup:
@@ -79,9 +78,7 @@ def peaks(summary: Document) -> Markup:
         " errors, which falls with the square of the step."
     )
     limit = Markup("")
-    if "exceedance" in summary:
-        lines = outcomes.sentences(summary["exceedance"]).splitlines()
-        limit = paragraphs(*map(sentence, lines))
+
     study = next(iter(summary["envelopes"].values()))
     low, high = (f"at α = {study['alpha'][level]:g}" for level in (0, -1))
     head = ("study", "output", f"least peak {low} (bound)", "least of motions tried")

@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from alphacut.figures.captions import caption
 from alphacut.io.files import Document
-from alphacut.io.netcdf import stored
 from alphacut.report.tables import fragment, paragraphs, section
 
 # figures that stand in the section they belong to
@@ -44,7 +43,7 @@ def gallery(summary: Document, folder: Path) -> Markup:
 
 def missing(summary: Document, folder: Path) -> Markup:
     """What the run wrote and the folder lacks; empty where it lacks nothing."""
-    named = [*stored(summary), *summary.get("figures", [])]
+    named = [*(f"{x}.nc" for x in summary["fingerprints"]), *summary.get("figures", [])]
     gone = [name for name in named if not (folder / name).is_file()]
     some = ", ".join(gone[:4]) + (f" and {len(gone) - 4} more" if len(gone) > 4 else "")
     told = f"The run wrote files that are no longer here: {some}. The same run makes them anew."

@@ -8,15 +8,12 @@ from functools import partial
 from markupsafe import Markup
 
 from alphacut.figures.captions import core
-from alphacut.frame.exceedance import ANY
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering, largest_by_unit
 from alphacut.report import envelopes
 from alphacut.report.material import meaning
 from alphacut.report.tables import paragraphs, section, sentence, table
-from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration.decision import degree, verdict_of, worth
 
 Line = tuple[str, str, str, str, float]
 """Quantity, its most plausible values, its range, the nature of that, and the level it is of."""
@@ -25,7 +22,7 @@ HEAD = ("quantity", "most plausible", "widest range", "nature of the range")
 
 def key_results(summary: Document) -> Markup:
     """Most plausible value, widest range and its worth of each result; empty without any."""
-    found, judged = [*moduli(summary), *peaks(summary), *exceeded(summary)], [*decisions(summary)]
+    found, judged = [*moduli(summary), *peaks(summary)], list[tuple[str, str, str, str]]()
     rows = [(of, likely, ends + at(level), nature) for of, likely, ends, nature, level in found]
     held: list[str] = []
     if not rows + judged:
@@ -114,29 +111,3 @@ def beyond(of: Document, unit: str) -> str:
         return ""
     most = engineering(of["upper"][0] + of["error"][0], unit)
     return f"; between nodes at most {most}"
-
-
-def exceeded(summary: Document) -> Iterator[Line]:
-    """Probability that an output exceeds its limit."""
-    for found in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
-        limit = f" exceeds {engineering(found['limit'], found['unit'])}"
-        of_any = " is exceeded" * (found["output"] == ANY)
-        name = f"Probability that {outcomes.event_words(found['output'], limit)}{of_any}"
-        nature = f"{found['nature'].split(':')[0]}{outcomes.nodes(found)}"
-        yield name, *both(found, chance), nature, found["alpha"][0]
-
-
-def chance(lower: float, upper: float) -> str:
-    """Interval of a probability."""
-    return "undecided" if (lower, upper) == (0, 1) else between(lower, upper, ".2g", "")
-
-
-def decisions(summary: Document) -> Iterator[tuple[str, str, str, str]]:
-    """Whether limits are exceeded, and how possible that is."""
-    found = summary.get("decision", {})
-    for name, one in found.get("limits", {}).items():
-        possible, of = f"possibility {degree(*one['possibility'])}", name
-        if (margin := found["margins"].get(name)) is not None:
-            limit = engineering(margin["limit"], margin["unit"])
-            of = f"|{margin.get('output', name)}| beyond {limit}"
-        yield of, verdict_of(found, name), possible, worth(found, name)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from alphacut.stages.material.micrograph import compared
 from markupsafe import Markup
 
 from alphacut.figures.captions import core, in_words, widest
 from alphacut.io.files import Document
 from alphacut.io.units import fixed
-from alphacut.report.tables import code, paragraphs, section, sentence, table
-from alphacut.stages.material import response
+from alphacut.report.tables import paragraphs, section, sentence, table
+from alphacut.stages import response
 
 
 def microstructure(found: Document, seen: Markup) -> Markup:
@@ -41,7 +40,7 @@ def discs(found: Document) -> str:
     whole = found.get("area_fraction_of_image")
     name = "mean_area_fraction_of_map"  # which results of an older program lack
     own = f"; {found[name]:.4f}{OF_MAP}" if name in found else ""
-    image = "" if whole is None else f". The {compared(whole)}"
+    image = "" if whole is None else f"; share of the whole image {whole:.4f}"
     return (
         f"{found['discs']} discs in {found['packings']} sections, area fraction"
         f" {found['area_fraction']:.4f}{own}{image}"
@@ -88,7 +87,7 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     told = [f"Hashin–Shtrikman bounds of E at the modal values: {low:.4f} … {high:.4f} GPa."]
     words = Markup(
         "<p>{} <strong>{}</strong>, {} [{}, {}] GPa; Poisson's ratio {:.4f}. {} {}"
-        " samples, {} linear systems, {:.1f} s. {} {}</p>"
+        " samples, {} linear systems, {:.1f} s.</p>"
     ).format(
         "Core" if "[" in core(found) else "Modal value",
         core(found),
@@ -97,8 +96,6 @@ def modulus(found: Document, drawn: Markup) -> Markup:
         found["nu"],
         MEANING[meaning(found)],
         *(found[name] for name in ("samples", "solves", "seconds")),
-        sentence(found.get("reason", "")),
-        isotropy(found),
     )
     each = (
         ("Error budget", "source", "estimated relative error of E", "error"),
@@ -113,12 +110,9 @@ def modulus(found: Document, drawn: Markup) -> Markup:
     return section("Fuzzy modulus", words + paragraphs(*told), drawn, table(head, rows), *more)
 
 
-def given(found: Document) -> Markup:
-    """The modulus that the case gives instead of having it computed."""
-    cuts = zip(found["alpha"], found["E_GPa"]["lower"], found["E_GPa"]["upper"], strict=True)
-    rows = [(f"{alpha:g}", fixed(low, 4), fixed(high, 4)) for alpha, low, high in cuts]
-    words = paragraphs(Markup("Given by the case: {}.").format(code(found["of"])))
-    return section("Fuzzy modulus", words, table(("α", "lower E, GPa", "upper E, GPa"), rows))
+def interval(ends: Document) -> str:
+    """An interval of moduli in GPa."""
+    return f"[{fixed(ends['lower'], 4)}, {fixed(ends['upper'], 4)}] GPa"
 
 
 def image(found: Document, drawn: Markup) -> Markup:
@@ -132,25 +126,16 @@ def image(found: Document, drawn: Markup) -> Markup:
         "Plane strain: every section of the material is the image, as with fibres; E is that of an"
         " isotropic solid with its plane bulk and shear moduli, not E_T across the fibres.",
     )
-    widths = [
-        (row["source"], f"{row['width_GPa']:.3g}", f"{row['share']:.1%}", row["cure"])
-        for row in found["error_table"]
-    ]
+    widths = [(name, f"{width:.3g}") for name, width in found["widths_GPa"].items()]
+    phases = [f"{name}: {share:.1%} of the area." for name, share in found["fractions"].items()]
     return section(
         "Stiffness of the image",
-        paragraphs(*found.get("phases", ()), *filter(None, [found.get("boundary")])) + words,
+        paragraphs(*phases) + words,
         drawn,
         table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows),
         Markup("<h3>What widens E, the source to improve first on top</h3>")
-        + table(("source", "width of E, GPa", "share", "to narrow it"), widths),
+        + table(("source", "width of E, GPa"), widths),
     )
-
-
-def isotropy(found: Document) -> str:
-    """Sentence on the array's anisotropy; empty where it was not computed."""
-    ratio = found.get("shear_ratio")
-    words = "shear modulus along the diagonals over that along the axes"
-    return "" if ratio is None else sentence(f"{words}: {float(ratio):.3f}")
 
 
 def stress(found: Document, drawn: Markup) -> Markup:

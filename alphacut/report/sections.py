@@ -16,11 +16,11 @@ from alphacut.io.files import Document
 from alphacut.io.provenance import sources
 from alphacut.io.units import engineering
 from alphacut.report import glossary
-from alphacut.report.decisions import decided, learned
+from alphacut.report.decisions import answered, learned
 from alphacut.report.envelopes import envelopes
 from alphacut.report.figures import gallery, listed, missing
 from alphacut.report.key_results import key_results
-from alphacut.report.material import given, image, microstructure, modulus, stress
+from alphacut.report.material import image, microstructure, modulus, stress
 from alphacut.report.tables import (
     citation,
     code,
@@ -45,16 +45,13 @@ def sections(summary: Document, folder: Path) -> Iterator[Markup]:
         yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
     if "image" in summary:
         yield image(summary["image"], listed(summary, folder, "image"))
-    if "given_modulus" in summary:
-        yield given(summary["given_modulus"])
     if "response" in summary:
         yield stress(summary["response"], listed(summary, folder, "response"))
     if "update" in summary:
         yield learned(summary, folder)
     if summary.get("envelopes"):
         yield envelopes(summary, listed(summary, folder, "exceedance"))
-    if "decision" in summary:
-        yield decided(summary, folder)
+    yield from answered(summary, folder)
     if summary.get("shares"):
         yield shares(summary)
     yield methods(summary)

@@ -7,10 +7,8 @@ from collections.abc import Iterator, Sequence
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.text_table import text_table
-from alphacut.io.units import axis_prefix, fixed
-from alphacut.stages.vibration import exceedance as outcomes
-from alphacut.stages.vibration import update
-from alphacut.stages.vibration.decision import degree, verdict_of
+from alphacut.io.units import axis_prefix, engineering, fixed
+from alphacut.questions.table import QUESTIONS
 
 SHORT = {"guaranteed": "guaranteed", "estimated": "estimated", "inner": "attained"}
 """First words of natures, for a column."""
@@ -39,8 +37,6 @@ def modulus_rows(summary: Document) -> Iterator[Sequence[str]]:
     if image := summary.get("image"):
         cuts = image["cuts"]
         yield ("E, GPa", *both(cuts["E_GPa"]), nature(cuts["nature"][0]), "")
-    if of_case := summary.get("given_modulus"):
-        yield ("E, GPa", *both(of_case["E_GPa"]), "of the case", "")
 
 
 def both(cuts: Document) -> tuple[str, str]:
@@ -106,16 +102,27 @@ def error_of(study: Document, output: str, peak: Document) -> str:
 def answers(summary: Document) -> Iterator[str]:
     """A line for each question, what drives the width, and what measured modes leave."""
     if "update" in summary:
-        yield from update.sentences(summary["update"])
-    for name, one in summary.get("decision", {}).get("limits", {}).items():
-        words = (degree(*one[kind]) for kind in ("possibility", "necessity"))
-        possible, necessary = words
-        verdict = verdict_of(summary["decision"], name)
-        yield f"{name}: exceeding possible to {possible}, necessary to {necessary}: {verdict}"
-    for event in outcomes.each_event(summary["exceedance"]) if "exceedance" in summary else ():
-        yield outcomes.sentence(event)
-    for of, shares in summary.get("shares", {}).items():
-        ranked = sorted(shares.items(), key=lambda pair: -pair[1])[:3]
-        if of == "E" or of == next(reversed(summary["shares"])):
-            words = ", ".join(f"{name} {share:.0%}" for name, share in ranked)
-            yield f"width of {of} comes from {words}"
+        yield from learned(summary["update"])
+    for question in QUESTIONS:
+        for row in question.rows(summary[question.key]) if question.key in summary else ():
+            yield ": ".join([row[0], ", ".join(filter(None, row[1:]))])
+    shares = summary.get("shares", {})
+    for of in dict.fromkeys([*[name for name in ("E",) if name in shares], *list(shares)[-1:]]):
+        ranked = sorted(shares[of].items(), key=lambda pair: -pair[1])[:3]
+        words = ", ".join(f"{name} {share:.0%}" for name, share in ranked)
+        yield f"the width of {of} comes from {words}"
+
+
+def learned(document: Document) -> Iterator[str]:
+    """A line for each input and each mode that was predicted, from `Learned.document`."""
+    if "refuted" in document:
+        yield str(document["refuted"])
+        return
+    for name, ends in document["inputs"].items():
+        both_ends, unit = (ends["lower"][0], ends["upper"][0]), document["units"][name]
+        words = " … ".join(engineering(end, unit) for end in both_ends)
+        yield f"{name}: {words}, {document['narrowed'][name]:.0%} of its width before"
+    for mode in document["held_out"]:
+        low, high = mode["predicted"]
+        where = f"{mode['measured']:.4g}, {'inside' if mode['inside'] else 'outside'}"
+        yield f"mode {mode['mode']}: {low:.4g} … {high:.4g} Hz predicted, measured {where}"

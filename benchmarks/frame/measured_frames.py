@@ -22,8 +22,7 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.identify import Measurement, RefutedError, identify, measured_mode
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.stages.vibration.structure import structure
-from alphacut.stages.vibration.update import learned
+from alphacut.stages.identify import learned
 from benchmarks.rows import write
 
 ROOT = Path(__file__).parents[2]
@@ -99,21 +98,23 @@ def tall_rows() -> list[dict[str, object]]:
 
 def laboratory_rows() -> list[dict[str, object]]:
     """Modes 3 and 4 of the laboratory frame, predicted from the first two."""
-    case = load(ROOT / "cases" / "laboratory-frame.toml", {})
-    found = learned(case, structure(case, None))
-    assert found.posterior is not None
+    content = load(ROOT / "cases" / "laboratory-frame.toml").content
+    assert content.frame is not None
+    assert content.identify is not None
+    result = learned(content.identify, content.frame.structure(), (0.05, 0.25, 0.5, 0.75, 1.0))
+    found = result.document()
     return [
         {
             "frame": "laboratory, 4 storeys",
-            "mode": x.mode,
-            "low": x.predicted[0],
-            "high": x.predicted[1],
-            "measured": x.measured,
-            "inside": x.inside,
-            "learned_from": f"agree to {found.posterior.height[0]:.2f}",
+            "mode": x["mode"],
+            "low": x["predicted"][0],
+            "high": x["predicted"][1],
+            "measured": x["measured"],
+            "inside": x["inside"],
+            "learned_from": f"agree to {found['agreement'][0]:.2f}",
             "all_modes": "",
         }
-        for x in found.held_out
+        for x in found["held_out"]
     ]
 
 

@@ -32,7 +32,7 @@ from alphacut.rve.model import Model, named
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.stages.material.cell import declared_errors, document
+from alphacut.stages.cell import declared_errors, document
 from alphacut.stochastic import HermiteMap
 from benchmarks.rows import write
 

@@ -61,7 +61,7 @@ def written_docs() -> list[Path]:
 
 def interface() -> dict[str, int]:
     """Counts of the commands, their options, and the keys of a case."""
-    from alphacut.case.schema import key_names
+    from alphacut.case.keys import every_key
     from alphacut.entry import COMMANDS, parsers
 
     each = parsers("alphacut", COMMANDS)[1]
@@ -72,7 +72,7 @@ def interface() -> dict[str, int]:
     return {
         "commands": len(each),
         "options of a command": max(options),
-        "case keys": len(key_names()),
+        "case keys": len(every_key()),
     }
 
 

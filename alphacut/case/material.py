@@ -1,0 +1,222 @@
+"""Sections on the material: random radius, phases, mesh, modulus and stress of the cell."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from alphacut.case.types import (
+    ALPHA,
+    Any_,
+    CaseFile,
+    Each,
+    Grey,
+    Length,
+    Levels,
+    Modulus,
+    Quantity,
+    Radius,
+    Ratio,
+    Section,
+    Share,
+    Stress,
+    after,
+    rising,
+)
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
+from alphacut.stochastic.radius_map import Kind, MapFamily
+
+CELL_METHODS = ("prism", "slices", "series", "auto")
+BETA = re.compile(r"beta\(\s*([0-9.]+)\s*,\s*([0-9.]+)\s*\)")
+LAWS = 'normal, uniform or beta(p, q), as "beta(2, 5)"'
+
+
+class RadiusMap(Section):
+    """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
+
+    theta: Annotated[
+        tuple[
+            Annotated[float, Quantity(least=-10, most=10)],
+            Annotated[float, Quantity(least=-10, most=10)],
+        ],
+        after(rising),
+    ] = Field(default=(-3.0, 3.0), description="support of θ")
+    law: str = Field(default="normal", description=f"law of θ on its support: {LAWS}")
+    map: Kind = Field(
+        default="hermite",
+        description="hermite, the cubic with the slopes a2 and a4; linear; exponential",
+    )
+    a1: Radius = Field(description="radius at the lower end of θ")
+    a3: Radius = Field(description="radius at the upper end of θ")
+    a2: Any_ | None = Field(default=None, description="slope dr/dξ at the lower end")
+    a4: Any_ | None = Field(default=None, description="slope dr/dξ at the upper end")
+
+    @property
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """Parameters of the map by name: of eq. 12 the factors a1 … a4 of its functions."""
+        every = {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
+        kept = ((name, every[name]) for name in self.family.names)
+        return {name: number for name, number in kept if number is not None}
+
+    @property
+    def family(self) -> MapFamily:
+        """Maps of this kind, under the law of θ."""
+        return MapFamily(self.map, self.distribution)
+
+    @property
+    def distribution(self) -> ThetaLaw:
+        """Law of θ.
+
+        Raises:
+            RefusedError: There is no such law.
+        """
+        lower, upper = self.theta
+        if self.law == "normal":
+            return TruncatedNormal(lower, upper)
+        if self.law == "uniform":
+            return Beta(1.0, 1.0, lower, upper)
+        if (shape := BETA.fullmatch(self.law)) is None:
+            raise RefusedError("radius.law", self.law, LAWS)
+        return Beta(float(shape[1]), float(shape[2]), lower, upper)
+
+    @model_validator(mode="after")
+    def _monotone(self) -> Self:
+        """Refuses maps that leave (0, 1) at a corner of the supports, which are linear in a1 … a4.
+
+        Raises:
+            RefusedError: One does, or a slope is missing.
+        """
+        for name in self.family.names:
+            if getattr(self, name) is None:
+                raise RefusedError(
+                    f"radius.{name}", None, "a slope, as 0.1", "map hermite needs it"
+                )
+        names = list(self.numbers)
+        for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
+            values = dict(zip(names, corner, strict=True))
+            try:
+                self.family(values)
+            except ValueError as error:
+                at = ", ".join(f"{name} {value:g}" for name, value in values.items())
+                raise RefusedError("radius", at, "a map inside (0, 1)", str(error)) from None
+        return self
+
+
+class RoundCell(Section):
+    """The two elastic phases of the periodic cell, and the shape of its particle."""
+
+    particles: Literal["cylinders", "spheres"] = Field(
+        default="cylinders", description="cylinders in plane strain, or spheres in a cubic array"
+    )
+    matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
+    matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
+    inclusion_modulus: Modulus = Field(description="Young's modulus of the particle")
+    inclusion_poisson: Ratio = Field(description="Poisson's ratio of the particle")
+
+    @property
+    def phases(self) -> dict[str, FuzzyNumber]:
+        """The elastic constants by name."""
+        names = [f"{x}_{y}" for x in ("matrix", "inclusion") for y in ("modulus", "poisson")]
+        return {name: getattr(self, name) for name in names}
+
+
+class ImageCell(Section):
+    """An image of the phases of a periodic cell, of a material that is the same in depth."""
+
+    image: CaseFile = Field(description="grey or labelled image, PNG, TIFF or .npy")
+    pixel: Annotated[tuple[Length, ...], Each] = Field(
+        description="side of a pixel, or its width and height"
+    )
+    threshold: tuple[Grey, ...] | None = Field(
+        default=None, description="grey value from which on a pixel is of the next phase"
+    )
+    labels: tuple[Annotated[float, Quantity()], ...] | None = Field(
+        default=None, description="value of each phase in a labelled image, instead of threshold"
+    )
+    modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
+    poisson: Annotated[tuple[Ratio, ...], Each] = Field(description="Poisson's ratio of each phase")
+    smooth: bool = Field(default=False, description="whether noise is taken away first")
+    level: bool = Field(default=False, description="whether the drift of light is taken away first")
+    width: Annotated[float, Quantity(least=1e-6, most=1)] | None = Field(
+        default=None, description="relative width of the stiffness's bounds to refine pixels to"
+    )
+
+    @property
+    def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:
+        """E and ν of each phase."""
+        several = self.poisson * (len(self.modulus) if len(self.poisson) == 1 else 1)
+        return tuple(zip(self.modulus, several, strict=True))
+
+    @model_validator(mode="after")
+    def _parted(self) -> Self:
+        """Refuses phases that nothing or too much tells apart.
+
+        Raises:
+            RefusedError: They are.
+        """
+        if (self.threshold is None) == (self.labels is None):
+            value = None if self.threshold is None else "beside cell.labels"
+            raise RefusedError("cell.threshold", value, "one of cell.threshold and cell.labels")
+        count = len(self.threshold) + 1 if self.threshold is not None else len(self.labels or ())
+        if len(self.modulus) != count or len(self.poisson) not in (1, count):
+            value = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
+            raise RefusedError("cell.modulus", value, f"one for each of {count} phases")
+        if len(self.pixel) > 2:
+            raise RefusedError("cell.pixel", len(self.pixel), "a side, or a width and a height")
+        return self
+
+
+def _kind(table: Any) -> str:
+    return "image" if "image" in table else "round"
+
+
+Cell = Annotated[
+    Annotated[RoundCell, Tag("round")] | Annotated[ImageCell, Tag("image")], Discriminator(_kind)
+]
+
+
+class Mesh(Section):
+    """Discretisation of the product domain."""
+
+    layers: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
+        default=12, description="element layers in θ, of method prism"
+    )
+    size: Annotated[float, Quantity(least=0.005, below=1)] = Field(
+        default=0.15, description="element size over half the cell's side"
+    )
+
+
+class ModulusSection(Section):
+    """Computation of the fuzzy modulus."""
+
+    method: Literal["prism", "slices", "series", "auto"] = Field(
+        default="auto", description="model of the cell; auto is the series"
+    )
+    plan: Literal["general", "reduced", "extended", "signed"] = Field(
+        default="general", description="samples of the transformation method"
+    )
+    alpha: Levels = Field(default=ALPHA, description="α-levels")
+    tolerance: Annotated[float, Quantity(least=1e-10, most=0.1)] | None = Field(
+        default=None, description="relative error of E that is allowed"
+    )
+    average: Literal["axes", "isotropic"] = Field(
+        default="isotropic",
+        description="E of a plane: isotropic, of the average over all directions; axes, of eq. 16",
+    )
+
+
+class Response(Section):
+    """Random stress of the cell: its p-box, quantiles, and the probability of a limit."""
+
+    quantity: Literal["s11", "s12"] = Field(
+        default="s11", description="stress 11 under ε11 = ε22 = 0.01, or 12 under ε12 = 0.01"
+    )
+    quantiles: Annotated[tuple[Share, ...], after(rising)] = Field(
+        default=(0.05, 0.5, 0.95), description="probabilities of the quantiles"
+    )
+    limit: Stress | None = Field(default=None, description="stress that may be exceeded")

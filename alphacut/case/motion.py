@@ -1,0 +1,125 @@
+"""Sections on the motion of a structure: envelopes, studies, limits, measured modes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationInfo
+
+from alphacut.case.types import (
+    ALPHA,
+    CaseFile,
+    Levels,
+    Names,
+    Quantity,
+    Section,
+    Share,
+    Text,
+    Time,
+    after,
+)
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io import quantity
+
+EnvelopeMethod = Literal[
+    "auto", "proof", "search", "graph-follower", "improved-graph-follower", "quasi-monte-carlo"
+]
+MOST_STEPS = 1_000_000
+"""Steps of a simulation; more do not fit into memory."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Error of an envelope that is allowed.
+
+    Args:
+        value: In SI, or as a share of each output's peak.
+        unit: SI unit, or "" of a share.
+    """
+
+    value: float
+    unit: str = "m"
+
+
+def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
+    if isinstance(value, Tolerance):
+        return value
+    for unit in ("m", "N", ""):
+        try:
+            number = quantity.number(value, unit)
+        except ValueError:
+            continue
+        if 0 < number < (1 if unit == "" else float("inf")):
+            return Tolerance(number, unit)
+    raise RefusedError("", value, 'a length, a force or a share, as "0.2 mm", "0.05 N", "0.1 %"')
+
+
+def _file_name(value: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,63}", value) or ".." in value:
+        raise RefusedError("", value, "up to 64 letters, digits and . _ + -, as a file's name")
+    return value
+
+
+class Study(Section):
+    """One envelope that `alphacut run` computes; what it leaves out is as in [envelope]."""
+
+    name: Annotated[str, after(_file_name)] = Field(description="name of envelope_NAME.nc")
+    fuzzy: Names = Field(description="inputs that are fuzzy")
+    duration: Time = Field(description="length of the simulation")
+    figures: dict[str, str] = Field(
+        default={}, description="outputs that are drawn, each with its number in the paper"
+    )
+
+
+class Envelope(Section):
+    """Fuzzy forward dynamics."""
+
+    fuzzy: Names = Field(
+        description="inputs that are fuzzy; of a frame E, I, m or m1 …, l, c (columns),"
+        " k (stiffness), d, q0, v0, zeta, rayleigh_mass, rayleigh_stiffness"
+    )
+    alpha: Levels = Field(default=ALPHA, description="α-levels")
+    method: EnvelopeMethod = Field(default="auto", description="method of the envelope")
+    integrator: Literal["midpoint", "rk4", "exact", "composition4"] | None = Field(
+        default=None, description="time stepping; by the method if left out"
+    )
+    tolerance: Annotated[Tolerance, Text(_tolerance)] = Field(
+        default=Tolerance(1e-4),
+        description="error that is allowed: of displacements, of forces, or a share of each peak",
+    )
+    gain: Annotated[float, Quantity(least=1e-6, most=1)] = Field(
+        default=0.25,
+        description="gain worth a trajectory to a Graph Follower, as a share of the tolerance",
+    )
+    duration: Time = Field(description="length of the simulation")
+    step: Time = Field(description="time step")
+
+    def require_steps(self, key: str, duration: float) -> None:
+        """Refuses a duration that is no whole number of steps, or of too many.
+
+        Raises:
+            RefusedError: It is.
+        """
+        steps = duration / self.step
+        whole = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps
+        if not whole or steps > MOST_STEPS:
+            allowed = f"whole multiples of envelope.step, up to {MOST_STEPS:,} steps"
+            raise RefusedError(key, f"{duration:g} s", allowed)
+
+
+class Identify(Section):
+    """Measured natural modes, from which inputs are identified."""
+
+    measured: CaseFile = Field(description="CSV file mode,frequency [Hz],q1,q2 …")
+    learn: Names = Field(description="inputs that are identified, as c or k1")
+    held_out: tuple[Annotated[int, Quantity(least=1, whole=True)], ...] = Field(
+        default=(), description="modes that are predicted and not learned from"
+    )
+    frequency_deviation: Share | None = Field(
+        default=None, description="standard deviation of a frequency as a share of it"
+    )
+    shape_deviation: Share | None = Field(
+        default=None, description="standard deviation of an amplitude, over the mode's largest"
+    )

@@ -1,0 +1,96 @@
+"""A structure at modal values, and its parameters as fuzzy numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from alphacut.frame import INTEGRATORS, LinearFlow, StoreyFrame
+from alphacut.frame.dynamics.flow import Flow
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.problem import suggestion
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A storey frame or a pendulum.
+
+    Args:
+        model: The model at modal values.
+        numbers: Every parameter, crisp or fuzzy, in SI.
+    """
+
+    model: StoreyFrame | LagrangianSystem
+    numbers: Mapping[str, FuzzyNumber]
+
+    @property
+    def frame(self) -> StoreyFrame | None:
+        """The model if it is a storey frame, else None."""
+        return self.model if isinstance(self.model, StoreyFrame) else None
+
+    @property
+    def linear(self) -> LinearSystem | None:
+        """The model if it is linear, else None."""
+        return None if isinstance(self.model, LagrangianSystem) else self.model
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return self.model.outputs
+
+    @property
+    def takes_modulus(self) -> bool:
+        """Whether Young's modulus is a parameter of it."""
+        return "E" in self.numbers
+
+    def with_modulus(self, number: FuzzyNumber | None) -> Structure:
+        """The structure with another Young's modulus in Pa, where it takes one."""
+        if number is None or self.frame is None or not self.takes_modulus:
+            return self
+        return Structure(replace(self.frame, modulus=number.modal), {**self.numbers, "E": number})
+
+    def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
+        """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.
+
+        Raises:
+            RefusedError: The name stands for nothing, or for nothing fuzzy.
+        """
+        try:
+            members = self.frame.group(name) if self.frame else (name,)
+            fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
+        except (ValueError, KeyError):
+            allowed = ", ".join(self.numbers)
+            raise RefusedError(key, name, allowed, suggestion(name, self.numbers)) from None
+        if not fuzzy:
+            raise RefusedError(key, name, "inputs that are fuzzy", "this one is one number")
+        return fuzzy
+
+    def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
+        """The fuzzy inputs that the names stand for."""
+        return {
+            member: self.numbers[member] for name in names for member in self.members(name, key)
+        }
+
+    def require_outputs(self, key: str, names: Iterable[str]) -> None:
+        """Refuses outputs that are not observed.
+
+        Raises:
+            RefusedError: One is not.
+        """
+        for name in names:
+            if name not in self.outputs:
+                cure = suggestion(name, self.outputs)
+                raise RefusedError(key, name, ", ".join(self.outputs), cure)
+
+    def flow(
+        self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
+    ) -> Flow:
+        """Trajectories as a function of parameters, by the midpoint rule by default."""
+        scheme, model = integrator or "midpoint", self.model
+        if isinstance(model, LagrangianSystem):
+            return LagrangianFlow(model, tuple(names), duration, step, scheme)
+        return LinearFlow(model, tuple(names), duration, step, INTEGRATORS[scheme])

@@ -1,0 +1,255 @@
+"""Sections on structures: storey frame, pendulum."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from alphacut.case.structure import Structure
+from alphacut.case.types import (
+    Acceleration,
+    Angle,
+    Count,
+    Critical,
+    Damping,
+    Delay,
+    Displacement,
+    Each,
+    Mass,
+    Modulus,
+    Moment,
+    Rate,
+    Section,
+    Span,
+    Spin,
+    Stiffness,
+    Text,
+    Turning,
+    Velocity,
+    case_file,
+)
+from alphacut.frame import Accelerogram, StoreyFrame
+from alphacut.frame.structures.lagrangian import pendulum
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.accelerogram import accelerogram
+
+ZERO = Crisp(0.0)
+STAND_IN = Crisp(2e10)
+"""Young's modulus in Pa of a frame whose own is yet to be computed."""
+
+
+def _record(value: object, info: ValidationInfo) -> Accelerogram:
+    return accelerogram(case_file(value, info), "frame.accelerogram")
+
+
+class Frame(Section):
+    """Storey frame: rigid floors on elastic columns, numbered from the ground.
+
+    A key with one value for each floor may hold one value for all of them.
+    """
+
+    masses: Annotated[tuple[Mass, ...], Each] = Field(description="mass of each floor")
+    lengths: Annotated[tuple[Span, ...], Each] | None = Field(
+        default=None, description="height of each storey"
+    )
+    modulus: Modulus | None = Field(
+        default=None, description="Young's modulus where no stage computes it"
+    )
+    second_moment: Annotated[tuple[Moment, ...], Each] | None = Field(
+        default=None, description="second moment of area of one column of each storey"
+    )
+    columns: Annotated[tuple[Count, ...], Each] = Field(
+        default=(Crisp(2.0),), description="clamped columns in each storey"
+    )
+    stiffness: Annotated[tuple[Stiffness, ...], Each] | None = Field(
+        default=None, description="stiffness of each storey, in place of columns and modulus"
+    )
+    damping_ratio: Annotated[tuple[Critical, ...], Each] | None = Field(
+        default=None, description="damping over the critical one, of all modes or of each"
+    )
+    dampers: Annotated[tuple[Damping, ...], Each] = Field(
+        default=(ZERO,), description="viscous damper of each floor"
+    )
+    damper_placement: Literal["ground", "storey"] | None = Field(
+        default=None, description="dampers to the ground, or between storeys"
+    )
+    displacements: Annotated[tuple[Displacement, ...], Each] = Field(
+        default=(ZERO,), description="displacement of each floor at the start"
+    )
+    velocities: Annotated[tuple[Velocity, ...], Each] = Field(
+        default=(ZERO,), description="velocity of each floor at the start"
+    )
+    rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
+    rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
+    accelerogram: Annotated[Accelerogram, Text(_record)] | None = Field(
+        default=None,
+        description="CSV or AT2 file of the ground's acceleration; motion is relative to it",
+    )
+    outputs: tuple[str, ...] = Field(
+        default=(),
+        description="observed quantities: q1, v1, a1, ar1, drift1, shear1 …, base_shear",
+    )
+
+    @property
+    def damped(self) -> bool:
+        """Whether any damper is there."""
+        return any(number.support.upper > 0 for number in self.dampers)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it needs no modulus of a stage."""
+        return self.modulus is not None or self.stiffness is not None
+
+    @property
+    def floors(self) -> int:
+        """Number of floors."""
+        return len(self.masses)
+
+    def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
+        """One value for each floor; a single one holds for all of them."""
+        several = values or ()
+        return several * self.floors if len(several) == 1 else several
+
+    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
+        """The frame with a Young's modulus in Pa, its own by default.
+
+        Raises:
+            RefusedError: Its values make no frame.
+        """
+        number = None if self.stiffness else modulus or self.modulus or STAND_IN
+        try:
+            model = self._model(number)
+        except RefusedError:
+            raise
+        except ValueError as error:
+            raise RefusedError("frame", "of these values", "a frame", str(error)) from None
+        every = self._numbers(number)
+        return Structure(model, {name: every[name] for name in model.parameters})
+
+    def _model(self, modulus: FuzzyNumber | None) -> StoreyFrame:
+        moments = self._modal(self.second_moment, spread=False)
+        return StoreyFrame(
+            self._modal(self.masses),
+            self._modal(self.lengths),
+            None if modulus is None else modulus.modal,
+            moments[0] if len(moments) == 1 else moments or None,
+            dampers=self._modal(self.dampers),
+            damper_placement=self.damper_placement or "ground",
+            q0=self._modal(self.displacements),
+            v0=self._modal(self.velocities),
+            outputs=self.outputs,
+            rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
+            ground=self.accelerogram,
+            damping_ratio=self._modal(self.damping_ratio, spread=False),
+            columns=() if self.stiffness else self._modal(self.columns),
+            stiffness=self._modal(self.stiffness),
+        )
+
+    def _modal(
+        self, values: tuple[FuzzyNumber, ...] | None, *, spread: bool = True
+    ) -> tuple[float, ...]:
+        return tuple(x.modal for x in (self.per_floor(values) if spread else values or ()))
+
+    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+        numbers = {
+            "rayleigh_mass": self.rayleigh_mass,
+            "rayleigh_stiffness": self.rayleigh_stiffness,
+            **({} if modulus is None else {"E": modulus}),
+            **_single("I", self.second_moment),
+            **_single("zeta", self.damping_ratio),
+        }
+        lists = {
+            "I{}": self.second_moment,
+            "k{}": self.stiffness,
+            "m{}": self.masses,
+            "l{}": self.lengths,
+            "d{}": self.dampers,
+            "c{}": self.columns,
+            "q{}_0": self.displacements,
+            "v{}_0": self.velocities,
+        }
+        for pattern, values in lists.items():
+            each = enumerate(self.per_floor(values), start=1)
+            numbers |= {pattern.format(floor): value for floor, value in each}
+        return numbers
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Refuses a frame that lacks values, or has too many.
+
+        Raises:
+            RefusedError: It does.
+        """
+        for key in LISTS:
+            values = getattr(self, key) or (ZERO,)
+            if len(values) not in (1, self.floors):
+                allowed = f"one value, or one for each of {self.floors} floors"
+                raise RefusedError(f"frame.{key}", f"{len(values)} values", allowed)
+        for key in ("lengths", "second_moment") if self.stiffness is None else ():
+            if getattr(self, key) is None:
+                raise RefusedError(f"frame.{key}", None, "this key, or frame.stiffness")
+        if self.stiffness is not None and (self.modulus or self.second_moment):
+            cure = "leave out modulus and second_moment"
+            raise RefusedError("frame.stiffness", "beside a modulus", "one of them", cure)
+        if self.names("dampers") != (self.damper_placement is not None):
+            raise RefusedError("frame.damper_placement", None, "both dampers and damper_placement")
+        if not any(map(self.names, DAMPING)):
+            raise RefusedError("frame.dampers", None, " or ".join(DAMPING), '"0 %" for none')
+        starts = (*self.displacements, *self.velocities)
+        if self.accelerogram is None and not any(
+            x.support.upper or x.support.lower for x in starts
+        ):
+            cure = "nothing moves the frame"
+            raise RefusedError("frame.displacements", None, "a start, or an accelerogram", cure)
+        self.structure()
+        return self
+
+
+LISTS = (
+    "lengths", "dampers", "displacements", "velocities", "second_moment", "columns", "stiffness",
+    "damping_ratio",
+)  # fmt: skip
+"""Keys of a frame with one value for each floor, or one for all."""
+DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
+
+
+def _single(name: str, values: tuple[FuzzyNumber, ...] | None) -> dict[str, FuzzyNumber]:
+    """A parameter that all floors share, or one for each of several values."""
+    several = values or ()
+    if len(several) == 1:
+        return {name: several[0]}
+    return {f"{name}{place}": value for place, value in enumerate(several, start=1)}
+
+
+class Pendulum(Section):
+    """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar."""
+
+    mass: Mass = Field(description="mass")
+    length: Span = Field(description="length of the bar")
+    damping: Turning = Field(description="moment over angular velocity")
+    gravity: Acceleration = Field(description="acceleration of gravity")
+    angle: Angle = Field(description="angle at the start, 0 hanging down")
+    angular_velocity: Spin = Field(description="angular velocity at the start")
+
+    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
+        """The pendulum; it takes no modulus."""
+        model = pendulum(
+            mass=self.mass.modal,
+            length=self.length.modal,
+            damping=self.damping.modal,
+            gravity=self.gravity.modal,
+            phi0=self.angle.modal,
+            omega0=self.angular_velocity.modal,
+        )
+        numbers = {
+            "m": self.mass,
+            "l": self.length,
+            "d": self.damping,
+            "g": self.gravity,
+            "phi_0": self.angle,
+            "omega_0": self.angular_velocity,
+        }
+        return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)

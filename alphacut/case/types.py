@@ -1,0 +1,226 @@
+"""Types of the keys of a case: quantities with their unit and range, levels, files."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
+
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io import quantity
+from alphacut.io.units import QUANTITIES
+
+
+class Section(BaseModel):
+    """One table of a case file; built, it does not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    def names(self, key: str) -> bool:
+        """Whether the file gives the key, so that no default stands in."""
+        return key in self.model_fields_set
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of a key, with its SI unit and the range of every value of it.
+
+    Args:
+        si: SI unit; empty for a number without one.
+        above: Values are greater than this.
+        least: Values are this or greater.
+        below: Values are less than this.
+        most: Values are this or less.
+        fuzzy: Whether it may be a fuzzy number.
+        whole: Whether it is a whole number.
+    """
+
+    si: str = ""
+    above: float = -math.inf
+    least: float = -math.inf
+    below: float = math.inf
+    most: float = math.inf
+    fuzzy: bool = False
+    whole: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """Allowed values in words."""
+        kind, example = QUANTITIES[self.si]
+        kind = "whole number" if self.whole else kind
+        ends = [
+            f"above {self.above:g}" * math.isfinite(self.above),
+            f"from {self.least:g}" * math.isfinite(self.least),
+            f"below {self.below:g}" * math.isfinite(self.below),
+            f"up to {self.most:g}" * math.isfinite(self.most),
+        ]
+        words = " ".join(filter(None, [kind, *ends]))
+        return f'{words}, as "{example}"' if self.si else words
+
+    def read(self, value: object) -> object:
+        """The value in SI.
+
+        Raises:
+            RefusedError: It is no such quantity, or out of range.
+        """
+        try:
+            number = self._parsed(value)
+        except ValueError as error:
+            raise RefusedError("", value, self.allowed, str(error)) from None
+        ends = [*number.cut(0.0)] if isinstance(number, FuzzyNumber) else [number]
+        if not all(self.holds(float(end)) for end in ends):
+            raise RefusedError("", value, self.allowed)
+        return number
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is in the range."""
+        return self.above < value < self.below and self.least <= value <= self.most
+
+    def _parsed(self, value: object) -> FuzzyNumber | float | int:
+        if self.whole:
+            if isinstance(value, bool) or not isinstance(value, int):
+                raise ValueError("this is no whole number")
+            return value
+        if isinstance(value, FuzzyNumber):
+            return value
+        if isinstance(value, str) and not self.si and "%" not in value and "[" not in value:
+            raise ValueError("a number stands without quotes")
+        return quantity.fuzzy(value, self.si) if self.fuzzy else quantity.number(value, self.si)
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """The validation by `read`."""
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The JSON Schema: text with a unit, or a number."""
+        bare: list[dict[str, Any]] = [{"type": "integer" if self.whole else "number"}]
+        bare += [{"type": "array", "items": {"type": "number"}}] * self.fuzzy
+        text = {"type": "string", "examples": [QUANTITIES[self.si][1]]}
+        kinds = [text] if self.si else [*bare, text] if not self.whole else bare
+        return {"anyOf": kinds, "description": self.allowed}
+
+
+@dataclass(frozen=True)
+class Text:
+    """A key whose text a function reads.
+
+    Args:
+        read: Object that the text says, from the text and the context of the case.
+    """
+
+    read: Callable[[object, ValidationInfo], object]
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """The validation by `read`."""
+        return core_schema.with_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The JSON Schema: text."""
+        return {"type": "string"}
+
+
+def one_or_many(value: object) -> object:
+    """The entry of an array that may stand without brackets."""
+    return value if isinstance(value, list | tuple) else [value]
+
+
+def _not_empty(value: object) -> object:
+    if isinstance(value, list | tuple) and not value:
+        raise RefusedError("", "[]", "one entry or more")
+    return value
+
+
+Each = BeforeValidator(one_or_many)
+Some = BeforeValidator(_not_empty)
+
+
+def rising(values: tuple[float, ...]) -> tuple[float, ...]:
+    """Numbers in rising order.
+
+    Raises:
+        RefusedError: They do not rise, or there are none.
+    """
+    if not values or any(a >= b for a, b in itertools.pairwise(values)):
+        raise RefusedError("", list(values), "numbers in rising order")
+    return values
+
+
+def case_file(value: object, info: ValidationInfo) -> Path:
+    """A file that the case names, looked for from the case's folder.
+
+    Raises:
+        RefusedError: There is no such file.
+    """
+    folder: Path = (info.context or {}).get("folder", Path())
+    if not isinstance(value, str) or not (folder / value).is_file():
+        raise RefusedError("", value, f"a file, from the folder {folder.absolute()}")
+    return folder / value
+
+
+def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
+    """Names, each once.
+
+    Raises:
+        RefusedError: One stands there twice.
+    """
+    if len(set(values)) < len(values):
+        raise RefusedError("", ", ".join(values), "each name once")
+    return values
+
+
+def after(check: Callable[[Any], Any]) -> Any:
+    """A check of a value that has its type."""
+    from pydantic import AfterValidator
+
+    return AfterValidator(check)
+
+
+CaseFile = Annotated[Path, Text(case_file)]
+Names = Annotated[tuple[str, ...], Some, after(unlike)]
+
+Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
+Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
+Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
+Any_ = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
+Grey = Any_
+Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
+Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
+Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
+Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
+Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
+Damping = Annotated[FuzzyNumber, Quantity("N*s/m", least=0, fuzzy=True)]
+Critical = Annotated[FuzzyNumber, Quantity(least=0, below=1, fuzzy=True)]
+Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
+Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
+Rate = Annotated[FuzzyNumber, Quantity("1/s", least=0, fuzzy=True)]
+Delay = Annotated[FuzzyNumber, Quantity("s", least=0, fuzzy=True)]
+Acceleration = Annotated[FuzzyNumber, Quantity("m/s^2", above=0, fuzzy=True)]
+Turning = Annotated[FuzzyNumber, Quantity("N*m*s", least=0, fuzzy=True)]
+Angle = Annotated[FuzzyNumber, Quantity("rad", fuzzy=True)]
+Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
+
+Time = Annotated[float, Quantity("s", above=0)]
+Length = Annotated[float, Quantity("m", above=0)]
+Stress = Annotated[float, Quantity("Pa", above=0)]
+Share = Annotated[float, Quantity(above=0, below=1)]
+Level = Annotated[float, Quantity(least=0, most=1)]
+Levels = Annotated[tuple[Level, ...], after(rising)]
+ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""α-levels where a case names none."""

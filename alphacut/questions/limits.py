@@ -1,0 +1,91 @@
+"""Limits of outputs as a case writes them: "drift1 <= 40 mm", "drift1 <= 0.5 %", "q3 <= 80 mm"."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field
+
+from alphacut.case.structure import Structure
+from alphacut.case.types import Some
+from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io import quantity
+from alphacut.io.units import engineering
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Largest magnitude allowed of an output.
+
+    Args:
+        output: Of the structure.
+        value: In the SI unit of the output, or as a share of the storey's height.
+        share: Whether it is such a share.
+        text: The limit as the user wrote it.
+    """
+
+    output: str
+    value: float
+    share: bool
+    text: str
+
+    def si(self, structure: Structure, key: str) -> float:
+        """Limit in the SI unit of its output.
+
+        Raises:
+            RefusedError: The structure has no such output, or no height of the storey.
+        """
+        if structure.frame is None:
+            structure.require_outputs(key, [self.output])
+        number = structure.numbers.get(self.output.replace("drift", "l"))
+        if self.share and number is None:
+            raise RefusedError(key, self.text, "a limit in the unit of the output")
+        return self.value * number.modal if self.share and number else self.value
+
+
+def _limit(value: object) -> Limit:
+    """Limit that a text says.
+
+    Raises:
+        RefusedError: It says none.
+    """
+    if isinstance(value, Limit):
+        return value
+    name, bound, text = (part.strip() for part in str(value).partition("<="))
+    allowed = "an output, <= and a quantity, as 'drift1 <= 40 mm' or 'drift1 <= 0.5 %'"
+    share = name.startswith("drift") and text.endswith("%")
+    try:
+        number = quantity.number(text, "" if share else Output(name).unit)
+    except (ValueError, KeyError) as error:
+        raise RefusedError("", value, allowed, str(error)) from None
+    if not bound or not re.fullmatch(r"\w+", name) or not number > 0:
+        raise RefusedError("", value, allowed)
+    return Limit(name, number, share, str(value))
+
+
+Limits = Annotated[
+    tuple[
+        Annotated[Limit, BeforeValidator(_limit), Field(json_schema_extra={"type": "string"})], ...
+    ],
+    Some,
+]
+
+
+def in_si(limits: tuple[Limit, ...], structure: Structure, key: str) -> dict[str, float]:
+    """The limit of each output in its SI unit.
+
+    Raises:
+        RefusedError: The structure has no such output, or an output has two limits.
+    """
+    values = {limit.output: limit.si(structure, key) for limit in limits}
+    if len(values) < len(limits):
+        raise RefusedError(key, ", ".join(x.text for x in limits), "one limit for each output")
+    return values
+
+
+def in_words(output: str, limit: float, unit: str) -> str:
+    """A limit for people: "|drift1| beyond 40.00 mm"; the event's name where it has no unit."""
+    return f"|{output}| beyond {engineering(limit, unit)}" if unit else f"{output} passed"

@@ -1,0 +1,179 @@
+"""Probability that limits are passed, with some inputs random and the others fuzzy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field
+
+from alphacut.case.structure import Structure
+from alphacut.case.types import Quantity
+from alphacut.figures.style import INK, ORANGE, alpha_legend, colours, figure
+from alphacut.frame.questions.passing import ANY
+from alphacut.frame.questions.probability import Probability, probabilities
+from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.io.files import Document
+from alphacut.io.units import axis_prefix, engineering
+from alphacut.questions.limits import in_si, in_words
+from alphacut.questions.question import Limited, Motion, Question, Row
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+class ProbabilitySection(Limited):
+    """Fuzzy probability that limits are passed; inputs that are not random stay fuzzy."""
+
+    random: tuple[str, ...] = Field(
+        default=(), description="inputs that are random, with the shape of their membership"
+    )
+    samples: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
+        default=200, description="random draws at each fuzzy point"
+    )
+
+    def require(self, structure: Structure, key: str) -> None:
+        """Refuses limits and random inputs that the structure does not have.
+
+        Raises:
+            RefusedError: It has no such output or input.
+        """
+        super().require(structure, key)
+        structure.inputs([x for x in self.random if x != "E"], f"{key}.random")
+
+
+def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
+    """Random values with a density proportional to the membership.
+
+    One value from each of `count` equally likely pieces, in random order (a Latin hypercube where
+    several inputs are random): means over them scatter less than those of independent draws.
+    """
+    grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
+    density = number.membership(grid)
+    share = np.concatenate([[0.0], np.cumsum(np.diff(grid) * (density[1:] + density[:-1]) / 2)])
+
+    def draw(rng: np.random.Generator, count: int) -> Array:
+        pieces = (rng.permutation(count) + rng.random(count)) / count
+        return np.asarray(np.interp(pieces * share[-1], share, grid))
+
+    return draw
+
+
+def answer(section: ProbabilitySection, motion: Motion) -> Document:
+    """Probabilities of passing each limit, and any of several."""
+    structure = motion.structure
+    limits = in_si(section.limits, structure, "probability.limits")
+    random = structure.inputs(section.random, "probability.random")
+    fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
+    crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
+    answers = probabilities(
+        motion.observed(tuple(limits)),
+        fuzzy or dict([next(iter(crisp.items()))]),
+        {name: shaped_like(number) for name, number in random.items()},
+        limits,
+        **motion.times,
+        alpha=motion.alpha,
+        samples=section.samples,
+        rng=np.random.default_rng(0),
+        progress=motion.progress,
+    )
+    return {
+        "fuzzy": list(fuzzy),
+        "random": list(random),
+        "samples": section.samples,
+        "step": motion.step,
+        "alpha": motion.alpha,
+        "events": {name: _document(name, one, limits) for name, one in answers.items()},
+    }
+
+
+def _document(name: str, one: Probability, limits: dict[str, float]) -> Document:
+    return {
+        "limit": limits.get(name, 1.0),
+        "unit": "" if name == ANY else Output(name).unit,
+        "lower": one.lower,
+        "upper": one.upper,
+        "error": one.error,
+        "deviation": one.deviation,
+        "nature": str(one.nature),
+        "evaluations": one.evaluations,
+        "curve": {"limit": one.limits, "lower": one.curve[0], "upper": one.curve[1]},
+    }
+
+
+def rows(document: Document) -> list[Row]:
+    """A row for each limit."""
+    return [
+        (
+            in_words(name, one["limit"], one["unit"]),
+            cut(one, 0),
+            one["nature"],
+            cut(one, -1),
+            f"{one['deviation']:.2g}",
+            f"{max(one['error']):.2g}",
+        )
+        for name, one in document["events"].items()
+    ]
+
+
+def cut(one: Document, level: int) -> str:
+    """Bounds of a probability on a level."""
+    return " … ".join(dict.fromkeys(f"{one[side][level]:.3g}" for side in ("lower", "upper")))
+
+
+def words(document: Document) -> str:
+    """How the probability was computed."""
+    random = ", ".join(document["random"]) or "no input"
+    return (
+        f"Random: {random}, with {document['samples']} draws at each fuzzy point. The bounds are"
+        " those of the fuzzy points tried; other points may have more or less. Peaks are those at"
+        f" nodes every {document['step']:g} s; the last column says what lies between them."
+    )
+
+
+def draw(document: Document) -> Figure:
+    """Probability over the limit for the event that names no other, between its bounds by level."""
+    name, one = list(document["events"].items())[-1]
+    alpha = np.asarray(document["alpha"], float)
+    limits = np.asarray(one["curve"]["limit"], float)
+    lower, upper = (np.asarray(one["curve"][side], float) for side in ("lower", "upper"))
+    drawn, axes = figure(7.2, 3.6)
+    for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):
+        axes.fill_between(limits, low, high, color=shade, lw=0)
+    for end in (lower[-1], upper[-1]):
+        axes.plot(limits, end, color=INK, lw=1)
+    _mark(axes, one["limit"], limits, one["unit"])
+    title = f"limit of |{name}|" if one["unit"] else "all limits, over those of the case"
+    factor, unit = axis_prefix(float(limits[-1]), one["unit"])
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}")
+    axes.set_xlabel(f"{title} ({unit})".replace("^2", "²") if unit else title)
+    axes.set_ylabel("probability of passing it")
+    axes.set_ylim(0, 1.02)
+    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
+    """The case's limit, where it is near the curve."""
+    words = engineering(limit, unit) if unit else "1"
+    near = limit <= 2 * limits[-1]
+    if near:
+        axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
+    axes.set_title(f"limit {words} ({'dashed' if near else 'far off'})", loc="left", fontsize=10)
+
+
+QUESTION = Question(
+    key="probability",
+    section=ProbabilitySection,
+    title="How probable is it that limits are passed?",
+    caption="Fuzzy probability of passing a limit, over the limit",
+    answer=answer,
+    figure=draw,
+    head=("limit", "at the lowest α", "nature", "at the highest α", "scatter", "between nodes"),
+    rows=rows,
+    words=words,
+)

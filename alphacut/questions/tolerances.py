@@ -1,0 +1,110 @@
+"""Tolerances: the largest scale of all supports at which every limit is kept."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field
+
+from alphacut.case.types import Quantity
+from alphacut.figures.style import BLUE, GREY, INK, figure
+from alphacut.frame.questions.tolerances import tolerances
+from alphacut.io.files import Document
+from alphacut.questions.limits import in_si
+from alphacut.questions.question import Limited, Motion, Question, Row
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Tolerances(Limited):
+    """Largest scale of the supports of the fuzzy inputs at which every limit is kept."""
+
+    most: Annotated[float, Quantity(above=0, most=100)] = Field(
+        default=2.0, description="largest scale that is tried; 1 is that of the case"
+    )
+
+
+def answer(section: Tolerances, motion: Motion) -> Document:
+    """Scales that are kept and passed, and the supports at the first."""
+    limits = in_si(section.limits, motion.structure, "tolerances.limits")
+    scale = tolerances(
+        motion.observed(tuple(limits)),
+        motion.inputs,
+        limits,
+        **motion.times,
+        most=section.most,
+        progress=motion.progress,
+    )
+    modal = {name: number.modal for name, number in motion.inputs.items()}
+    supports = {
+        name: {"modal": modal[name], "own": motion.inputs[name].support, "kept": ends}
+        for name, ends in scale.supports.items()
+    }
+    return {
+        "limits": limits,
+        "kept": scale.kept,
+        "passed": scale.passed if math.isfinite(scale.passed) else None,
+        "most": section.most,
+        "nature": str(scale.nature),
+        "envelopes": scale.envelopes,
+        "step": motion.step,
+        "supports": supports,
+    }
+
+
+def rows(document: Document) -> list[Row]:
+    """The scale, then each input's tolerance."""
+    kept, passed = document["kept"], document["passed"]
+    scale = "none" if kept is None else f"up to {kept:.4g}"
+    beyond = f"passed at {passed:.4g}" if passed is not None else "none passed"
+    head = ("scale of all tolerances", scale, document["nature"], beyond)
+    return [head, *(_row(name, one, document) for name, one in document["supports"].items())]
+
+
+def _row(name: str, one: Document, document: Document) -> Row:
+    modal, share = one["modal"], [end / one["modal"] - 1 for end in one["kept"] if one["modal"]]
+    ends = ", ".join(f"{end:+.2%}".replace("-", "−") for end in share) or f"about {modal:g}"
+    own = " … ".join(f"{end:.4g}" for end in one["kept"])
+    kept = "–" if document["kept"] is None else f"{own} (SI)"
+    return f"tolerance of {name}", kept, document["nature"], ends if kept != "–" else ""
+
+
+def words(document: Document) -> str:
+    """How to read the scale."""
+    return (
+        "All supports are scaled together about their modal values; 1 is the case as it stands."
+        f" Scales up to {document['most']:g} were tried, each with an envelope of its own."
+    )
+
+
+def draw(document: Document) -> Figure:
+    """Supports of the case and at the scale that keeps the limits, over their modal values."""
+    each = document["supports"]
+    drawn, axes = figure(7.2, 1.0 + 0.4 * len(each))
+    places = np.arange(len(each))[::-1]
+    series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "limits kept"))
+    for kind, colour, height, label in series:
+        ends = np.array([np.asarray(one[kind]) / (one["modal"] or 1.0) for one in each.values()])
+        wide = ends[:, 1] - ends[:, 0]
+        axes.barh(places, wide, left=ends[:, 0], height=height, color=colour, lw=0, label=label)
+    axes.axvline(1.0, color=INK, lw=0.8)
+    axes.set_yticks(places, list(each))
+    axes.set_xlabel("value over the modal one")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
+
+
+QUESTION = Question(
+    key="tolerances",
+    section=Tolerances,
+    title="How far may tolerances go?",
+    caption="Supports of the inputs in the case, and at the scale that keeps all limits",
+    answer=answer,
+    figure=draw,
+    head=("quantity", "limits kept", "nature", "beyond, or relative"),
+    rows=rows,
+    words=words,
+)

@@ -1,0 +1,248 @@
+"""The cell of a case: its parts at crisp values, its model, and its result as a document."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.io.files import Document
+from alphacut.io.problem import BadInput, missing
+from alphacut.io.provenance import versions
+from alphacut.rve import bounds as plane
+from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.result import Homogenised, effective_modulus, error_of_means
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.spheres import bounds as space
+from alphacut.rve.spheres.cubic import hill_average
+from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
+from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.stochastic import RadiusMap as Radii
+from alphacut.stochastic import gauss_rule
+from alphacut.stochastic.radius_map import CaseMap, MapFamily
+
+if TYPE_CHECKING:
+    from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
+
+GPA = 1e9
+SHARE = 0.4
+"""Of the tolerance, for the series at each θ and again for its rule in θ."""
+SPHERES = 1e-5
+"""Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
+
+
+class CellModel(Protocol):
+    """A model of the cell as the front door needs it."""
+
+    def solve(
+        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> Sequence[Homogenised]:
+        """One result for each inclusion material; mesh and assembly are shared."""
+
+
+@dataclass(frozen=True)
+class CellChoice:
+    """A cell model and its resolution, small enough for workers.
+
+    Args:
+        method: prism, slices, series, or auto, which is the series.
+        layers: Element layers in θ.
+        size: Element size over half the cell's side.
+        tolerance: Relative error of E; None for the model's own accuracy.
+        petsc: PETSc options that override the solver's, without their prefix.
+        parallel: Whether all MPI ranks work on one cell together.
+        moduli: Moduli of the particle that all samples together span, in Pa.
+        estimate: Whether elements estimate their error at an extra cost.
+        particles: cylinders or spheres.
+        average: "axes", eq. 16, or "isotropic": the average over all directions of the plane.
+    """
+
+    method: str = "auto"
+    layers: int = 12
+    size: float = 0.15
+    tolerance: float | None = None
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    parallel: bool = False
+    moduli: tuple[float, float] | None = None
+    estimate: bool = False
+    particles: str = "cylinders"
+    average: str = "isotropic"
+
+    @classmethod
+    def of(
+        cls, cell: RoundCell, mesh: Mesh, modulus: ModulusSection, petsc: Mapping[str, str]
+    ) -> CellChoice:
+        """The model that the sections of a case name."""
+        return cls(
+            modulus.method,
+            mesh.layers,
+            mesh.size,
+            modulus.tolerance,
+            petsc,
+            particles=cell.particles,
+            average=modulus.average,
+        )
+
+    @property
+    def averages(self) -> bool:
+        """Whether E and ν are those of the isotropic average of a plane stiffness."""
+        return self.average == "isotropic" and self.particles == "cylinders"
+
+    @property
+    def meaning(self) -> str:
+        """What E and ν are of: cylinders (eq. 16), isotropic or spheres."""
+        return "isotropic" if self.averages else self.particles
+
+    def model(self) -> CellModel:
+        """The model.
+
+        Raises:
+            BadInput: It needs what is not installed.
+            RefusedError: An option of it is out of range.
+        """
+        try:
+            return Averaged(self._axes()) if self.averages else self._axes()
+        except ImportError as error:
+            raise BadInput.of("modulus.method", missing(error), self.method, "series") from None
+
+    def _axes(self) -> CellModel:
+        tolerance = self.tolerance
+        if self.particles == "spheres":
+            return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11))
+        if self.method in ("auto", "series"):
+            own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
+            return SeriesModel(accuracy=own)
+        if self.method == "slices":
+            from alphacut.rve.slices.model import SlicesModel
+
+            return SlicesModel(mesh_size=self.size)
+        from alphacut.rve.prism.model import PrismModel
+
+        return PrismModel(
+            self.size,
+            self.layers,
+            petsc=dict(self.petsc),
+            parallel=self.parallel,
+            stiffness=self.averages,
+            estimate=self.estimate,
+            moduli=self.moduli,
+        )
+
+
+@dataclass(frozen=True)
+class Averaged:
+    """A model whose E and ν are those of the isotropic average of the plane stiffness.
+
+    Args:
+        model: Makes the whole plane stiffness.
+    """
+
+    model: CellModel
+
+    def solve(
+        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Phase]
+    ) -> list[Homogenised]:
+        """One result for each inclusion material."""
+        results = self.model.solve(radius_map, matrix, inclusions)
+        return [result.averaged("isotropic") for result in results]
+
+
+def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
+    """Inputs of the cell by name, crisp or fuzzy, in SI."""
+    return radius.numbers | cell.phases
+
+
+def parts(values: Mapping[str, float], family: MapFamily) -> tuple[CaseMap, Phase, Phase]:
+    """Radius map, matrix and inclusion from crisp values of the inputs, in SI."""
+    matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
+    return family(values), matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+
+
+def modal_parts(radius: RadiusMap, cell: RoundCell) -> tuple[CaseMap, Phase, Phase]:
+    """Radius map, matrix and inclusion at the modal values."""
+    values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
+    return parts(values, radius.family)
+
+
+def solve(radius: RadiusMap, cell: RoundCell, choice: CellChoice) -> Homogenised:
+    """The cell's result at the modal values of its inputs."""
+    map_of, matrix, inclusion = modal_parts(radius, cell)
+    return choice.model().solve(map_of, matrix, [inclusion])[0]
+
+
+def references(radius: RadiusMap, cell: RoundCell) -> Document:
+    """Fraction of the particles, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E in GPa.
+
+    They are of the modal inputs.
+    """
+    map_of, matrix, inclusion = modal_parts(radius, cell)
+    rule, spheres = gauss_rule(map_of.distribution, points=40), cell.particles == "spheres"
+    radii = map_of(rule.nodes)
+    share = np.asarray(rule.mean(volume_fraction(radii) if spheres else np.pi / 4 * radii**2))
+    if spheres:
+        ends = space.hashin_shtrikman(share, matrix, inclusion).T
+        moduli = [_young(*k) for k in (*ends, space.mori_tanaka(share, matrix, inclusion))]
+    else:
+        ends = plane.hashin_shtrikman(share, matrix, inclusion).T
+        whole, _, shear = plane.mori_tanaka(share, matrix, inclusion)
+        moduli = [_across(*k) for k in (*ends, (whole / 2, shear))]
+    return {
+        "fraction": float(share),
+        "hashin_shtrikman_E_GPa": [moduli[0] / GPA, moduli[1] / GPA],
+        "mori_tanaka_E_GPa": moduli[2] / GPA,
+    }
+
+
+def _across(bulk: float, shear: float) -> float:
+    """Young's modulus of eq. 16 of an isotropic plane, in Pa."""
+    return effective_modulus(2 * STRAIN * float(bulk), 2 * STRAIN * float(shear))[0]
+
+
+def _young(bulk: float, shear: float) -> float:
+    """Young's modulus of an isotropic material, in Pa."""
+    return float(hill_average(np.array([bulk, shear, shear]))[0])
+
+
+def document(result: Homogenised) -> Document:
+    """The result for ``--json``; moduli and stresses in GPa."""
+    s11, s12 = result.curve.mean
+    return {
+        "E_GPa": result.modulus / GPA,
+        "nu": result.poisson,
+        "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
+        "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
+        "curve": {
+            "theta": result.curve.theta,
+            "weights": result.curve.weights,
+            "s11": result.curve.s11 / GPA,
+            "s12": result.curve.s12 / GPA,
+        },
+        "unknowns": result.unknowns,
+        "iterations": list(result.iterations),
+        "seconds": dict(result.seconds),
+        "method": result.method,
+        "solver": result.solver,
+        "error": dict(result.error),
+        "declared_error": declared_errors(result),
+        "checks": dict(result.checks),
+        "versions": versions(),
+    }
+
+
+def declared_errors(result: Homogenised) -> dict[str, Any] | None:
+    """Declared absolute errors of E, ν and the mean stresses; None where there are none."""
+    if not result.errors:
+        return None
+    if isinstance(result, HomogenisedSpheres):
+        modulus, nu = result.error_of(hill_average)
+        s11, s12 = result.error_of(lambda k: STRAIN * np.array([2 * k[0] + 2 / 3 * k[1], 2 * k[2]]))
+    else:
+        modulus, nu, s11, s12 = error_of_means(result)
+    return {
+        "E_GPa": modulus / GPA,
+        "nu": nu,
+        "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
+    }

@@ -1,0 +1,92 @@
+"""Stage microstructure: from particles to the fuzzy radius map."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.case.case import file_digest
+from alphacut.case.material import RadiusMap
+from alphacut.case.particles import Microstructure as Section
+from alphacut.fuzzy.campaign.workers import pool
+from alphacut.io.files import as_json, write_text
+from alphacut.stages.store import Stage, Work
+from alphacut.stochastic.microstructure import Microstructure, study
+from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def stage(section: Section, *, spheres: bool, figures: bool = True) -> Stage:
+    """The stage of some particles; in a folder it writes radius.toml and figures as well."""
+
+    def compute(work: Work) -> xarray.Dataset:
+        map_of = computed(section, spheres=spheres, work=work)
+        if work.folder is not None:
+            write(map_of, work.folder, figures=figures)
+        data = to_dataset(map_of)
+        return data.assign_attrs(document=as_json(summary(map_of)), radius=fragment(map_of))
+
+    source = section.packing or section.circles or section.image
+    file = getattr(source, "file", None)
+    inputs = [section, spheres, file and file_digest(file)]
+    return Stage("microstructure", inputs, ("stochastic",), compute)
+
+
+def computed(section: Section, *, spheres: bool, work: Work) -> Microstructure:
+    """The fuzzy radius map; the same for any number of workers.
+
+    Raises:
+        RefusedError: Measured data have no meaning.
+        FailedError: Particles find no place.
+    """
+    with pool(work.workers) as executor:
+        return study(section.study(spheres=spheres), executor=executor, progress=work.tick)
+
+
+def radius_of(dataset: xarray.Dataset) -> RadiusMap:
+    """The section [radius] that the particles give."""
+    return RadiusMap.model_validate(tomllib.loads(str(dataset.attrs["radius"]))["radius"])
+
+
+def document(dataset: xarray.Dataset) -> dict[str, object]:
+    """Numbers of the particles and of their map."""
+    numbers: dict[str, object] = json.loads(dataset.attrs["document"])
+    return numbers
+
+
+PICTURES = {
+    *("03-04_two_point", "05-08_neighbours", "06-07_neighbour_statistics", "09_correlation"),
+    *("10_cells", "11_radii", "12_areas", "13_pbox", "radius_map", "image_circles"),
+}
+"""Stems of the figures of this stage."""
+
+
+def pictures(folder: Path) -> list[Path]:
+    """Figures of this stage in a folder of results."""
+    every = sorted(folder.glob("figures/*.*"))
+    return [path for path in every if path.stem in PICTURES and path.suffix in (".png", ".svg")]
+
+
+def write(map_of: Microstructure, folder: Path, *, figures: bool) -> None:
+    """Writes the fragment of a case, the circles of an image, and figures."""
+    from alphacut.stochastic.figures.all import draw
+
+    for old in pictures(folder):
+        old.unlink()
+    drawn = draw(map_of, folder / "figures") if figures else {}
+    write_text(folder / "radius.toml", fragment(map_of))
+    if "image_circles" in drawn:
+        write_text(folder / "circles.csv", _circles(map_of))
+
+
+def _circles(map_of: Microstructure) -> str:
+    """The circles seen in an image as a CSV file, lengths in m."""
+    discs = map_of.sections[0].particles
+    rows = np.column_stack([discs.centres, discs.radii])
+    return "x [m],y [m],r [m]\n" + "".join(f"{x:.7g},{y:.7g},{r:.7g}\n" for x, y, r in rows)
