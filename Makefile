@@ -29,10 +29,10 @@ coverage:
 
 bench-solver:
 	$(IN) python -m benchmarks.rve.solvers
+	$(IN) python -m benchmarks.rve.solvers --iterations
 
 bench-scaling:
 	$(IN) python -m benchmarks.rve.scaling
-	$(IN) python -m benchmarks.rve.solvers --mesh-size 0.04 --solvers gamg --out benchmarks/results/cell_solvers_large.csv
 
 lint:
 	$(IN) ruff check .

@@ -1,250 +1,134 @@
-"""Two charts of the cell, made from scratch in one run on one core: `make charts`.
+"""What a digit of the cell's modulus costs: error of E against time, for every way to it.
 
-1. Error of E against time, for every way to it.
-2. Time and iterations of the named solvers of the product-space system, over its size and over the
-   contrast of the phases.
+    ./enter python -m benchmarks.rve.charts
 
-Points that would take longer than the cap are drawn hollow at the cap. CSV and figures go to
-benchmarks/results/.
+Made from scratch in one run on one core: `make charts`. Processor time of one call, without imports
+and compilation; a family ends where a run would pass the cap. The truth is the series. CSV and
+figures go to benchmarks/results/.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
 
-from alphacut.rve.cell import Phase
-from benchmarks.rve.methods import MATRIX, PAPER_MAP, Run, exact_modulus, families, measure
+from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.result import Homogenised
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.slices.model import SlicesModel
+from benchmarks.rows import write
+from benchmarks.rve.solvers import MATRIX, PAPER, PARTICLE
 
 RESULTS = Path(__file__).parents[1] / "results"
-RECOMMENDED = ("auto", "tolerance 1e-06")
-COLOURS = {
-    "auto": "black",
-    "series": "#0b6e4f",
-    "table, kept": "#1b9e77",
-    "table, made": "#66c2a5",
-    "slices, order 2": "#c6dbef",
-    "slices, order 3": "#6baed6",
-    "slices, order 4": "#2171b5",
-    "dolfinx_mpc, order 2": "#dadaeb",
-    "dolfinx_mpc, order 3": "#9e9ac8",
-    "prism": "#d94801",
-    "prism, MUMPS": "#fd8d3c",
-    "prism, CG + GAMG": "#fdbe85",
-    "prism, interface ignored": "#a63603",
-    "Monte Carlo over θ": "#969696",
-}
+PLANES = ((0.6, 4), (0.45, 5), (0.3, 6), (0.2, 8), (0.14, 9))  # mesh size, nodes in θ
+PRISMS = ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12), (0.1, 12), (0.07, 12), (0.05, 12))  # layers
+Way = Callable[[], Homogenised]
 
 
 @dataclass(frozen=True)
-class SolverRun:
-    """One solver on one product-space system: set-up and both loads.
+class Run:
+    """One point of the chart.
 
-    `seconds` is processor time: the wall time of these stages by the share of the processor that
-        the whole call had.
+    Args:
+        family: Name of the line.
+        setting: Its resolution, in words.
+        error: Relative error of E.
+        declared: The declared one.
+        seconds: Processor time.
+        unknowns: Of one linear system.
     """
 
-    solver: str
-    mesh_size: float
-    layers: int
-    contrast: float
-    unknowns: int
+    family: str
+    setting: str
+    error: float
+    declared: float
     seconds: float
-    iterations: int
-    capped: bool = False
+    unknowns: int
 
 
-def accuracy_runs(*, cap: float, small: bool = False) -> list[Run]:
-    """All points of the first chart."""
-    exact, runs = exact_modulus(), []
-    for family in families(small=small):
-        for run in measure(family, exact=exact, cap=cap):
-            runs.append(run)
-            state = "capped" if run.capped else f"error {run.error:8.1e}"
-            print(f"{run.family:26} {run.setting:22} {state:16} {run.seconds:9.4f} s", flush=True)
-    return runs
+def way(model: PrismModel | SlicesModel | SeriesModel) -> Way:
+    """A call of the model on the paper's cell."""
+    return lambda: model.solve(PAPER, MATRIX, [PARTICLE])[0]
 
 
-def solver_runs(*, cap: float, small: bool = False) -> list[SolverRun]:
-    """All points of the second chart: first over size, then over contrast."""
-    sizes = (
-        ((0.5, 6), (0.3, 6))
-        if small
-        else ((0.15, 12), (0.1, 12), (0.08, 12), (0.056, 12), (0.04, 12), (0.1, 185))
-    )
-    contrasts = (1e-2, 1e2) if small else (1e-4, 1e-2, 1e2, 1e4)
-    runs = []
-    for solver in ("theta", "mumps") if small else ("theta", "mumps", "gamg"):
-        for settings in (
-            [(h, n, 4.0) for h, n in sizes],
-            [(sizes[0][0], sizes[0][1], c) for c in contrasts],
-        ):
-            stopped = False
-            for mesh_size, layers, contrast in settings:
-                run = _solver_run(solver, mesh_size, layers, contrast, cap=cap, stopped=stopped)
-                growing = settings[0][2] == settings[-1][2]
-                stopped = stopped or run.capped or (4 if growing else 2) * run.seconds > cap
-                runs.append(run)
-                print(
-                    f"{solver:8} h {mesh_size:5g}, {layers} layers, contrast {contrast:7g}: {run}",
-                    flush=True,
-                )
-    return runs
+def families() -> dict[str, list[tuple[str, Way]]]:
+    """All lines, each from coarse to fine."""
+    lines = {"series": [(f"{n} nodes", way(SeriesModel(points=n))) for n in (2, 3, 4, 6, 8, 12)]}
+    for order in (2, 3, 4):
+        lines[f"slices, order {order}"] = [
+            (f"h {h:g}, {n} nodes", way(SlicesModel(order, h, n))) for h, n in PLANES
+        ]
+    for name, solver, interface in (
+        ("prism", "theta", "conforming"),
+        ("prism, MUMPS", "mumps", "conforming"),
+        ("prism, interface ignored", "theta", "sign"),
+    ):
+        lines[name] = [
+            (f"h {h:g}, {n} layers", way(PrismModel(h, n, interface, solver))) for h, n in PRISMS
+        ]
+    return lines
 
 
-def _solver_run(
-    solver: str, mesh_size: float, layers: int, contrast: float, *, cap: float, stopped: bool
-) -> SolverRun:
-    from alphacut.rve.prism.model import PrismModel
-
-    if stopped:
-        return SolverRun(solver, mesh_size, layers, contrast, 0, cap, 0, capped=True)
-    model = PrismModel(mesh_size=mesh_size, layers=layers, solver=solver)
-    wall, processor = perf_counter(), process_time()
-    try:
-        result = model.solve(PAPER_MAP, MATRIX, [Phase(MATRIX.modulus * contrast)])[0]
-    except RuntimeError as refusal:
-        print(f"{solver}: {refusal}", flush=True)
-        return SolverRun(solver, mesh_size, layers, contrast, 0, cap, 0, capped=True)
-    share = min(1.0, (process_time() - processor) / (perf_counter() - wall))
-    seconds = share * (result.seconds["setup"] + result.seconds["solve"])
-    return SolverRun(
-        solver,
-        mesh_size,
-        layers,
-        contrast,
-        result.unknowns,
-        seconds,
-        max(result.iterations, default=0),
-    )
+def runs(*, cap: float, only: Sequence[str]) -> Iterator[Run]:
+    """All points; a line ends before a run that would take longer than `cap` seconds."""
+    exact = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0].modulus
+    for family, settings in families().items():
+        if only and family not in only:
+            continue
+        settings[0][1]()  # compiles
+        for setting, call in settings:
+            started = process_time()
+            one = call()
+            seconds = process_time() - started
+            error = max(abs(one.modulus / exact - 1), 1e-16)
+            yield Run(family, setting, error, one.estimated_error, seconds, one.unknowns)
+            if 4 * seconds > cap:
+                break
 
 
-def write(rows: Sequence[Run] | Sequence[SolverRun], path: Path) -> None:
-    """One CSV file, written whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    with partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(asdict(rows[0])))
-        writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
-    partial.replace(path)
-
-
-def draw_accuracy(runs: Sequence[Run], stem: Path) -> None:
-    """Error over time, one line for each family, named at its end; the recommended point ringed."""
+def draw(points: Sequence[Run], stem: Path) -> None:
+    """Error over time, one line for each family."""
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(9.5, 6), layout="constrained")
-    for family in dict.fromkeys(run.family for run in runs):
-        own = [run for run in runs if run.family == family]
-        made = [run for run in own if not run.capped]
-        colour = COLOURS.get(family, "black")
-        seconds, errors = [run.seconds for run in made], [run.error for run in made]
-        axes.loglog(seconds, errors, "o-", color=colour, label=family, ms=4, lw=1.6)
-        for run in own:
-            if run.capped:
-                axes.plot(run.seconds, errors[-1], ">", mfc="none", color=colour)
-            if (run.family, run.setting) == RECOMMENDED:
-                axes.plot(run.seconds, run.error, "*", ms=20, color="gold", mec="black", zorder=5)
-                text = "recommended:\n--method auto --tolerance 1e-6"
-                axes.annotate(
-                    text,
-                    (run.seconds, run.error),
-                    (16, -4),
-                    textcoords="offset points",
-                    fontsize=10,
-                )
-    axes.set(
-        xlabel="seconds of one core",
-        ylabel="relative error of E",
-        title="What a digit of the effective modulus costs",
-    )
+    figure, axes = plt.subplots(figsize=(9, 5.5), layout="constrained")
+    for family in dict.fromkeys(point.family for point in points):
+        own = [point for point in points if point.family == family]
+        seconds, errors = [point.seconds for point in own], [point.error for point in own]
+        axes.loglog(seconds, errors, "o-", label=family, ms=4)
+    axes.set(xlabel="seconds of one core", ylabel="relative error of E")
+    axes.set_title("What a digit of the effective modulus costs")
     axes.invert_yaxis()
-    axes.grid(alpha=0.25, which="major")
-    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5), frameon=False)
-    axes.text(
-        0.01, 0.985, "better ↖", transform=axes.transAxes, va="top", fontsize=11, weight="bold"
-    )
-    _save(figure, stem)
-
-
-def draw_solvers(runs: Sequence[SolverRun], stem: Path) -> None:
-    """Time and iterations over unknowns and over contrast."""
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(2, 2, figsize=(10, 7), layout="constrained", sharex="col")
-    names = list(dict.fromkeys(run.solver for run in runs))
-    for name in names:
-        own = [run for run in runs if run.solver == name and not run.capped]
-        sized = sorted((run for run in own if run.contrast == 4.0), key=lambda run: run.unknowns)
-        base = min((run.unknowns for run in sized), default=0)
-        contrasted = sorted(
-            (run for run in own if run.unknowns == base), key=lambda run: run.contrast
-        )
-        for column, (chosen, across) in enumerate(((sized, "unknowns"), (contrasted, "contrast"))):
-            x = [getattr(run, across) for run in chosen]
-            panels[0, column].loglog(x, [run.seconds for run in chosen], "o-", label=name, ms=4)
-            panels[1, column].loglog(x, [max(run.iterations, 1) for run in chosen], "o-", ms=4)
-        colour = panels[0, 0].lines[-1].get_color()
-        sizes = {(run.mesh_size, run.layers): run.unknowns for run in runs if not run.capped}
-        for run in runs:
-            if run.solver == name and run.capped and (run.mesh_size, run.layers) in sizes:
-                column, x = (
-                    (0, sizes[run.mesh_size, run.layers])
-                    if run.contrast == 4.0
-                    else (1, run.contrast)
-                )
-                panels[0, column].plot(x, run.seconds, "^", mfc="none", color=colour)
-    panels[0, 0].set(ylabel="seconds, set-up and both loads", title="over unknowns, contrast 4")
-    panels[0, 1].set(title="over contrast E_i / E_m, smallest mesh")
-    panels[1, 0].set(xlabel="unknowns", ylabel="iterations of a load")
-    panels[1, 1].set(xlabel="contrast")
-    panels[0, 0].legend(frameon=False)
-    for panel in panels.flat:
-        panel.grid(alpha=0.25)
-    _save(figure, stem)
-
-
-def _save(figure: Any, stem: Path) -> None:
-    import matplotlib.pyplot as plt
-
-    stem.parent.mkdir(parents=True, exist_ok=True)
+    axes.grid(alpha=0.25)
+    axes.legend(frameon=False)
     for suffix in (".svg", ".png"):
         figure.savefig(stem.with_suffix(suffix), dpi=160)
     plt.close(figure)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make both charts."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--cap", type=float, default=30.0, help="seconds that one point may take (default 30)"
-    )
-    parser.add_argument("--small", action="store_true", help="a few coarse points, in seconds")
-    parser.add_argument("--only", choices=("accuracy", "solvers"), help="one chart alone")
-    parser.add_argument(
-        "--out", type=Path, default=RESULTS, help="folder for CSV files and figures"
-    )
+    """Make the table and the chart; exit 1 where an error lies outside the declared one."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cap", type=float, default=30.0, help="seconds of a run")
+    parser.add_argument("--only", nargs="*", default=(), help="families to run")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
-    started = perf_counter()
-    if options.only != "solvers":
-        runs = accuracy_runs(cap=options.cap, small=options.small)
-        write(runs, options.out / "cell_accuracy.csv")
-        draw_accuracy(runs, options.out / "cell_accuracy")
-    if options.only != "accuracy":
-        solved = solver_runs(cap=options.cap, small=options.small)
-        write(solved, options.out / "cell_solver_sizes.csv")
-        draw_solvers(solved, options.out / "cell_solver_sizes")
+    started, points = perf_counter(), []
+    for point in runs(cap=options.cap, only=options.only):
+        points.append(point)
+        print(
+            f"{point.family:26} {point.setting:20} error {point.error:8.1e}"
+            f" declared {point.declared:8.1e} {point.seconds:8.3f} s",
+            flush=True,
+        )
+    options.out.mkdir(parents=True, exist_ok=True)
+    write([asdict(point) for point in points], options.out / "cell_accuracy.csv")
+    draw(points, options.out / "cell_accuracy")
     print(f"made in {perf_counter() - started:.0f} s, in {options.out}")
-    return 0
+    return int(any(point.error > point.declared + 1e-12 for point in points))
 
 
 if __name__ == "__main__":

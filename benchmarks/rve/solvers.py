@@ -1,179 +1,143 @@
-"""Default solver against a direct one and multigrid: `make bench-solver`.
+"""Solvers of the product-space cell: set-up, solves and iterations; `make bench-solver`.
 
-One process, one thread, both loads; set-up and solve are timed, assembly is the same for all.
-Ratios of times from one run. A solver that needs more than the cap is stopped there, and its time
-is a lower bound.
+    ./enter python -m benchmarks.rve.solvers
+    ./enter python -m benchmarks.rve.solvers --iterations
+
+The first compares the named solvers with the default one on the paper's cell and exits with 1 where
+E differs or MUMPS on the whole system is not 6 times slower. The second prints iterations of the
+default over maps, contrasts and layers, and exits with 1 above 25 from 6 layers on.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from time import perf_counter
 
-from alphacut.rve.cell import Phase
-from alphacut.stochastic import HermiteMap
+from alphacut.rve.cell import LOADS, Phase
+from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.solver.options import SOLVERS
+from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, RadiusMap
+from benchmarks.rows import write
 
-PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
+PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
-AT_LEAST = {"mumps": 4.0, "gamg": 15.0}  # how much faster the default must be
-SAME = 1e-8
-SMALL = 0.6
+SLOWER = 6.0  # at least, MUMPS on the whole system at h .15
+MOST = 25  # iterations from 6 layers on
+RESULTS = Path(__file__).parents[1] / "results"
+MAPS: dict[str, RadiusMap] = {
+    "paper": PAPER,
+    "paper, a2 and a4 highest": HermiteMap(0.1337, 0.3145, 0.8663, 0.9975),
+    "paper, a2 and a4 lowest": HermiteMap(0.1337, 0.001, 0.8663, 0.001),
+    "radii .05 to .95": HermiteMap(0.05, 0.0, 0.95, 0.0),
+    "not monotone": HermiteMap(0.6, -1.5, 0.7, 0.5),
+    "steep": HermiteMap(0.1, 0.0, 0.9, 2.0),
+    "exponential": ExponentialMap(0.8, 0.2),
+    "exponential, Beta law": ExponentialMap(0.8, 0.2, Beta()),
+    "Beta(2, 4)": HermiteMap(0.2, 0.1, 0.8, 0.2, Beta(2, 4, 0.0, 1.0)),
+    "crisp": HermiteMap(0.5, 0.0, 0.5, 0.0),
+}
 
 
 @dataclass(frozen=True)
 class Timing:
-    """One solver on one mesh.
+    """One solver on one system.
 
     Args:
         solver: Its name.
-        unknowns: Size of the system.
-        seconds: Set-up and both loads, the fastest of the repetitions.
+        unknowns: Of the system.
+        setup: Seconds.
+        solve: Seconds of both loads.
         iterations: For each load.
-        modulus: E in Pa; nan where the solver was stopped.
-        other: Seconds of everything else: mesh, assembly, what follows the solution.
-        capped: Whether it was stopped, so that `seconds` is a lower bound.
+        modulus: E, in Pa.
     """
 
     solver: str
     unknowns: int
-    seconds: float
+    setup: float
+    solve: float
     iterations: tuple[int, ...]
     modulus: float
-    other: float = 0.0
-    capped: bool = False
+
+    @property
+    def seconds(self) -> float:
+        """Both together."""
+        return self.setup + self.solve
 
 
-def measure(
-    solver: str, *, mesh_size: float, layers: int = 12, repeat: int = 1, particle: Phase = PARTICLE
-) -> Timing:
-    """Time one solver, without the first run when there are more."""
-    from alphacut.rve.prism.model import PrismModel
-
-    model = PrismModel(mesh_size=mesh_size, layers=layers, solver=solver)
-    results = [model.solve(PAPER_MAP, MATRIX, [particle])[0] for _ in range(repeat)]
-    best = min(results, key=lambda r: r.seconds["setup"] + r.seconds["solve"])
-    seconds = best.seconds["setup"] + best.seconds["solve"]
+def timing(solver: str, size: float, layers: int = 12, repeat: int = 3) -> Timing:
+    """The fastest of a few runs."""
+    model = PrismModel(size, layers, solver=solver, estimate=False)
+    results = [model.solve(PAPER, MATRIX, [PARTICLE])[0] for _ in range(repeat)]
+    one = min(results, key=lambda result: result.seconds["setup"] + result.seconds["solve"])
     return Timing(
         solver,
-        best.unknowns,
-        seconds,
-        best.iterations,
-        best.modulus,
-        best.seconds["total"] - seconds,
+        one.unknowns,
+        one.seconds["setup"],
+        one.seconds["solve"],
+        one.iterations,
+        one.modulus,
     )
 
 
-def measure_capped(
-    solver: str, first: Timing, *, cap: float, mesh_size: float, repeat: int
-) -> Timing:
-    """Time one solver in a process of its own, stopped after `cap` seconds."""
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
-    with ProcessPoolExecutor(1, mp_context=get_context("forkserver")) as executor:
-        executor.submit(
-            measure, solver, mesh_size=SMALL
-        ).result()  # imports and compiles before the clock starts
-        future = executor.submit(measure, solver, mesh_size=mesh_size, repeat=repeat)
-        try:
-            return future.result(timeout=repeat * (cap + first.other))
-        except TimeoutError:
-            for process in executor._processes.values():
-                process.kill()
-            return Timing(solver, first.unknowns, cap, (), float("nan"), capped=True)
+def compare(timings: Sequence[Timing]) -> Iterator[str]:
+    """Print the table; gives each fault in a sentence."""
+    first = timings[0]
+    print(f"{'solver':8} {'unknowns':>9} {'setup s':>8} {'solve s':>8} {'times':>6} iterations")
+    for one in timings:
+        times = one.seconds / first.seconds
+        print(
+            f"{one.solver:8} {one.unknowns:9} {one.setup:8.3f} {one.solve:8.3f} {times:6.1f}"
+            f" {one.iterations}"
+        )
+        if abs(one.modulus / first.modulus - 1) > 1e-8:
+            yield f"E of {one.solver} is {one.modulus:.10g} Pa, not {first.modulus:.10g} Pa"
+        if one.solver == "mumps" and times < SLOWER:
+            yield f"mumps is {times:.1f} times slower, not {SLOWER:g}"
 
 
-def compare(timings: Sequence[Timing]) -> list[str]:
-    """Shortfalls: a ratio below `AT_LEAST` or a modulus that differs."""
-    first, faults = timings[0], []
-    for other in timings[1:]:
-        if other.seconds < AT_LEAST.get(other.solver, 0) * first.seconds:
-            faults.append(
-                f"{first.solver} is {other.seconds / first.seconds:.1f} times faster than"
-                f" {other.solver}, not {AT_LEAST[other.solver]:g}"
-            )
-        if not other.capped and not abs(other.modulus / first.modulus - 1) <= SAME:
-            faults.append(
-                f"E of {other.solver} differs by {abs(other.modulus / first.modulus - 1):.1e}"
-            )
-    return faults
-
-
-def _row(t: Timing, first: Timing) -> list[str | int]:
-    more = ">" if t.capped else ""
-    iterations = max(t.iterations, default="-")
-    return [
-        t.solver,
-        t.unknowns,
-        f"{more}{t.seconds:.4f}",
-        iterations,
-        f"{t.modulus / 1e9:.10f}",
-        f"{more}{t.seconds / first.seconds:.1f}",
-    ]
-
-
-def parser() -> argparse.ArgumentParser:
-    """The options."""
-    found = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    found.add_argument(
-        "--mesh-size",
-        type=float,
-        default=0.15,
-        help="triangle size in halves of the cell's side (default 0.15: 34,000 unknowns)",
-    )
-    found.add_argument(
-        "--out",
-        type=Path,
-        default=Path(__file__).parents[1] / "results" / "cell_solvers.csv",
-        help="CSV file to write",
-    )
-    found.add_argument(
-        "--solvers",
-        default="mumps,gamg",
-        help="what to set beside the default, separated by commas (default mumps,gamg)",
-    )
-    found.add_argument(
-        "--cap",
-        type=float,
-        default=120,
-        help="seconds after which a solver is stopped (default 120)",
-    )
-    return found
-
-
-def write_rows(timings: Sequence[Timing], out: Path) -> None:
-    """Print the table and write it."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    line = "{:8s}{:>8} unknowns{:>10} s{:>6} iterations   E = {} GPa{:>8} times"
-    with out.open("w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["solver", "unknowns", "seconds", "iterations", "E_GPa", "times_default"])
-        for t in timings:
-            row = _row(t, timings[0])
-            writer.writerow(row)
-            print(line.format(*row))
+def iterations(size: float) -> Iterator[tuple[str, float, int, int]]:
+    """Map, contrast, layers, and most iterations of both loads."""
+    settings = [(name, 4.0, layers) for name in MAPS for layers in (1, 2, 4, 6, 12, 24)]
+    settings += [("paper", contrast, 12) for contrast in (1e-3, 1e-2, 1e2, 1e3)]
+    problem_of = {}
+    for name, contrast, layers in settings:
+        key = layers, name
+        model = PrismModel(size, layers)
+        problem = problem_of[key] = model.problem(MAPS[name])
+        problem.assemble((MATRIX.stiffness, Phase(MATRIX.modulus * contrast).stiffness))
+        solved = problem.solver(model.options).solve(problem.loads(LOADS))
+        yield name, contrast, layers, max(solved.iterations)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, write the CSV file; exit 1 if the default is too slow."""
-    options = parser().parse_args(arguments)
-    size = options.mesh_size
-    timings = [measure("theta", mesh_size=size, repeat=4)]
-    for name in options.solvers.split(","):
-        repeat = {"mumps": 2}.get(name, 1)
-        timings.append(
-            measure_capped(name, timings[0], cap=options.cap, mesh_size=size, repeat=repeat)
-        )
-    write_rows(timings, options.out)
-    faults = compare(timings)
-    print("\n".join(faults), file=sys.stderr, end="\n" if faults else "")
-    return 1 if faults else 0
+    """Print a table, write the CSV; exit 1 at a fault."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--mesh-size", type=float, default=0.15)
+    parser.add_argument("--solvers", nargs="*", default=list(SOLVERS), choices=list(SOLVERS))
+    parser.add_argument("--iterations", action="store_true")
+    options = parser.parse_args(arguments)
+    started = perf_counter()
+    if options.iterations:
+        rows, faults = [], []
+        for name, contrast, layers, count in iterations(options.mesh_size):
+            print(f"{name:26} contrast {contrast:6g} {layers:3} layers {count:4}", flush=True)
+            rows.append({"map": name, "contrast": contrast, "layers": layers, "iterations": count})
+            if layers >= 6 and count > MOST:
+                faults.append(f"{name} with {layers} layers takes {count} iterations")
+        write(rows, RESULTS / "cell_iterations.csv")
+    else:
+        timings = [timing(solver, options.mesh_size) for solver in options.solvers]
+        faults = list(compare(timings))
+        rows = [{**asdict(one), "iterations": max(one.iterations)} for one in timings]
+        write(rows, RESULTS / "cell_solvers.csv")
+    print(f"made in {perf_counter() - started:.0f} s")
+    for fault in faults:
+        print(fault, file=sys.stderr)
+    return int(bool(faults))
 
 
 if __name__ == "__main__":

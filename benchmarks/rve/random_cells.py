@@ -1,0 +1,179 @@
+"""Random cells by finite elements: declared against true errors of all that a result holds.
+
+    ./enter python -m benchmarks.rve.random_cells --cells 150 --seed 1
+
+Round cells of isotropic phases (contrasts of 1e-3 to 1e3, Poisson's ratios of 0 to 0.45 in either
+phase, random maps with radii to nearly touching) are judged by the multipole series; ellipses and
+orthotropic particles (`--any`) by prisms and slices against one another. Each result has a random
+resolution. Prints by quantity how many numbers lie outside their declared errors, and the median of
+declared over true; exit status 1 if one lies outside or a median is above 10.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.rve.cell import Cell, Phase, VoigtPhase
+from alphacut.rve.mesh.outline import Ellipse, circle
+from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.result import Homogenised
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.slices.curve import stresses
+from alphacut.rve.slices.model import SlicesModel
+from alphacut.stochastic import HermiteMap
+
+NOISE = 1e-10  # of the truth, relative
+MOST_MEDIAN = 10.0
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One number beside its truth, both errors relative.
+
+    Args:
+        quantity: Its name.
+        declared: Its declared error.
+        true: Its true one.
+    """
+
+    quantity: str
+    declared: float
+    true: float
+
+    @property
+    def covered(self) -> bool:
+        """True if the declared error covers the true one."""
+        return bool(self.true <= self.declared + NOISE)
+
+
+def random_map(rng: np.random.Generator, most: float) -> HermiteMap:
+    """A map with radii below `most`."""
+    while True:
+        ends = rng.uniform([0.02, -0.5, 0.05, -0.5], [0.9, 1.0, 0.99, 1.0])
+        try:
+            radius = HermiteMap(*map(float, ends))
+        except ValueError:
+            continue
+        if radius.extremes()[1] < most:
+            return radius
+
+
+def round_cell(rng: np.random.Generator) -> Cell:
+    """A circle, isotropic phases."""
+    matrix = Phase(20e9, float(rng.uniform(0, 0.45)))
+    particle = Phase(20e9 * 10 ** rng.uniform(-3, 3), float(rng.uniform(0, 0.45)))
+    return Cell(matrix, particle, random_map(rng, 0.97))
+
+
+def any_cell(rng: np.random.Generator) -> Cell:
+    """An ellipse or a circle of an orthotropic material, its axes turned."""
+    axial, lateral, shear = 20e9 * 10 ** rng.uniform(-1, 1, 3)
+    mixed = rng.uniform(0, 0.5) * np.sqrt(axial * lateral)
+    own = np.array([[axial, mixed, 0], [mixed, lateral, 0], [0, 0, shear]])
+    c, s = np.cos(angle := rng.uniform(0, np.pi)), np.sin(angle)
+    turn = np.array(
+        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
+    )
+    particle = VoigtPhase((turn.T @ own @ turn).tolist())
+    outline = Ellipse(float(rng.choice([0.5, 2.0]))) if rng.random() < 0.75 else None
+    return Cell(Phase(20e9, 0.3), particle, random_map(rng, 0.66), outline)
+
+
+def draw_prism(rng: np.random.Generator, cell: Cell) -> PrismModel:
+    """Prisms at a random resolution."""
+    size, layers = float(rng.uniform(0.2, 0.5)), int(rng.choice([1, 2, 4, 6]))
+    return PrismModel(size, layers, stiffness=True, outline=cell.outline or circle)
+
+
+def draw_slices(rng: np.random.Generator, cell: Cell) -> SlicesModel:
+    """Slices at a random resolution."""
+    size, points = float(rng.uniform(0.2, 1.0)), int(rng.integers(3, 10))
+    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline or circle)
+
+
+def judged(own: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
+    """Every number of a result beside that of the truth, whose declared error is added."""
+    slack = truth.largest_error
+    yield Judgement("E", own.estimated_error + slack, abs(own.modulus / truth.modulus - 1))
+    yield Judgement("ν", own.poisson_error + slack, abs(own.poisson - truth.poisson))
+    moduli = ("C11 + C12", "C11 − C12", "C33")
+    for name, error, one, two in zip(
+        moduli, own.modulus_errors, own.moduli, truth.moduli, strict=True
+    ):
+        yield Judgement(name, error + slack, abs(one / two - 1))
+    for name, one, two in zip(("s11", "s12"), own.curve.mean, truth.curve.mean, strict=True):
+        error = own.modulus_errors[0 if name == "s11" else 2]
+        yield Judgement(name, error + slack, abs(one / two - 1))
+    first, second = np.asarray(own.stiffness), np.asarray(truth.stiffness)
+    entries = abs(first - second).max() / second.max()
+    yield Judgement("stiffness", own.largest_error + slack, float(entries))
+
+
+def judged_curve(own: Homogenised) -> Iterator[Judgement]:
+    """The stresses at the nodes of a round cell beside the series there."""
+    cell, curve = own.cell, own.curve
+    assert cell is not None
+    assert curve.error is not None
+    radii = cell.radius(curve.theta)
+    exact = stresses(square_stiffness(radii, cell.matrix, [cell.inclusion]).matrix[:, 0])
+    for name, k in (("s11 at θ", 0), ("s12 at θ", 1)):
+        values: Array = (curve.s11, curve.s12)[k]
+        true = abs(values / exact[k] - 1)
+        for declared, one in zip(curve.error[:, k], true, strict=True):
+            yield Judgement(name, float(declared), float(one))
+
+
+def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
+    """All numbers of one cell by prisms and slices; empty where a model refuses."""
+    parts = cell.radius, cell.matrix, [cell.inclusion]
+    try:
+        results = [draw(rng, cell).solve(*parts)[0] for draw in (draw_prism, draw_slices)]
+    except (FailedError, RefusedError) as refusal:
+        print(f"refused: {refusal}", flush=True)
+        return []
+    if cell.square:
+        truth = SeriesModel(accuracy=1e-12).solve(*parts)[0]
+        numbers = [one for result in results for one in judged_curve(result)]
+    else:
+        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline or circle).solve(
+            *parts
+        )[0]
+        numbers = []
+    return numbers + [one for result in results for one in judged(result, truth)]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table; exit 1 if a number lies outside its declared error."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cells", type=int, default=150)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--any", action="store_true", help="ellipses and orthotropic particles")
+    options = parser.parse_args(arguments)
+    draw, rows = any_cell if options.any else round_cell, defaultdict(list)
+    for number in range(options.cells):
+        rng = np.random.default_rng([options.seed, number])
+        for one in judge(draw(rng), rng):
+            rows[one.quantity].append(one)
+            if not one.covered:
+                print(f"cell {number}: {one}", flush=True)
+    outside, worst = 0, 0.0
+    print(f"{'quantity':12} {'numbers':>8} {'outside':>8} {'declared/true':>14}")
+    for name, numbers in rows.items():
+        missed = sum(not one.covered for one in numbers)
+        median = float(np.median([one.declared / max(one.true, NOISE) for one in numbers]))
+        outside, worst = outside + missed, max(worst, median)
+        print(f"{name:12} {len(numbers):8} {missed:8} {median:14.2f}")
+    return int(outside > 0 or worst > MOST_MEDIAN)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
