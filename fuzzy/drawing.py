@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,8 +18,8 @@ _BLUE = "#0072B2"
 def new_axes(axes: Axes | None) -> Axes:
     """The axes, or those of a new figure that a notebook shows."""
     if axes is not None:
-        if not hasattr(axes, "fill_between"):
-            raise RefusedError("axes", axes, "Matplotlib's, or none for a new figure")
+        plain = hasattr(axes, "fill_between")
+        require(plain, "axes", axes, "Matplotlib's, or none for a new figure")
         return axes
     from matplotlib import pyplot
 

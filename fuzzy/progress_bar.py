@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from time import monotonic
 from typing import Any
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 Progress = Callable[[float], None]
 _WAIT = 1.0  # seconds before a bar appears
@@ -62,8 +62,8 @@ def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
     Raises:
         RefusedError: It is neither.
     """
-    if not (progress is None or isinstance(progress, bool) or callable(progress)):
-        raise RefusedError("progress", progress, "a function of the share done, False for none")
+    plain = progress is None or isinstance(progress, bool) or callable(progress)
+    require(plain, "progress", progress, "a function of the share done, False for none")
     if callable(progress) or progress is False:
         yield progress or None
         return

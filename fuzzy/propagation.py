@@ -19,7 +19,7 @@ from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.progress_bar import Progress, told
-from alphacut.fuzzy.refused import RefusedError, chosen, real
+from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
@@ -89,8 +89,8 @@ def propagate(
     start = perf_counter()
     domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
     method, known = method or Automatic(), known or Known()
-    if not hasattr(method, "run") or isinstance(method, type):
-        raise RefusedError("method", repr(method), "an object such as General() or Signed()")
+    runs = hasattr(method, "run") and not isinstance(method, type)
+    require(runs, "method", repr(method), "an object such as General() or Signed()")
     known.check_inputs(domain.names)
     chosen("on_failure", on_failure, ("raise", "skip"))
     real("budget", budget, positive=True, whole=True)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.samples.design import Design
 from alphacut.fuzzy.samples.model import Values
@@ -77,8 +77,8 @@ class RandomResponse:
     def quantile(self, probability: ArrayLike) -> Bounds:
         """Fuzzy quantiles of the response at probabilities (m,) inside (0, 1)."""
         at = np.atleast_1d(np.asarray(probability, float))
-        if not ((at > 0) & (at < 1)).all():
-            raise RefusedError("probability", at.tolist(), "values inside (0, 1)")
+        inside = ((at > 0) & (at < 1)).all()
+        require(inside, "probability", at.tolist(), "values inside (0, 1)")
         strata = (np.arange(self.ordered.shape[1]) + 0.5) / self.ordered.shape[1]
         table = np.array([np.interp(at, strata, row) for row in self.ordered])
         return self._bounds("quantile", table)

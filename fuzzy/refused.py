@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from math import isfinite, nan
 from numbers import Integral, Real
 
+import numpy as np
+
 
 class RefusedError(ValueError):
     """A value that has no meaning where it stands.
@@ -65,5 +67,14 @@ def chosen(key: str, value: object, names: Iterable[str]) -> None:
         RefusedError: It is none.
     """
     known = tuple(names)
-    if value not in known:
-        raise RefusedError(key, repr(value), ", ".join(known))
+    require(value in known, key, value, ", ".join(known))
+
+
+def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure: str = "") -> None:
+    """Refuse a value unless something holds; the other arguments are those of `RefusedError`.
+
+    Raises:
+        RefusedError: It does not hold.
+    """
+    if not holds:
+        raise RefusedError(key, value, allowed, cure)

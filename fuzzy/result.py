@@ -24,7 +24,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.joint import JointClaim
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, chosen, require
 from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 from alphacut.fuzzy.shown import Shown
@@ -138,22 +138,19 @@ class Bounds(Shown):
             *((name, getattr(self, name), places) for name in ("lower_at", "upper_at")),
             *((f"inner, outer: {end}", getattr(p, end), shape) for p in pairs for end in p._fields),
         ):
-            if array.shape != expected:
-                raise RefusedError(f"shape of {name}", array.shape, str(expected))
-        if not {len(self.natures), len(self.units)} <= {0, len(self.outputs)}:
-            raise RefusedError("natures and units", (self.natures, self.units), "one an output")
+            require(array.shape == expected, f"shape of {name}", array.shape, str(expected))
+        each = {len(self.natures), len(self.units)} <= {0, len(self.outputs)}
+        require(each, "natures and units", (self.natures, self.units), "one an output")
 
     def _check_values(self) -> None:
-        if not (self.alpha.size and (np.diff(self.alpha) > 0).all() and self._levels_inside):
-            raise RefusedError("alpha", self.alpha.tolist(), "levels that rise within [0, 1]")
-        if not (np.isfinite(self.lower) & np.isfinite(self.upper)).all():
-            raise RefusedError("lower and upper", "not finite", "finite ends")
-        if not ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed)).all():
-            raise RefusedError("error", "negative or NaN", "errors of 0 or more; NaN if guaranteed")
-
-    @property
-    def _levels_inside(self) -> bool:
-        return bool(self.alpha[0] >= 0 and self.alpha[-1] <= 1)
+        alpha = self.alpha
+        inside = alpha.size > 0 and alpha[0] >= 0 and alpha[-1] <= 1
+        rising = inside and (np.diff(alpha) > 0).all()
+        require(rising, "alpha", alpha.tolist(), "levels that rise within [0, 1]")
+        finite = (np.isfinite(self.lower) & np.isfinite(self.upper)).all()
+        require(finite, "lower and upper", "not finite", "finite ends")
+        plain = ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed)).all()
+        require(plain, "error", "negative or NaN", "0 or more, or NaN where guaranteed")
 
     def _check_proof(self) -> None:
         """Refuse bounds that contradict each other by more than their error and rounding."""
@@ -222,8 +219,8 @@ class Bounds(Shown):
         steps = outer_steps(self.alpha, *self.bounds(output))
         if (claim := self.claim.claim) is not None:
             return Claimed(steps, claim, float(self.alpha[0]))
-        if (self.alpha[0], self.alpha[-1]) != (0, 1):
-            raise RefusedError("alpha", self.alpha.tolist(), "levels from 0 to 1: alpha=levels(4)")
+        whole = (self.alpha[0], self.alpha[-1]) == (0, 1)
+        require(whole, "alpha", self.alpha.tolist(), "levels from 0 to 1: alpha=levels(4)")
         return steps
 
     def column(self, output: str = "y") -> int:
@@ -232,8 +229,7 @@ class Bounds(Shown):
         Raises:
             RefusedError: There is no such output.
         """
-        if output not in self.outputs:
-            raise RefusedError("output", output, ", ".join(self.outputs))
+        chosen("output", output, self.outputs)
         return self.outputs.index(output)
 
     def bounds(self, output: str = "y") -> Ends:

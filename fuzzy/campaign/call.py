@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, chosen
+from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.samples.model import Layout, flatten
 
 Function = Callable[..., object]
@@ -55,10 +55,10 @@ class Call:
     vectorised: bool = False
 
     def __post_init__(self) -> None:
-        if not callable(self.function):
-            raise RefusedError("function", repr(self.function), "what can be called")
-        if self.shared and self.vectorised:
-            raise RefusedError("shared", self.shared, "none where the function is vectorised")
+        shown = repr(self.function)
+        require(callable(self.function), "function", shown, "what can be called")
+        one = not (self.shared and self.vectorised)
+        require(one, "shared", self.shared, "none where the function is vectorised")
         for name in self.shared:
             chosen("shared input", name, self.names)
 
@@ -79,10 +79,7 @@ class Call:
         """Outputs of one task; if it fails as a whole, each point is tried alone."""
         try:
             outputs = self._outputs(points)
-            if len(outputs) != len(points):
-                raise RefusedError(
-                    "outputs", f"{len(outputs)} for {len(points)} points", "one each"
-                )
+            require(len(outputs) == len(points), "outputs", len(outputs), f"{len(points)}")
         except (Exception, SystemExit) as error:  # a model that ends its program ends its sample
             if len(points) > 1:
                 return [self(point[None])[0] for point in points]
@@ -104,9 +101,8 @@ class Call:
         rows = {}
         for name, value in named.items():
             rows[name] = array = np.asarray(value, float).reshape(np.shape(value) or (1,))
-            if len(array) != len(points):
-                shape = f"of {len(array)} for {len(points)} points"
-                raise RefusedError(f"output {name}", shape, "an array whose first axis is theirs")
+            allowed = f"arrays of the length {len(points)}, that of the points"
+            require(len(array) == len(points), f"output {name}", len(array), allowed)
         return [{name: array[row] for name, array in rows.items()} for row in range(len(points))]
 
 

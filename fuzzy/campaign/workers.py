@@ -14,7 +14,7 @@ from typing import ParamSpec, TypeVar
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Outcome
-from alphacut.fuzzy.refused import FailedError, RefusedError, real
+from alphacut.fuzzy.refused import FailedError, real, require
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -82,9 +82,9 @@ def _end_with_parent(parent: int) -> None:
 
 def require_executor(executor: object, workers: int) -> None:
     """Refuse what is no executor, or one beside workers."""
-    if executor is not None and not (isinstance(executor, Executor) and workers == 1):
-        allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
-        raise RefusedError("executor", executor, allowed)
+    holds = executor is None or (isinstance(executor, Executor) and workers == 1)
+    allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
+    require(holds, "executor", executor, allowed)
 
 
 def submitted(

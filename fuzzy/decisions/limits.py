@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.counted import ranged
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.tables import html_table
 
@@ -83,8 +83,7 @@ def decide(bounds: Bounds, limits: Mapping[str, float]) -> Decision:
     Raises:
         RefusedError: There is no limit, or it names no output.
     """
-    if not limits:
-        raise RefusedError("limits", limits, "one limit or more, as {'y': 4.5}")
+    require(bool(limits), "limits", limits, "one limit or more, as {'y': 4.5}")
     own = bounds.select(*limits)
     at = np.array([real(f"limit of {name}", limit) for name, limit in limits.items()])
     may, does, least, surely = (ends - at for ends in _reaches(own))

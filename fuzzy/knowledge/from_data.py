@@ -12,7 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import LEVELS, Law, law_cuts
 from alphacut.fuzzy.knowledge.observations import Limits, Observations, Values
 from alphacut.fuzzy.knowledge.order_statistics import rank_cuts, values_needed
-from alphacut.fuzzy.refused import RefusedError, chosen
+from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
@@ -78,8 +78,7 @@ def _quantile(claim: str) -> float | None:
     number = re.fullmatch(r"quantile +(\d*\.\d+(?:e-\d+)?)", str(claim))
     if number and 0 < float(number[1]) < 1:
         return float(number[1])
-    if claim not in ("next value", "mean", "median"):
-        raise RefusedError("claim", repr(claim), CLAIMS)
+    require(claim in ("next value", "mean", "median"), "claim", repr(claim), CLAIMS)
     return 0.5 if claim == "median" else None
 
 
@@ -110,9 +109,9 @@ def mean_cuts(data: Observations) -> Stepwise:
         RefusedError: A bound is missing.
     """
     low, high = data.bounds
-    if not np.isfinite(data.bounds).all():
-        cure = "give both, or law='normal' or 'log-normal' (Bahadur and Savage: none decide a mean)"
-        raise RefusedError("bounds", data.bounds, "finite ends for a mean of any law", cure)
+    cure = "give both, or law='normal' or 'log-normal'"
+    finite = np.isfinite(data.bounds).all()
+    require(finite, "bounds", data.bounds, "finite ends for a mean of any law", cure)
     band, count = _band(data.count), np.arange(data.count + 1) / data.count
     sums = [np.append(0.0, np.cumsum(row)) / data.count for row in (data.lower, data.upper)]
     lower = low * band + np.interp(1 - band, count, sums[0])

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
@@ -60,9 +60,8 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 
 def _common(claimed: Mapping[str, Claimed]) -> str:
     kinds = {number.claim.about for number in claimed.values()}
-    if len(kinds) > 1:
-        cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
-        raise RefusedError("claims of the inputs", sorted(kinds), "of one kind", cure)
+    cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
+    require(len(kinds) == 1, "claims of the inputs", sorted(kinds), "of one kind", cure)
     return kinds.pop()
 
 
@@ -70,9 +69,10 @@ def _require_apart(claimed: Mapping[str, Claimed]) -> None:
     names = list(claimed)
     for i, name in enumerate(names):
         for other in names[:i]:
-            if claimed[name].number is claimed[other].number or claimed[name] == claimed[other]:
-                cure = f"{other} and {name} rest on the same values"
-                raise RefusedError("independent", True, "False", cure)
+            one, two = claimed[name], claimed[other]
+            cure = f"{other} and {name} rest on the same values"
+            apart = one.number is not two.number and one != two
+            require(apart, "independent", True, "False", cure)
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:

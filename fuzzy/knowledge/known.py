@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import RefusedError, chosen
+from alphacut.fuzzy.refused import chosen, require
 
 Signs = NDArray[np.int8]
 GradientRange = Callable[[Array, Array], Mapping[str, tuple[Array, Array]]]
@@ -44,8 +44,7 @@ class Known:
     def __post_init__(self) -> None:
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
-                if value not in (-1, 1):
-                    raise RefusedError(f"sign of {name}", value, "1 (rises), -1 (falls)")
+                require(value in (-1, 1), f"sign of {name}", value, "1 (rises), -1 (falls)")
 
     @property
     def words(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.observations import Observations
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
@@ -45,8 +45,8 @@ def law_cuts(
             censored without an end.
     """
     logarithmic = law == "log-normal"
-    if logarithmic and not (data.lower > 0).all():
-        raise RefusedError("least value", data.lower[0], "positive ones with a log-normal law")
+    positive = not logarithmic or (data.lower > 0).all()
+    require(positive, "least value", data.lower[0], "positive ones with a log-normal law")
     about = data.mapped(np.log) if logarithmic else data
     _require_scatter(about, law)
     if logarithmic and mean:
@@ -61,10 +61,11 @@ def law_cuts(
 def _require_scatter(data: Observations, law: str) -> None:
     """Refuse values that do not tell the scatter of a law."""
     finite = np.isfinite(data.lower).all() and np.isfinite(data.upper).all()
-    if data.count < 2 or not finite or (data.exact and data.lower[0] == data.lower[-1]):
-        cure = "leave the law out, give bounds= or resolution=, or measure more"
-        values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
-        raise RefusedError(f"values of a {law} law", values, "two or more, finite, unlike", cure)
+    unlike = not data.exact or data.lower[0] < data.lower[-1]
+    cure = "leave the law out, give bounds= or resolution=, or measure more"
+    values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
+    enough = data.count > 1 and finite and unlike
+    require(enough, f"values of a {law} law", values, "two or more, finite, unlike", cure)
 
 
 def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
@@ -162,8 +163,8 @@ def from_scatter(mean: float, deviation: float, count: int, *, known: bool = Fal
 
     real("mean", mean)
     real("deviation", deviation, positive=True)
-    if count < (1 if known else 2):
-        raise RefusedError("count", count, "2 or more, or 1 where the deviation is known")
+    enough = count >= (1 if known else 2)
+    require(enough, "count", count, "2 or more, or 1 where the deviation is known")
     factors = norm.isf(LEVELS / 2) if known else t.isf(LEVELS / 2, count - 1)
     reach = deviation / np.sqrt(count) * np.maximum(factors, 0.0)
     law = f"{count} values drawn alike and independently from a normal law"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import RefusedError, real, require
 
 Values = Sequence[float] | Sequence[tuple[float, float]] | NDArray[np.float64]
 Limits = tuple[float | None, float | None]
@@ -48,13 +48,13 @@ class Observations:
         low, high = _limits(bounds)
         half = real("resolution", resolution) / 2
         ends = np.array([_pair(number, value) for number, value in enumerate(values, 1)])
-        if not len(ends) or half < 0:
-            raise RefusedError("values", (len(ends), resolution), "one or more, resolution >= 0")
+        require(len(ends) > 0, "values", list(values), "one or more")
+        require(half >= 0, "resolution", resolution, "0 or more")
         lower, upper = ends[:, 0] - half, ends[:, 1] + half
         outside = np.flatnonzero((upper < low) | (lower > high))
-        if len(outside):
+        for row in outside:
             allowed = f"values within the bounds [{low:g}, {high:g}]"
-            raise RefusedError(f"value {outside[0] + 1}", ends[outside[0]].tolist(), allowed)
+            require(False, f"value {row + 1}", ends[row].tolist(), allowed)
         return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
 
     @property
@@ -79,8 +79,7 @@ def _limits(bounds: Limits | None) -> tuple[float, float]:
     lower, upper = (None, None) if bounds is None else bounds
     low = -np.inf if lower is None else real("lower bound", lower)
     high = np.inf if upper is None else real("upper bound", upper)
-    if not low < high:
-        raise RefusedError("bounds", bounds, "(lower, upper) with lower < upper, None for none")
+    require(low < high, "bounds", bounds, "(lower, upper) with lower < upper, None for none")
     return low, high
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.knowledge.observations import Observations
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.sets.stepwise import Stepwise
 
 
@@ -107,8 +107,8 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
     centre = _centre(data, 0.5 if quantile is None else quantile)
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):
-        if not np.isfinite(centre):
-            raise RefusedError("bounds", data.bounds, "finite ends: the values decide no cut")
+        decided = np.isfinite(centre)
+        require(decided, "bounds", data.bounds, "finite ends: the values decide no cut")
         return Stepwise((0.0,), (centre,), (centre,)), 1.0
     first = finite[0]
     lower[:first], upper[:first] = lower[first], upper[first]
@@ -131,8 +131,7 @@ def least_alpha(n: int, quantile: float | None = None) -> float:
 
 def values_needed(alpha: float, quantile: float | None = None) -> int:
     """Least number of values that decide the cut at `alpha` in (0, 1] without physical bounds."""
-    if not 0 < alpha <= 1:
-        raise RefusedError("alpha", alpha, "levels in (0, 1]: no values decide the cut at 0")
+    require(0 < alpha <= 1, "alpha", alpha, "levels in (0, 1]: no values decide the cut at 0")
     n = 1
     while least_alpha(n, quantile) > alpha:
         n *= 2

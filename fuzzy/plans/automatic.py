@@ -19,7 +19,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation, attained, searched
 from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.samples.model import Memo, Model, SpentError
 from alphacut.fuzzy.sets.boxes import Domain
@@ -60,8 +60,8 @@ class Automatic:
     name = "automatic"
 
     def __post_init__(self) -> None:
-        if not 0 < real("tolerance", self.tolerance) < 1:
-            raise RefusedError("tolerance", self.tolerance, "shares inside (0, 1)")
+        share = real("tolerance", self.tolerance)
+        require(0 < share < 1, "tolerance", share, "shares inside (0, 1)")
         for key in ("starts", "look", "passes"):
             real(key, getattr(self, key), positive=True, whole=True)
         real("seed", self.seed, whole=True)

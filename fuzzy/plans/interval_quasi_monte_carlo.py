@@ -20,7 +20,7 @@ from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.propagation import propagate
-from alphacut.fuzzy.refused import RefusedError, chosen, real
+from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, PiecewiseLinear
@@ -143,8 +143,8 @@ class IntervalQuasiMonteCarlo:
         """
         from scipy.stats import qmc
 
-        if not random or set(random) & set(inputs):
-            raise RefusedError("random inputs", tuple(random), "one or more, none of them fuzzy")
+        apart = bool(random) and not set(random) & set(inputs)
+        require(apart, "random inputs", tuple(random), "one or more, none of them fuzzy")
         alpha = Domain({"u": Crisp(0.0)}, alpha).alpha
         u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
         numbers = [_numbers(one, u[:, i], alpha) for i, one in enumerate(random.values())]

@@ -126,7 +126,8 @@ class LevelSearch:
         here, *around = self.worth(
             np.concatenate([[place], place + steps, place - steps]), output, 1
         )
-        slopes = np.abs(np.array(around) - here) / _STEP / self.scale(output)
+        allowed = np.array([value for value in around if np.isfinite(value)])
+        slopes = np.abs(allowed - here) / _STEP / self.scale(output)
         return float(slopes.max(initial=0.0))
 
     def scale(self, output: str) -> float:

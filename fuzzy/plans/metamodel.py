@@ -19,7 +19,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.plans.transformation import Reduced
-from alphacut.fuzzy.refused import FailedError, RefusedError, real
+from alphacut.fuzzy.refused import FailedError, real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.samples.model import Memo, Model, Samples
 from alphacut.fuzzy.sets.boxes import Domain
@@ -79,8 +79,7 @@ class Metamodel:
         memo(domain.modal[None])
         support = lower, upper = tuple(ends[0] for ends in Domain(domain.inputs, (0.0,)).boxes)
         moving = upper > lower
-        if not moving.any():
-            raise RefusedError("inputs", domain.names, "one with a width or more")
+        require(moving.any(), "inputs", domain.names, "one with a width or more")
         unit = self._boxes(int(moving.sum()))
         boxes = [_real(box, lower, upper, moving) for box in unit]
         for done, box in enumerate(boxes):
@@ -144,9 +143,9 @@ class TrainedBounds:
         domain.require_free("metamodel")
         (low, high), (lower, upper) = self.support, domain.boxes
         near = 1e-12 * (high - low)
-        if (lower < low - near).any() or (upper > high + near).any():
-            allowed = f"within {low.tolist()} … {high.tolist()}, which it was trained on"
-            raise RefusedError("inputs of the metamodel", lower[0].tolist(), allowed)
+        inside = (lower >= low - near).all() and (upper <= high + near).all()
+        allowed = f"within {low.tolist()} … {high.tolist()}, which it was trained on"
+        require(inside, "inputs of the metamodel", lower[0].tolist(), allowed)
         least, most = self._predicted(lower, upper)
         seen_least, seen_most = self._seen(domain)
         lacking = np.maximum(np.maximum(least - seen_least, seen_most - most), 0)

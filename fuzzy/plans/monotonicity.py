@@ -13,7 +13,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.knowledge.known import Known, Signs
-from alphacut.fuzzy.refused import RefusedError, chosen, real
+from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -38,8 +38,8 @@ class Verification:
 
     def __post_init__(self) -> None:
         real("probes", self.probes, whole=True)
-        if real("margin", self.margin) < 0 or not 0 < real("step", self.step) <= 0.5:
-            raise RefusedError("margin, step", (self.margin, self.step), "margin >= 0, step <= 0.5")
+        holds = real("margin", self.margin) >= 0 and 0 < real("step", self.step) <= 0.5
+        require(holds, "margin, step", (self.margin, self.step), "margin >= 0, step in (0, 0.5]")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.refused import FailedError, RefusedError, chosen
+from alphacut.fuzzy.refused import FailedError, chosen, require
 
 Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
 Layout = tuple[tuple[str, tuple[int, ...]], ...]
@@ -113,8 +113,8 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     arrays = {str(name): _numbers(str(name), value) for name, value in named.items()}
     layout = tuple((name, array.shape) for name, array in arrays.items())
     columns = Values(layout, np.zeros((0, 0))).columns
-    if not columns or len(set(columns)) < len(columns):
-        raise RefusedError("outputs", columns, "one number or more, each with a name of its own")
+    apart = bool(columns) and len(set(columns)) == len(columns)
+    require(apart, "outputs", columns, "one number or more, each with a name of its own")
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
 
 
@@ -122,10 +122,10 @@ def _numbers(name: str, value: ArrayLike | None) -> Array:
     """Finite real numbers of an output, which may have no unit and no mask."""
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
-    if hasattr(value, "units") or not plain or not np.isfinite(array).all():
-        shown = " ".join(repr(value).split())[:80]
-        allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
-        raise RefusedError(f"output {name}", shown, allowed)
+    real_numbers = plain and not hasattr(value, "units") and np.isfinite(array).all()
+    shown = " ".join(repr(value).split())[:80]
+    allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
+    require(real_numbers, f"output {name}", shown, allowed)
     return np.asarray(array, float)
 
 

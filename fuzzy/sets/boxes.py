@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.sets.claimed import from_level
-from alphacut.fuzzy.sets.interaction import Interaction, named
+from alphacut.fuzzy.sets.interaction import Interaction, require_inputs
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, level
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
@@ -29,8 +29,8 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
         RefusedError: The inputs are no mapping, there is none, or a value is neither a fuzzy number
             nor a number.
     """
-    if not isinstance(inputs, Mapping) or not inputs or not all(isinstance(x, str) for x in inputs):
-        raise RefusedError("inputs", inputs, "a mapping, as {'E': Triangular(24, 25, 26)}")
+    named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
+    require(bool(named), "inputs", inputs, "a mapping, as {'E': Triangular(24, 25, 26)}")
     return {
         name: value if isinstance(value, FuzzyNumber) else Crisp(real(f"input {name}", value))
         for name, value in inputs.items()
@@ -58,14 +58,14 @@ class Domain:
 
     def __post_init__(self) -> None:
         alpha = tuple(level(alpha) for alpha in self.alpha)
-        if not alpha or (np.diff(alpha) <= 0).any():
-            raise RefusedError("alpha", list(alpha), "levels that rise within [0, 1]")
+        rising = bool(alpha) and (np.diff(alpha) > 0).all()
+        require(rising, "alpha", list(alpha), "levels that rise within [0, 1]")
         inputs = fuzzy_inputs(self.inputs)
         decided = {name: from_level(number, alpha[0]) for name, number in inputs.items()}
         object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "inputs", decided)
         object.__setattr__(self, "interactions", tuple(self.interactions))
-        named(self.interactions, self.names)
+        require_inputs(self.interactions, self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,7 +100,6 @@ class Domain:
 
     def require_free(self, method: str) -> None:
         """Refuse interactions, which the named method cannot respect."""
-        if self.interactions:
-            kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
-            cure = "take Automatic or Optimisation"
-            raise RefusedError("interactions", kinds, f"none with the method {method}", cure)
+        kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
+        cure = "take Automatic or Optimisation"
+        require(not kinds, "interactions", kinds, f"none with the method {method}", cure)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, chosen, real
+from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 _HALVINGS = 50
@@ -82,13 +82,12 @@ class Ellipsoidal:
 
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
-            if not -1 < real(f"correlation of {' and '.join(pair)}", value) < 1:
-                raise RefusedError(f"correlation of {' and '.join(pair)}", value, "inside (-1, 1)")
-        if len(self.names) < 2:
-            raise RefusedError("inputs of the ellipsoid", self.names, "two names or more")
-        if np.linalg.eigvalsh(self._matrix).min() <= 0:
-            cure = "their matrix must be positive definite"
-            raise RefusedError("correlation", dict(self.correlation), "values that agree", cure)
+            key = f"correlation of {' and '.join(pair)}"
+            require(-1 < real(key, value) < 1, key, value, "values inside (-1, 1)")
+        require(len(self.names) > 1, "inputs of the ellipsoid", self.names, "two names or more")
+        definite = np.linalg.eigvalsh(self._matrix).min() > 0
+        allowed = "values that agree: their matrix is positive definite"
+        require(definite, "correlation", dict(self.correlation), allowed)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -142,7 +141,7 @@ def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Arra
     return point + inside * (anchor - point)
 
 
-def named(interactions: Sequence[Interaction], inputs: Sequence[str]) -> None:
+def require_inputs(interactions: Sequence[Interaction], inputs: Sequence[str]) -> None:
     """Refuse interactions that name what is no input."""
     for interaction in interactions:
         for name in interaction.names:

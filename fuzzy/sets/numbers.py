@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.drawing import draw_membership, new_axes
-from alphacut.fuzzy.refused import RefusedError, real
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.tables import membership_svg
 
 if TYPE_CHECKING:
@@ -104,8 +104,7 @@ def level(alpha: float) -> float:
     Raises:
         RefusedError: It lies outside [0, 1].
     """
-    if not 0 <= real("alpha", alpha) <= 1:
-        raise RefusedError("alpha", alpha, "levels in [0, 1]")
+    require(0 <= real("alpha", alpha) <= 1, "alpha", alpha, "levels in [0, 1]")
     return float(alpha)
 
 
@@ -134,8 +133,7 @@ def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
 def _ordered(kind: str, values: Sequence[float], order: str) -> None:
     """Refuse values that are no finite numbers or not in order."""
     numbers = [real(kind, value) for value in values]
-    if (np.diff(numbers) < 0).any():
-        raise RefusedError(kind, [float(x) for x in numbers], order)
+    require((np.diff(numbers) >= 0).all(), kind, numbers, order)
 
 
 @dataclass(frozen=True)
@@ -250,8 +248,8 @@ class PiecewiseLinear(FuzzyNumber):
         rows = nested(self.alpha, self.lower, self.upper)
         for name, row in zip(("alpha", "lower", "upper"), rows, strict=True):
             object.__setattr__(self, name, row)
-        if self.alpha[-1] != 1 or len(self.alpha) < 2:
-            raise RefusedError("alpha", self.alpha, "levels that rise from 0 to 1")
+        whole = self.alpha[-1] == 1 and len(self.alpha) > 1
+        require(whole, "alpha", self.alpha, "levels that rise from 0 to 1")
 
     @property
     def cuts(self) -> Cuts:
@@ -273,10 +271,9 @@ def nested(alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Cuts:
     """
     levels, low, high = (np.atleast_1d(np.asarray(x, float)) for x in (alpha, lower, upper))
     rising = levels[0] == 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()
-    if not (len(levels) == len(low) == len(high) and rising):
-        shown = levels.tolist(), len(low), len(high)
-        raise RefusedError("alpha", shown, "levels that rise from 0 within [0, 1], as many as ends")
+    alike, shown = len(levels) == len(low) == len(high), (levels.tolist(), len(low), len(high))
+    require(alike and rising, "alpha", shown, "levels that rise from 0 within [0, 1], one an end")
     ends = np.concatenate([low, high[::-1]])
-    if not np.isfinite(ends).all() or (np.diff(ends) < 0).any():
-        raise RefusedError("cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
+    rising = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
+    require(rising, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
     return Cuts(*(tuple(map(float, row)) for row in (levels, low, high)))

@@ -58,7 +58,6 @@ INDIRECT = {  # imported by others on this project's behalf
 }
 FROM_PYPI = {  # each is needed by one comparison
     "openseespylinux": "benchmarks/frame/opensees.py",
-    "pyuncertainnumber": "benchmarks/fuzzy/requirements.txt",
 }
 
 

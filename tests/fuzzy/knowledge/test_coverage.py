@@ -13,11 +13,9 @@ import alphacut.fuzzy.knowledge.named_law as laws
 from alphacut.fuzzy import RefusedError, from_data
 from alphacut.fuzzy.knowledge.named_law import from_scatter
 from alphacut.fuzzy.knowledge.order_statistics import least_alpha, values_needed, windows
-from tests.fuzzy.knowledge.coverage import LAWS, held
+from benchmarks.fuzzy.coverage import FREE, LAWS, NAMED, held
 
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
-FREE = ["next value", "median", "quantile 0.9"]
-NAMED = ["next value", "mean", "median", "quantile 0.9"]
 
 
 @pytest.mark.parametrize("claim", FREE)

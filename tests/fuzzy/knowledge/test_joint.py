@@ -16,6 +16,7 @@ from alphacut.fuzzy import (
 )
 from alphacut.fuzzy.knowledge.joint import JointClaim, joined_inputs
 from alphacut.fuzzy.sets.claimed import Claimed
+from benchmarks.fuzzy.coverage import jointly_held
 
 BOUNDS = (0, 100)
 FIRST = from_data(np.arange(1.0, 20.0), "next value", bounds=BOUNDS)
@@ -100,21 +101,6 @@ def test_what_values_do_not_decide_is_refused_at_the_joint_level():
 
 
 def test_joint_coverage_holds_where_the_minimum_rule_fails():
-    """Four links of a chain in their cuts at once."""
-    links, rng, count, alpha = 4, np.random.default_rng(4), 300, 0.3
-    scores = {}
-    for rule in ("minimum", "unknown", "independent"):
-        held = np.ones(count, bool)
-        for k in range(count):
-            drawn = rng.normal(size=(links, 20))
-            numbers = {
-                str(i): from_data(row[:19], "next value", bounds=(-99, 99))
-                for i, row in enumerate(drawn)
-            }
-            if rule != "minimum":
-                numbers = jointly(numbers, independent=rule == "independent")
-            cuts = np.array([number.cut(alpha) for number in numbers.values()])
-            held[k] = ((cuts[:, 0] <= drawn[:, 19]) & (drawn[:, 19] <= cuts[:, 1])).all()
-        scores[rule] = (held.mean() - (1 - alpha)) / np.sqrt(alpha * (1 - alpha) / count)
+    scores = jointly_held(4, 300, np.random.default_rng(4))
     assert scores["minimum"] < -4
     assert min(scores["unknown"], scores["independent"]) > -4
