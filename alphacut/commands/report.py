@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.commands.options import add_quiet, answer
-from alphacut.export.csv_tables import write_tables
+from alphacut.export.tables import write_tables
 from alphacut.io.files import write_text
-from alphacut.io.netcdf import own_files, read_summary
+from alphacut.io.netcdf import read_summary
 from alphacut.report.page import report
 
 ABOUT = "one self-contained HTML page of a run's results"
@@ -32,8 +32,9 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     path = Path(options.out) if options.out else folder / "report.html"
     page = report(folder)
     write_text(path, page)
-    files = own_files(read_summary(folder), folder) if options.csv else []
-    tables = write_tables(files, Path(options.csv)) if options.csv else []
+    tables = []
+    if options.csv:
+        tables = write_tables(read_summary(folder), folder, Path(options.csv))
     document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
     answer(options, document, out, "".join(f"{file}\n" for file in (path, *tables)))
     return 0

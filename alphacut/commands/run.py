@@ -12,7 +12,7 @@ from typing import Any, TextIO
 from alphacut.case.case import Case
 from alphacut.case.load import load
 from alphacut.commands import options as common
-from alphacut.figures.showing import Showing
+from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import as_json, rank, say, write_text
 from alphacut.io.output_paths import alone, unwritable
@@ -56,10 +56,9 @@ def computed(
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
-        showing = Showing(store, figures, executor)
-        chain = Chain(case.content, store, petsc, figures, executor, showing.begin)
-        results = chain.run()
-        drawn = showing.drawn(results)
+        results = Chain(case.content, store, petsc, figures, executor).run()
+        look = {"fresh": store.fresh, "quiet": store.quiet}
+        names = drawn(results, executor, **look) if figures else []
     assert results.shares is not None
     document: dict[str, Any] = {
         "format_version": FORMAT,
@@ -73,7 +72,7 @@ def computed(
         "shares": shares.means(results.shares),
         "changes": list(case.changes),
         "sections": case.traces(),
-        "figures": drawn,
+        "figures": names,
         "seconds": time.perf_counter() - start,
         "fingerprints": {x: data.attrs["fingerprint"] for x, data in results.datasets.items()},
     }

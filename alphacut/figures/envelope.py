@@ -1,4 +1,4 @@
-"""Envelopes over time (Figs. 28 to 35), exceedance of a limit, the record and its spectrum."""
+"""Envelopes over time (Figs. 28 to 35), the fuzzy mapping behind them (Fig. 20), the record."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.units import engineering
 from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.results import Results
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
 def drawings(
-    study: EnvelopeTask, dataset: xarray.Dataset
+    task: EnvelopeTask, dataset: xarray.Dataset
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Name and function of each figure of a study."""
-    outputs = [study.output] if study.output else [str(name) for name in dataset["output"].values]
+    outputs = [task.output] if task.output else [str(name) for name in dataset["output"].values]
     for index, output in enumerate(outputs):
-        number = f"fig{study.figures[index]}-" if index < len(study.figures) else ""
-        yield f"{number}envelope-{study.name}-{output}", partial(envelope, dataset, output, study)
+        number = f"fig{task.figures[index]}-" if index < len(task.figures) else ""
+        yield f"{number}envelope-{task.name}-{output}", partial(envelope, dataset, output, task)
 
 
-def envelope(dataset: xarray.Dataset, output: str, study: EnvelopeTask) -> Figure:
-    """Nested bands between lower and upper envelope, and the modal trajectory."""
-    drawn, axes = look.figure(7.2, 3.6)
+def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure:
+    """Nested bands between lower and upper envelope, the error of the lowest, the modal motion."""
+    drawn, axes = look.figure()
     shown = dataset.sel(output=output)
     alpha, time = dataset["alpha"].values, dataset["time"].values
     for level, shade in enumerate(look.colours(alpha)[:-1]):
@@ -42,38 +44,71 @@ def envelope(dataset: xarray.Dataset, output: str, study: EnvelopeTask) -> Figur
     for side in ("lower", "upper"):
         axes.plot(time, shown.isel(alpha=-1)[side], color=look.INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=look.INK, lw=0.3)
-    axes.set_xlabel("time t, s")
+    nature = str(dataset.attrs["nature"])
+    words = nature + error_band(axes, time, shown.isel(alpha=0), nature)
+    time_axes(axes, time, output)
+    linear = output.startswith(("q", "v", "a", "drift", "shear", "base", "roof"))
+    fuzzy = (INPUTS.get(name, name) if linear else name for name in task.fuzzy)
+    title = f"{Output(output).words}; fuzzy: {', '.join(fuzzy)}; {words}"
+    look.title(axes, fill(title, 80))
+    look.alpha_legend(axes, alpha)
+    return drawn
+
+
+def error_band(axes: Axes, time: object, lowest: xarray.Dataset, nature: str) -> str:
+    """Draws the error outside the lowest band, and says how large it is."""
+    if "error" not in lowest or nature == "guaranteed":
+        return ""
+    error = lowest["error"]
+    for end in (lowest["lower"] - error, lowest["upper"] + error):
+        axes.plot(time, end, color=look.GREY, lw=0.7, ls="--")
+    unit = Output(str(lowest["output"].values)).unit
+    return f", error up to {engineering(float(error.max()), unit, digits=2)} (dashed)"
+
+
+def time_axes(axes: Axes, time: object, output: str) -> None:
+    """Axes of an output over time."""
+    values = np.asarray(time, float)
+    axes.set_xlim(values[0], values[-1])
+    axes.set_xlabel("time t (s)")
     look.prefix_axis(axes, output, Output(output).unit)
-    axes.set_xlim(time[0], time[-1])
-    # letters mean something else in a pendulum
-    known = INPUTS if output.startswith(("q", "v", "a", "drift", "shear", "base", "roof")) else {}
-    words = ", ".join(known.get(name, name) for name in study.fuzzy)
-    title = f"{Output(output).words}; fuzzy: {words}"
-    axes.set_title(fill(title, 84), loc="left", fontsize=10)
-    look.alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
+    """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
+    task = next((one for one in results.tasks if len(one.fuzzy) > 1), results.tasks[0])
+    dataset, structure = results.envelopes[task.name].isel(alpha=0), results.structure
+    assert structure is not None
+    names = [str(name) for name in dataset["output"].values]
+    output = names[-1 if "q" in names[-1] else 0]
+    inputs, step = structure.inputs(task.fuzzy), task.section.step
+    end = round(min(duration, task.duration) / step) * step
+    scheme = task.section.integrator or ("exact" if structure.linear else None)
+    flow = structure.flow(tuple(inputs), end, step, scheme)
+    ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
+    points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
+    curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
+    drawn, axes = look.figure()
+    axes.plot(flow.time, curves.T, color=look.BLUE, lw=0.5, alpha=0.5)
+    shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
+    for side in ("lower", "upper"):
+        axes.plot(flow.time, shown[side], color=look.INK, lw=1.3)
+    time_axes(axes, flow.time, output)
+    level = f"α = {float(dataset['alpha']):g}"
+    look.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
     return drawn
 
 
 def record(ground: Accelerogram) -> Figure:
     """The record as it is read, its peak marked."""
-    drawn, axes = look.figure(7.2, 2.4)
+    drawn, axes = look.figure(look.WIDTH, 2.4)
     acceleration = np.asarray(ground.acceleration)
     time, peak = np.arange(len(acceleration)) * ground.step, int(np.abs(acceleration).argmax())
     axes.plot(time, acceleration, color=look.INK, lw=0.7)
     axes.plot(time[peak], acceleration[peak], "o", color=look.ORANGE, ms=4)
-    strongest = engineering(float(acceleration[peak]), "m/s^2", digits=3).replace("^2", "²")
-    axes.set_title(f"peak {strongest} at {time[peak]:.4g} s", loc="left", fontsize=10)
-    axes.set_xlabel("time t, s")
-    axes.set_ylabel("ground acceleration, m/s²")
+    strongest = engineering(float(acceleration[peak]), "m/s^2", digits=3)
+    look.title(axes, f"peak {strongest} at {time[peak]:.4g} s")
+    axes.set_xlabel("time t (s)")
+    axes.set_ylabel("ground acceleration (m/s²)")
     axes.set_xlim(time[0], time[-1])
     return drawn
-
-
-SPECTRUM_LINES = [
-    (colour, dash)
-    for dash in ("-", "--", ":")
-    for colour in (look.INK, look.BLUE, look.ORANGE, look.PURPLE, look.GREY)
-]
-
-
-TICKS = [digit * 10.0**power for power in range(-3, 4) for digit in (1, 2, 5)]

@@ -1,4 +1,4 @@
-"""Structure to scale (Fig. 26), as masses, springs and dampers (Fig. 27), and its fuzzy field."""
+"""The frame to scale (Fig. 26), and as masses, springs and dampers (Fig. 27)."""
 
 from __future__ import annotations
 
@@ -26,16 +26,13 @@ def frame(section: Frame) -> Figure:
     drawn, axes = figure(high * 2.15 * span / (1.13 * height), high)
     ground(axes, 0.0, span)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
-        given = section.stiffness
-        stiff = None if given is None else section.per_floor(given)[floor - 1].modal
+        own = section.stiffness
+        stiff = None if own is None else section.per_floor(own)[floor - 1].modal
         columns(axes, floor, level, length, span, stiff)
         level += length
         beam(axes, floor, level, mass, span)
     axes.set_xlim(-0.6 * span, 1.55 * span)
     axes.set_ylim(-0.05 * height, 1.08 * height)
-    told = (*section.masses, *known, *(section.stiffness or ()))
-    if any(number.support.width > 0 for number in told):
-        axes.set_title("fuzzy numbers by their modal value", fontsize=8)
     axes.set_aspect("equal")
     axes.axis("off")
     return drawn
@@ -57,15 +54,9 @@ def columns(
 def beam(axes: Axes, floor: int, level: float, mass: float, span: float) -> None:
     """A floor with its mass and the arrow of its displacement."""
     axes.plot([-0.03 * span, 1.03 * span], [level, level], color=INK, lw=6, solid_capstyle="butt")
-    axes.annotate(
-        f"$m_{{{floor}}}$ = {mass / 1000:g} t",
-        (span / 2, level),
-        xytext=(0, 6),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        fontsize=8,
-    )
+    above = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center", "va": "bottom"}
+    words = f"$m_{{{floor}}}$ = {mass / 1000:g} t"
+    axes.annotate(words, (span / 2, level), fontsize=8, **above)
     arrow = {"arrowstyle": "-|>", "color": ORANGE}
     axes.annotate("", (1.32 * span, level), (1.08 * span, level), arrowprops=arrow)
     axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)
@@ -177,6 +168,3 @@ def damper(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> 
         [piston, b],
     ):
         axes.plot(*np.array(points).T, color=INK, lw=1)
-
-
-LINES = ("-", "--", ":", "-.")

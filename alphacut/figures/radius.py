@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.material import RadiusMap
-from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure
+from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure, title
 from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.radius_map import CaseMap
 from alphacut.stochastic.theta.truncated_normal import Array
@@ -44,11 +44,7 @@ def radii(section: RadiusMap) -> Figure:
     axes.set_xlabel("radius r over its median")
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
-    axes.set_title(
-        f"Log-normal particle radii, σ$_r$ = (ln 10)/6 = {SIGMA:.4f}, truncated",
-        loc="left",
-        fontsize=10,
-    )
+    title(axes, f"log-normal radii, σ$_r$ = (ln 10)/6 = {SIGMA:.4f}, truncated")
     return drawn
 
 

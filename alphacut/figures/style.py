@@ -4,30 +4,28 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import whole_file
 from alphacut.io.units import MINUS, axis_prefix
-from alphacut.stochastic.figures import style as figure_style
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.stochastic.figures import style as look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK = figure_style.INK
-BLUE = figure_style.BLUE
-ORANGE = figure_style.ORANGE
-GREY = figure_style.GREY
+INK, BLUE, ORANGE, GREY = look.INK, look.BLUE, look.ORANGE, look.GREY
 PURPLE = "#7b3294"  # differs from Okabe's and Ito's blue and orange in lightness
-WIDTH, HEIGHT = 6.4, 3.8  # inches
+WIDTH, HEIGHT = 7.2, 3.8  # inches
+Colour = tuple[float, float, float, float]
 
 
 def style() -> AbstractContextManager[None]:
     """The project's look, for the figures drawn inside the block."""
-    return figure_style.style({"axes.edgecolor": INK, "axes.labelcolor": INK})
+    return look.style({"axes.edgecolor": INK, "axes.labelcolor": INK})
 
 
 def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
@@ -39,7 +37,7 @@ def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
 
 
 def save(drawn: Figure, stem: Path) -> list[Path]:
-    """Write STEM.svg and STEM.png, whole or not at all, and close the figure."""
+    """Writes STEM.svg and STEM.png, whole or not at all, and closes the figure."""
     import matplotlib.pyplot as plt
 
     paths = [stem.with_name(stem.name + ending) for ending in (".svg", ".png")]
@@ -50,47 +48,39 @@ def save(drawn: Figure, stem: Path) -> list[Path]:
     return paths
 
 
-def colours(alpha: Array) -> list[tuple[float, float, float, float]]:
+def colours(alpha: Array) -> list[Colour]:
     """Colour for each level, the darker the higher, fit for grey print."""
     from matplotlib import colormaps
 
-    scale = colormaps["YlGnBu"]
-    return [tuple(scale(0.25 + 0.65 * float(level))) for level in alpha]  # type: ignore[misc]
+    return [colormaps["YlGnBu"](0.25 + 0.65 * float(level)) for level in alpha]
 
 
-def alpha_legend(
-    axes: Axes,
-    alpha: Array,
-    *,
-    loc: str = "best",
-    bbox_to_anchor: tuple[float, float] | None = None,
-) -> None:
-    """The α scale, explained."""
+def alpha_legend(axes: Axes, alpha: Array) -> None:
+    """The α scale, explained beside the axes, where no data are."""
+    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    shades = colours(alpha)
-    patches = [Patch(facecolor=shades[i], label=f"α = {alpha[i]:g}") for i in range(len(alpha) - 1)]
-    from matplotlib.lines import Line2D
-
-    handles: list[Any] = [*patches, Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")]
-    axes.legend(
-        handles=handles,
-        title="α-cut",
-        fontsize=8,
-        title_fontsize=8,
-        loc=loc,
-        bbox_to_anchor=bbox_to_anchor,
-    )
+    shades = zip(alpha[:-1], colours(alpha), strict=False)
+    patches = [Patch(facecolor=shade, label=f"α = {level:g}") for level, shade in shades]
+    top = Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")
+    small = {"title": "α-cut", "fontsize": 8, "title_fontsize": 8}
+    axes.legend(handles=[*patches, top], loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
 
 
-def prefix_axis(axes: Axes, label: str, si: str) -> None:
-    """Label the vertical axis, with a prefix to its unit; the data stay in SI."""
-    factor, unit = axis_prefix(max(map(abs, axes.get_ylim())), si)
-    axes.set_ylabel(f"{label}, {unit}".replace("^2", "²"))
+def title(axes: Axes, text: str) -> None:
+    """A small title at the left."""
+    axes.set_title(text.replace("^2", "²"), loc="left", fontsize=10)
+
+
+def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> None:
+    """Labels the vertical or horizontal axis, with a prefix to its unit; the data stay in SI."""
+    limits = axes.get_xlim() if across else axes.get_ylim()
+    factor, unit = axis_prefix(max(map(abs, limits)), si)
+    words = f"{label} ({unit})".replace("^2", "²") if unit else label
+    (axes.set_xlabel if across else axes.set_ylabel)(words)
     if factor != 1.0:
-        axes.yaxis.set_major_formatter(
-            lambda value, _: f"{value * factor:.10g}".replace("-", MINUS)
-        )
+        axis = axes.xaxis if across else axes.yaxis
+        axis.set_major_formatter(lambda value, _: f"{value * factor:.10g}".replace("-", MINUS))
 
 
 def membership_axes(axes: Axes, label: str) -> None:
@@ -100,16 +90,14 @@ def membership_axes(axes: Axes, label: str) -> None:
     axes.set_ylim(0, 1.05)
 
 
+def outline(lower: Array, upper: Array) -> Array:
+    """Ends of α-cuts in one sequence: up the left branch, down the right."""
+    return np.concatenate([lower, upper[::-1]])
+
+
 def shaded_cuts(axes: Axes, alpha: Array, lower: Array, upper: Array) -> None:
     """A membership function from its α-cuts, each cut as a bar at its level."""
     for level, low, high, shade in zip(alpha, lower, upper, colours(alpha), strict=True):
         axes.plot([low, high], [level, level], color=shade, lw=3, solid_capstyle="butt", zorder=2)
-    axes.plot(
-        np.concatenate([lower, upper[::-1]]),
-        np.concatenate([alpha, alpha[::-1]]),
-        color=INK,
-        lw=1.2,
-        marker="o",
-        ms=3.5,
-        zorder=3,
-    )
+    line = {"color": INK, "lw": 1.2, "marker": "o", "ms": 3.5, "zorder": 3}
+    axes.plot(outline(lower, upper), outline(alpha, alpha), **line)

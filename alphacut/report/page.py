@@ -4,25 +4,23 @@ from __future__ import annotations
 
 import base64
 import json
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, own_files, read_dataset, read_summary
-from alphacut.report.glossary import explained
-from alphacut.report.sections import sections
-from alphacut.report.tables import environment
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.report.html import HERE, environment
+from alphacut.report.results import nature_of
+from alphacut.report.safe import cleaned, plain_name
+from alphacut.report.sections import Page
 
 if TYPE_CHECKING:
     import xarray
-
-HERE = Path(__file__).parent
 
 
 def report(folder: Path) -> str:
@@ -34,53 +32,62 @@ def report(folder: Path) -> str:
     summary = read_summary(folder)
     try:
         own_files(summary, folder)
-        return page(summary, folder)
-    except (KeyError, TypeError, AttributeError, IndexError) as error:
+        return page(cleaned(summary), folder)
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         raise damaged(folder / "summary.json", error) from error
 
 
 def page(summary: Document, folder: Path) -> str:
     """The page for a summary."""
     text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
-    data = [  # of the interactive plot
-        plot(name, study, read_dataset(folder / f"envelope_{name}.nc", key=str(folder)))
-        for name, study in summary.get("envelopes", {}).items()
-    ]
-    about = escape(" ".join(summary.get("about", "").split()))
+    studies = summary.get("envelopes", {}).items()
+    data = [plot(name, study, folder) for name, study in studies if plain_name(name)]
     return (
         environment()
         .get_template("report.html")
         .render(
             title=summary["title"],
             name=summary["case"],
-            about=Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", about)),
-            banner="",
+            about=" ".join(summary.get("about", "").split()),
             css=Markup(text["css"]),
             js=Markup(text["js"]),
-            sections=explained(Markup("\n").join(sections(summary, folder))),
+            sections=Markup("\n").join(Page(summary, folder).sections()),
             # JSON that may stand inside a script element
             envelopes=Markup(json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")),
         )
     )
 
 
-def plot(name: str, study: Document, dataset: xarray.Dataset) -> Document:
-    """One study: lower and upper bounds by level and output as 32-bit floats, in base64."""
+def plot(name: str, study: Document, folder: Path) -> Document:
+    """One study of the interactive plot: bounds and error by level and output, in base64."""
+    dataset = read_dataset(folder / f"envelope_{name}.nc", key=str(folder))
     time = dataset["time"].values
-    bounds = dataset[["lower", "upper"]].transpose("alpha", "output", "time")
+    outputs = [str(output) for output in dataset["output"].values]
+    bands = {side: dataset[side] for side in ("lower", "upper")}
+    bands["error"] = _error(dataset)
     return {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study['fuzzy'])}",
-        "fuzzy": len(dataset["parameter"]),
+        "fuzzy": len(study["fuzzy"]),
+        "nature": str(nature_of(study["nature"])),
         "alpha": dataset["alpha"].values.tolist(),
-        "outputs": [str(output) for output in dataset["output"].values],
-        "units": [Output(str(output)).unit for output in dataset["output"].values],
+        "outputs": outputs,
+        "units": [Output(output).unit for output in outputs],
         "step": float(time[1] - time[0]),
         **{
-            str(side): [[packed(row) for row in level] for level in ends.values]
-            for side, ends in bounds.items()
+            side: [
+                [packed(row) for row in level]
+                for level in band.transpose("alpha", "output", "time").values
+            ]
+            for side, band in bands.items()
         },
     }
+
+
+def _error(dataset: xarray.Dataset) -> xarray.DataArray:
+    """Error outside the bounds; none outside guaranteed ones."""
+    proved = str(dataset.attrs.get("nature", "")).startswith("guaranteed")
+    return dataset["lower"] * 0.0 if proved or "error" not in dataset else dataset["error"]
 
 
 def packed(row: Array) -> str:

@@ -23,6 +23,7 @@
   for (const entry of data) {
     entry.lower = entry.lower.map((rows) => rows.map(decode));
     entry.upper = entry.upper.map((rows) => rows.map(decode));
+    entry.error = entry.error.map((rows) => rows.map(decode));
     study.add(new Option(entry.title, entry.name));
   }
   study.value = data.reduce((most, entry) => (entry.fuzzy > most.fuzzy ? entry : most)).name;
@@ -89,7 +90,7 @@
     }
     element("text", { x: (margin.left + width - margin.right) / 2, y: height - 8, "text-anchor": "middle" }, svg).textContent = "time t, s";
     const label = element("text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(16 ${(height - margin.bottom) / 2}) rotate(-90)` }, svg);
-    label.textContent = `${output.value}, ${unit}`;
+    label.textContent = `${output.value}, ${unit} (${entry.nature})`;
   }
   function draw() {
     const entry = chosen();
@@ -106,6 +107,11 @@
       const path = band(entry, entry.lower[k][index], entry.upper[k][index]);
       element("path", { d: path, fill, "fill-opacity": 0.55, stroke: last ? "#1a1a1a" : "none", class: "level" }, inside);
     });
+    const off = entry.error[0][index];
+    for (const [side, sign] of [["lower", -1], ["upper", 1]]) {
+      const line = entry[side][0][index].map((value, k) => value + sign * off[k]);
+      element("path", { d: band(entry, line, line), fill: "none", stroke: "#8c8c8c", "stroke-width": 0.8, "stroke-dasharray": "4 3", class: "error" }, inside);
+    }
     const alpha = +slider.value;
     const [lower, upper] = ["lower", "upper"].map((side) => cut(entry, side, index, alpha));
     element("path", { id: "band", "data-alpha": alpha, d: band(entry, lower, upper), fill: "none", stroke: "#d55e00", "stroke-width": 1.6 }, inside);

@@ -1,210 +1,241 @@
-"""The sections of the report, each a piece of HTML: methods and their worth among them."""
+"""The sections of the report, each from its part of the summary."""
 
 from __future__ import annotations
 
-import ast
-import re
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator
 from pathlib import Path
 
 from markupsafe import Markup
 
-from alphacut.figures.captions import INPUTS, in_words
-from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature
+from alphacut.figures.captions import INPUTS, caption, in_words
 from alphacut.io.files import Document
-from alphacut.io.provenance import sources
-from alphacut.io.units import engineering
-from alphacut.report import glossary
-from alphacut.report.decisions import answered, learned
-from alphacut.report.envelopes import envelopes
-from alphacut.report.figures import gallery, listed, missing
-from alphacut.report.key_results import key_results
-from alphacut.report.material import image, microstructure, modulus, stress
-from alphacut.report.tables import (
-    citation,
-    code,
-    details,
-    items,
-    paragraphs,
-    percent,
-    section,
-    sentence,
-    table,
-)
+from alphacut.questions.question import Question
+from alphacut.questions.table import QUESTIONS
+from alphacut.report.html import code, folded, fragment, paragraphs, picture, section, table
+from alphacut.report.results import HEAD, NATURES, extremes, nature_of, peak_rows, results
+from alphacut.report.safe import figures
+
+TERMS = {
+    "α-cut": "All values whose membership is at least α.",
+    "Support": "The α-cut at 0: all values that are possible.",
+    "Most plausible": "The α-cut at 1, or that of the highest level computed.",
+    "Envelope": "Least and greatest value of an output at each time, over one α-cut of the inputs.",
+    "Peak": "Largest magnitude of an output over the motion.",
+    "Possibility": "Degree of the highest α-cut in which something happens. 0: it cannot.",
+    "Necessity": "One less the possibility of the contrary. 1: it must happen.",
+    **{str(nature).capitalize(): meaning for nature, meaning in NATURES.items()},
+}
+"""Terms of the page with their meaning."""
 
 
-def sections(summary: Document, folder: Path) -> Iterator[Markup]:
-    """All sections that the results allow, in reading order."""
-    yield key_results(summary)
-    yield missing(summary, folder)
-    if "microstructure" in summary:
-        seen = listed(summary, folder, "image_circles")
-        yield microstructure(summary["microstructure"], seen)
-    if "modulus" in summary:
-        yield modulus(summary["modulus"], listed(summary, folder, "modulus"))
-    if "image" in summary:
-        yield image(summary["image"], listed(summary, folder, "image"))
-    if "response" in summary:
-        yield stress(summary["response"], listed(summary, folder, "response"))
-    if "update" in summary:
-        yield learned(summary, folder)
-    if summary.get("envelopes"):
-        yield envelopes(summary, listed(summary, folder, "exceedance"))
-    yield from answered(summary, folder)
-    if summary.get("shares"):
-        yield shares(summary)
-    yield methods(summary)
-    yield section("Terms", glossary.box())
-    yield gallery(summary, folder)
-    yield case_text(summary)
-    yield differing(summary)
-    yield versions(summary)
+class Page:
+    """The sections of one run.
 
+    Args:
+        summary: Its summary, made safe.
+        folder: Where its figures are.
+    """
 
-def shares(summary: Document) -> Markup:
-    """Contributions of the inputs to the widths."""
-    found, studies = summary["shares"], [*summary.get("envelopes", {}).values()]
-    words = paragraphs(
-        "Share of the width, on the lowest level computed, that is lost when an input is fixed at"
-        " its modal value and all others are kept.",
-        *map(sentence, summary.get("shares_notes", ())),
-    )
-    kinds = dict.fromkeys(tuple(entry) for entry in found.values())
-    drawn = []
-    for inputs in kinds:
-        of = [name for name, entry in found.items() if tuple(entry) == inputs]
+    def __init__(self, summary: Document, folder: Path) -> None:
+        self.summary, self.folder = summary, folder
+        self.paper = any("fig" in name for name in summary.get("figures", ()))
+        self.left = dict(figures(summary, folder))  # of those that no section has shown yet
+
+    def sections(self) -> Iterator[Markup]:
+        """All sections that the results allow, in reading order."""
+        yield section("Key results", table(HEAD, results(self.summary)))
+        for name in ("microstructure", "modulus", "image", "response"):
+            if name in self.summary:
+                yield getattr(self, f"_{name}")(self.summary[name])
+        if "update" in self.summary:
+            yield self._identify(self.summary["update"])
+        if self.summary.get("envelopes"):
+            yield self._envelopes(self.summary["envelopes"])
+        for question in QUESTIONS:
+            if question.key in self.summary:
+                yield self._question(question, self.summary[question.key])
+        if self.summary.get("shares"):
+            yield self._shares(self.summary["shares"])
+        others = [self._drawn(stem) for stem in list(self.left)]
+        yield section("Terms", fragment("glossary", TERMS.items()))
+        yield section("More", folded("All other figures", *others), *self._origin())
+
+    def _drawn(self, name: str) -> Markup:
+        """A figure by its name without the paper's number; empty if this run has not drawn it."""
+        stems = [stem for stem in self.left if stem == name or stem.endswith(f"-{name}")]
+        shown = [
+            picture(self.left.pop(stem), caption(stem, paper=self.paper)) for stem in stems[:1]
+        ]
+        return shown[0] if shown else Markup("")
+
+    def _microstructure(self, part: Document) -> Markup:
+        count, kind = part.get("discs"), "discs"
+        if count is None:
+            count, kind = part.get("spheres", 0), "spheres"
+        words = f"{count:,} {kind} in {part.get('packings', 1)} sections or cubes."
+        slopes = [
+            (name, " … ".join(f"{end:.5g}" for end in _ends(part[name])))
+            for name in ("a1", "a2", "a3", "a4")
+        ]
+        map_of = table(("parameter of the radius map", "least … modal … greatest"), slopes)
+        drawn = self._drawn("pbox") or self._drawn("p-box")
+        return section("Microstructure", paragraphs(words), drawn, folded("Radius map", map_of))
+
+    def _modulus(self, part: Document) -> Markup:
+        columns = [part["E_GPa"], *([part["nu_cuts"]] if "nu_cuts" in part else [])]
+        cuts = [
+            (f"{alpha:g}", *(f"{one[side][row]:.5g}" for one in columns for side in one))
+            for row, alpha in enumerate(part["alpha"])
+        ]
+        head = ("α", "E from, GPa", "E to, GPa", "ν from", "ν to")[: 1 + 2 * len(columns)]
+        errors = [(in_words(x), f"{value:.2g}") for x, value in part.get("error", {}).items()]
+        checks = [(in_words(x), f"{value:.2g}") for x, value in part.get("checks", {}).items()]
+        return section(
+            "How stiff is the material?",
+            self._drawn("modulus"),
+            folded("α-cuts", table(head, cuts)),
+            folded(
+                "Errors, checks and references",
+                table(("source", "relative error of E"), errors),
+                table(("property", "largest violation"), checks),
+                table(("reference at the modal values", "E, GPa"), _references(part)),
+            ),
+        )
+
+    def _image(self, part: Document) -> Markup:
+        cuts = part["cuts"]
+        ends = zip(cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], strict=True)
+        rows = [(f"{alpha:g}", f"{low:.5g}", f"{high:.5g}") for alpha, low, high in ends]
+        words = "The bounds are those of the image as it was segmented, in plane strain."
+        return section(
+            "How stiff is the image?",
+            paragraphs(words, *_fractions(part.get("fractions", {}))),
+            self._drawn("image"),
+            folded("α-cuts", table(("α", "E from, GPa", "E to, GPa"), rows)),
+        )
+
+    def _response(self, part: Document) -> Markup:
+        rows = [("mean", _widest(part["mean_GPa"]))]
+        rows += [
+            (f"quantile {one['probability']:g}", _widest(one["GPa"])) for one in part["quantiles"]
+        ]
+        if "exceedance" in part:
+            limit = f"probability beyond {part['exceedance']['limit_GPa']:g} GPa"
+            rows.append((limit, _widest(part["exceedance"])))
+        words = f"Homogenised stress {part['quantity']}, random with θ at every fuzzy sample."
+        head = ("quantity, GPa", f"at α = {part['alpha'][0]:g}")
+        drawn = self._drawn("response")
+        return section(
+            "How much does the stress scatter?", paragraphs(words), drawn, table(head, rows)
+        )
+
+    def _identify(self, part: Document) -> Markup:
+        title = "What do the measured modes teach?"
+        if "refuted" in part:
+            return section(title, paragraphs(str(part["refuted"])))
         rows = [
-            (INPUTS.get(name) or in_words(name), *(percent(found[x][name]) for x in of))
+            (name, *(f"{low:.5g} … {high:.5g}" for low, high in (part["prior"][name], after)))
+            for name, ends in part["inputs"].items()
+            for after in [(ends["lower"][0], ends["upper"][0])]
+        ]
+        held = [
+            (
+                f"mode {one['mode']}",
+                f"{one['measured']:.5g}",
+                " … ".join(f"{end:.5g}" for end in one["predicted"]),
+                "inside" if one["inside"] else "outside",
+            )
+            for one in part.get("held_out", ())
+        ]
+        head = ("input, SI", "before", f"after, at α = {part['alpha'][0]:g}")
+        return section(
+            title,
+            self._drawn("update-inputs"),
+            table(head, rows),
+            table(("held out", "measured, Hz", "predicted, Hz", "measured is"), held),
+            *(self._drawn(f"update-{name}") for name in part.get("envelope_width", {})),
+        )
+
+    def _envelopes(self, studies: Document) -> Markup:
+        omega = self.summary.get("structure", {}).get("omega_rad_per_s", ())
+        periods = ", ".join(f"{2 * math.pi / one:.3g}" for one in omega[:4])
+        words = f"First natural periods: {periods} s." if periods else ""
+        natures = dict.fromkeys(nature_of(study["nature"]) for study in studies.values())
+        head = ("output", "least", "greatest", "error up to", "nature")
+        tables = [
+            folded(
+                f"{name}: {study['method']}, fuzzy {', '.join(study['fuzzy'])}",
+                table(head, extremes(study)),
+                table(HEAD, [*peak_rows(study)]),
+            )
+            for name, study in studies.items()
+        ]
+        meaning = (f"{str(one).capitalize()}: {NATURES[one]}" for one in natures)
+        return section(
+            "How does the structure move?", fragment("plot"), paragraphs(words, *meaning), *tables
+        )
+
+    def _question(self, question: Question, part: Document) -> Markup:
+        shown = table(question.head, question.rows(part))
+        drawn = self._drawn(question.key)
+        return section(question.title, drawn, shown, paragraphs(question.words(part)))
+
+    def _shares(self, part: Document) -> Markup:
+        inputs = dict.fromkeys(name for entry in part.values() for name in entry)
+        rows = [
+            (INPUTS.get(name) or in_words(name), *(_percent(part[of].get(name)) for of in part))
             for name in inputs
         ]
-        level = (summary["modulus"] if of[0] in ("E", "ν") else studies[0])["alpha"][0]
-        drawn.append(table((f"input, at α = {level:g}", *of), rows))
-    return section("What drives the width", words, *drawn)
+        words = "Share of the width that is lost when an input is fixed at its modal value."
+        drawn = self._drawn("shares-over-time"), self._drawn("shares-modulus")
+        shown = folded("Shares, on the lowest level", table(("input", *part), rows))
+        return section("What drives the width?", paragraphs(words), *drawn, shown)
 
-
-def case_text(summary: Document) -> Markup:
-    """The case file as it was, and what the command line changed."""
-    changes = [code(change) for change in summary.get("changes", ())]
-    return section(
-        "The case",
-        paragraphs("Changed on the command line:") + items(changes) if changes else Markup(),
-        details(f"{summary['case']}.toml", code(summary["case_text"], "pre")),
-    )
-
-
-def differing(summary: Document) -> Markup:
-    """Differences from the paper in the modules that the run used."""
-    found = tuple(differences(summary))
-    listed = items(
-        Markup("<strong>{}</strong>: {}").format(subject, text) for subject, text in found
-    )
-    # for a case of one's own they are no news, but they are what the numbers rest on
-    if not summary.get("paper"):
-        head = f"{len(found)} places where the methods differ from the paper they follow"
-        listed = details(head, listed)
-    return section("Differences from the paper", listed) if found else Markup("")
-
-
-def versions(summary: Document) -> Markup:
-    """Versions, command, and how to cite."""
-    found = ", ".join(f"{name} {version}" for name, version in summary["versions"].items())
-    command = Markup("Made by {} in {:.0f} s.").format(code(summary["command"]), summary["seconds"])
-    return section("Versions and citation", paragraphs(command, found), code(citation(), "pre"))
-
-
-PACKAGES = ("stochastic", "rve", "fuzzy", "frame")
-MARK = "This differs from the paper in:"
-
-
-def differences(found: Document | None = None) -> Iterator[tuple[str, str]]:
-    """Subject and differences of each module, "1. … 2. …", that concern a run."""
-    for package in PACKAGES:
-        for name, file in sources(package):
-            if file.suffix != ".py":
-                continue
-            if found is not None and not concerns(
-                f"{package}.{name[:-3].replace('/', '.')}", found
-            ):
-                continue
-            words = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
-            if MARK in words:
-                after = words.partition(MARK)[2].split("\n\n")[0]
-                subject = re.sub(r"\s*\(.*", "", words.partition("\n")[0].rstrip("."))
-                yield subject, " ".join(after.split())
-
-
-def concerns(module: str, found: Document) -> bool:
-    """True if a run used the module, by its summary."""
-    methods = {study["method"] for study in found.get("envelopes", {}).values()}
-    if module == "stochastic.radius_map":
-        return "modulus" in found or "microstructure" in found
-    if module.startswith("stochastic."):
-        return "microstructure" in found
-    if module.startswith("rve."):
-        return "modulus" in found and (
-            module != "rve.prism.model" or found["modulus"]["method"] == "prism"
+    def _origin(self) -> Iterator[Markup]:
+        """The case file, what the command line changed, versions."""
+        summary = self.summary
+        changes = [code(str(change), "pre") for change in summary.get("changes", ())]
+        yield folded(f"Case {summary['case']}", code(summary["case_text"], "pre"))
+        yield folded("Changed on the command line", *changes)
+        versions = [(name, version) for name, version in summary["versions"].items()]
+        made = Markup("Made by {} in {:.0f} s.").format(
+            code(summary["command"]), summary["seconds"]
         )
-    if module == "frame.methods.graph_follower":
-        return any(method.endswith("graph-follower") for method in methods)
-    return not module.startswith("frame.") or bool(methods)
+        yield folded("Versions", paragraphs(made), table(("program", "version"), versions))
 
 
-def methods(summary: Document) -> Markup:
-    """Method and cost of each stage."""
-    rows: list[tuple[object, ...]] = []
-    if cell := summary.get("modulus"):
-        how, cost = f"{cell['method']}, plan {cell['plan']}", f"{cell['samples']} samples"
-        rows.append(("fuzzy modulus", how, cell["nature"], cost, f"{cell['seconds']:.1f}"))
-    if picture := summary.get("image"):
-        cost = f"{picture['iterations']} iterations"
-        rows.append(("image", "trial fields", picture["nature"], cost, f"{picture['seconds']:.1f}"))
-    for name, study in summary.get("envelopes", {}).items():
-        how, seconds = study["method"], f"{study['seconds']:.1f}"
-        rows.append((f"envelope {name}", how, study["nature"], effort(study), seconds))
-    words = paragraphs(*explained(rows), *proofs(summary))
-    return section(
-        "Methods and cost",
-        table(("stage", "method", "nature of the bounds", "cost", "seconds"), rows, numbers=3),
-        words,
+def _ends(value: object) -> list[float]:
+    return [float(x) for x in value] if isinstance(value, list) else [float(str(value))]
+
+
+def _widest(ends: Document) -> str:
+    return f"{ends['lower'][0]:.4g} … {ends['upper'][0]:.4g}"
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{share:.1%}"
+
+
+def _references(part: Document) -> list[tuple[str, str]]:
+    known = {
+        "hashin_shtrikman_E_GPa": "Hashin–Shtrikman bounds",
+        "mori_tanaka_E_GPa": "Mori–Tanaka",
+    }
+    of = part.get("references", {})
+    return [
+        (words, " … ".join(f"{end:.5g}" for end in _ends(of[key])))
+        for key, words in known.items()
+        if key in of
+    ]
+
+
+def _fractions(part: object) -> tuple[str, ...]:
+    """Shares of the area of the phases."""
+    if isinstance(part, list):
+        part = {f"phase {place}": share for place, share in enumerate(part, start=1)}
+    if not isinstance(part, dict) or not part:
+        return ()
+    return (
+        "Of the area: " + ", ".join(f"{x} {_percent(share)}" for x, share in part.items()) + ".",
     )
-
-
-def explained(rows: Sequence[tuple[object, ...]]) -> Iterator[str]:
-    """Meaning of each nature of bounds in the table."""
-    told = {nature.value: nature.sentence for nature in Nature}
-    yield from (
-        f"{nature.capitalize()}: {told[nature]}."
-        for nature in dict.fromkeys(str(row[2]) for row in rows)
-        if nature in told
-    )
-
-
-def proofs(summary: Document) -> Iterator[str]:
-    """Gap of each certified envelope, and what it rests on."""
-    for name, study in summary.get("envelopes", {}).items():
-        if "proved" in study:
-            ends = study["proved"]
-            words = ", ".join(
-                f"{output} {engineering(ends['min'][output], Output(output).unit)} …"
-                f" {engineering(ends['max'][output], Output(output).unit)}"
-                for output in ends["min"]
-            )
-            yield (
-                f"Beside envelope {name} stand guaranteed bounds of the exact motion at every node"
-                f" and level, on the lowest from least to greatest {words}."
-            )
-        if "gap" in study:
-            of = str(study.get("gap_output", next(iter(study.get("min", {"q": 0})))))
-            gap = engineering(float(study["gap"]), Output(of).unit, digits=2)
-            worth = "proved" if "guaranteed" in str(study["nature"]) else "verified by sampling"
-            yield (
-                f"The bounds of envelope {name} are {worth} at every node, and no wider than {gap}"
-                f" of {of} beyond what is attained. {sentence(study['proof'])}"
-            )
-
-
-def effort(study: Document) -> str:
-    """Cost of an envelope: trajectories, or eigen-analyses."""
-    kind = "eigen-analyses" if study["method"] == "modal" else "trajectories"
-    return f"{study['trajectories']} {kind}"
