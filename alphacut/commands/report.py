@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.commands.options import add_quiet, answer
-from alphacut.export.tables import write_tables
 from alphacut.io.files import write_text
 from alphacut.io.netcdf import read_summary
 from alphacut.report.page import report
+from alphacut.report.tables import write_tables
 
 ABOUT = "one self-contained HTML page of a run's results"
 

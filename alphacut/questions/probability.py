@@ -153,7 +153,7 @@ def draw(document: Document) -> Figure:
     axes.set_xlabel(f"{title} ({unit})".replace("^2", "²") if unit else title)
     axes.set_ylabel("probability of passing it")
     axes.set_ylim(0, 1.02)
-    alpha_legend(axes, alpha, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    alpha_legend(axes, alpha)
     return drawn
 
 

@@ -1,0 +1,97 @@
+"""Figures: which are drawn, when they are drawn anew, what they show."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+import xarray
+
+from alphacut.figures import envelope, modulus, shares, style
+from alphacut.figures.captions import caption
+from tests.alphacut.one_case import run
+
+
+def kept(folder):
+    return json.loads((folder / "figures" / ".kept.json").read_text(encoding="utf-8"))
+
+
+def test_figures_are_drawn_once_and_anew_where_the_case_changed(tmp_path):
+    folder = run(tmp_path)
+    first = kept(folder)
+    drawn = folder / "figures" / "decision.png"
+    os.utime(drawn, (1, 1))
+    run(tmp_path)
+    assert drawn.stat().st_mtime == 1
+    drawn.unlink()
+    run(tmp_path)
+    assert drawn.is_file()
+    run(tmp_path, "--set", "decision.limits=['q2 <= 10 mm']")
+    assert kept(folder)["fingerprint"] != first["fingerprint"]
+
+
+def test_every_figure_has_both_forms_and_a_caption(results):
+    names = kept(results)["figures"]
+    assert {"figures/decision.svg", "figures/probability.png", "figures/tolerances.png"} <= set(
+        names
+    )
+    for name in names:
+        assert (results / name).stat().st_size > 1000
+        stem = name.removeprefix("figures/").rpartition(".")[0]
+        words = caption(stem, paper=False)
+        assert words[0].isupper()
+        assert words != stem
+
+
+def study(nature, **more):
+    """An envelope of one output on two levels."""
+    time = np.linspace(0, 1, 11)
+    band = np.stack([np.stack([-np.ones(11), -np.ones(11) / 2])])[..., None][0]
+    ends = {"lower": band, "upper": -band, **more}
+    axes = ("alpha", "time", "output")
+    variables = {name: (axes, values) for name, values in ends.items()}
+    coordinates = {"alpha": [0.0, 1.0], "time": time, "output": ["q1"]}
+    return xarray.Dataset(variables, coordinates, {"nature": nature})
+
+
+@pytest.mark.parametrize(("nature", "lines"), [("estimated", 2), ("guaranteed", 0)])
+def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
+    data = study(nature, error=0.25 * np.ones((2, 11, 1)))
+    with style.style():
+        _, axes = style.figure()
+        words = envelope.error_band(axes, data["time"], data.sel(output="q1").isel(alpha=0), nature)
+        ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
+    assert ends == [-1.25, 1.25][:lines]
+    assert ("error up to 250 mm" in words) == bool(lines)
+
+
+def test_means_of_shares_are_weighted_with_the_width():
+    width = np.array([0.0, 0, 1, 3, 1, 0, 0])
+    share = np.array([np.nan, np.nan, 0.5, 0.1, 0.5, np.nan, np.nan])
+    mean = shares.weighted(share, width, 1)
+    assert mean[3] == pytest.approx((0.5 + 0.3 + 0.5) / 5)
+    assert np.isnan(mean[0])
+
+
+def test_samples_have_the_membership_of_their_least_input():
+    places = np.array([[[0.0, 0.0], [1.0, 1.0]], [[0.5, 0.5], [0.5, 0.5]]])  # (alpha, bound, input)
+    points = np.array([[0.5, 0.5], [0.5, 1.0], [0.0, 0.5]])
+    data = xarray.Dataset(
+        {"point": (("sample", "input"), points), "E_at": (("alpha", "bound", "input"), places)},
+        {"alpha": [0.0, 1.0]},
+    )
+    assert modulus.levels_of_samples(data).tolist() == [1, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("stem", "paper", "words"),
+    [
+        ("fig21-25-graph-follower", True, "Figs. 21 to 25: The Graph Follower, step by step"),
+        ("fig18-modulus", True, "Fig. 18: Fuzzy effective modulus"),
+        ("envelope-all-q3", False, "Envelope of q3"),
+        ("fig28-envelope-E-5s-q1", True, "Fig. 28: Envelope of q1, study E-5s"),
+        ("update-q4", False, "Envelope of q4 before and after the measurement"),
+    ],
+)
+def test_captions(stem, paper, words):
+    assert caption(stem, paper=paper) == words

@@ -1,0 +1,165 @@
+"""The page and the CSV files of a run: what they say, and what they refuse to believe."""
+
+import csv
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy.result import Nature
+from alphacut.report.page import report
+from alphacut.report.results import nature_of, peak_rows
+from alphacut.report.results import results as rows_of
+from alphacut.report.safe import MOST, cleaned, figures, plain_name
+from alphacut.report.tables import write_tables
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
+def changed(results, folder, **keys):
+    """A copy of the results with other keys in its summary."""
+    copy = folder / "copy"
+    shutil.copytree(results, copy)
+    text = json.dumps({**summary_of(results), **keys})
+    (copy / "summary.json").write_text(text, encoding="utf-8")
+    return copy
+
+
+def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results):
+    page = report(results)
+    assert not re.search(r'(src|href)="(?!data:)', page)
+    drawn = [name for name in summary_of(results)["figures"] if name.endswith(".png")]
+    assert page.count("data:image/png;base64,") == len(drawn) > 5
+
+
+def test_texts_of_the_case_are_no_markup(results):
+    page = report(results)
+    assert "<script>alert" not in page
+    assert "Two floors &lt;script&gt;" in page
+
+
+def test_every_question_has_its_answer_on_the_page(results):
+    page = report(results)
+    for words in ("Can or must limits be passed?", "How far may tolerances go?", "How probable"):
+        assert page.count(words) == 1
+
+
+def test_a_script_in_a_drawing_does_not_reach_the_page(results, tmp_path):
+    copy = changed(results, tmp_path)
+    for drawing in (copy / "figures").glob("*.svg"):
+        drawing.write_text("<svg><script>stolen()</script></svg>", encoding="utf-8")
+    for drawing in (copy / "figures").glob("frame.png"):
+        drawing.write_text("<script>stolen()</script>", encoding="utf-8")
+    assert "stolen" not in report(copy)
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret.png", "/etc/secret.png", "figures/../../secret.png", "figures/link.png"]
+)
+def test_a_figure_outside_the_folder_is_left_out(results, tmp_path, name):
+    copy = changed(results, tmp_path, figures=[name])
+    secret = tmp_path / "secret.png"
+    shutil.copy(next((results / "figures").glob("*.png")), secret)
+    (copy / "figures" / "link.png").symlink_to(secret)
+    assert list(figures(summary_of(copy), copy)) == []
+    assert "data:image/png" not in report(copy)
+
+
+@pytest.mark.parametrize("name", ["../other", "..", "a/b", "", "x-" * 100])
+def test_a_study_that_leads_elsewhere_is_left_out(results, tmp_path, name):
+    study = summary_of(results)["envelopes"]["all"]
+    assert not plain_name(name)
+    copy = changed(results, tmp_path, envelopes={name: study})
+    assert "decodeme" not in report(copy)
+    assert not [
+        x for x in write_tables(summary_of(copy), copy, tmp_path / "csv") if "all" in x.name
+    ]
+
+
+def test_control_characters_and_long_texts_are_cut(results, tmp_path):
+    copy = changed(results, tmp_path, title="\x1b[31mred" + "x" * 100_000)
+    page = report(copy)
+    assert "\x1b" not in page
+    assert "x" * (MOST + 1) not in page
+    deep = cleaned({"a": [{"b\x07": "\x9b1m"}]})
+    assert deep == {"a": [{"b ": " 1m"}]}
+
+
+@pytest.mark.parametrize(
+    ("text", "nature"),
+    [
+        ("guaranteed, at two corners, if the image repeats itself", Nature.GUARANTEED),
+        ("estimated", Nature.ESTIMATED),
+        ("inner: attained at the points tried", Nature.ATTAINED),
+        ("proved beyond doubt", Nature.ATTAINED),
+    ],
+)
+def test_an_unknown_word_is_never_a_stronger_nature(text, nature):
+    assert nature_of(text) is nature
+
+
+STUDY = {
+    "alpha": [0, 1],
+    "fuzzy": ["E"],
+    "max": {"q1": 1.0},
+    "peak": {"q1": {"lower": [10.371, 10.4], "upper": [12.0, 11.0], "error": [0.2, 0.1]}},
+}
+
+
+def test_a_least_peak_is_stated_with_its_error():
+    (row,) = peak_rows({**STUDY, "nature": "estimated"})
+    assert row[2] == "10.17 m … 12.20 m"
+    assert row[3:] == ("estimated", "200 mm")
+
+
+def test_attained_bounds_say_what_is_reached_and_no_more():
+    (row,) = peak_rows({**STUDY, "nature": "attained"})
+    assert row[1:4] == ("≥ 10.90 m", "≥ 11.80 m", "attained")
+
+
+def test_the_first_table_has_a_row_for_every_result(results):
+    names = [row[0] for row in rows_of(summary_of(results))]
+    assert names[:2] == ["peak of |q2|", "peak of |drift1|"]
+    assert any("tolerance" in name for name in names)
+
+
+@pytest.fixture(scope="module")
+def tables(results, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("csv")
+    return {
+        file.stem: list(csv.reader(file.open(encoding="utf-8")))
+        for file in write_tables(summary_of(results), results, folder)
+    }
+
+
+def test_an_envelope_has_a_row_a_time_and_units_in_its_head(results, tables):
+    import xarray
+
+    head, *rows = tables["envelope_all-q2"]
+    assert head[0] == "time [s]"
+    assert all(title.endswith("[m]") for title in head[1:])
+    assert head[1].startswith("guaranteed lower at alpha 0 ")
+    data = xarray.load_dataset(results / "envelope_all.nc")
+    assert len(rows) == data.sizes["time"]
+    column = np.array([row[1] for row in rows], float)
+    lower = data["lower"].sel(output="q2").isel(alpha=0).values
+    assert column == pytest.approx(lower, abs=1e-5 * np.abs(lower).max())
+
+
+def test_a_row_of_a_decision_does_not_contradict_itself(tables):
+    head, *rows = tables["decision"]
+    for row in rows:
+        cells = dict(zip(head, row, strict=True))
+        assert cells["nature"] in list(Nature)
+        assert "not proved" not in " ".join(row)
+        if cells["verdict"] == "kept":
+            assert (cells["possibility"], cells["necessity"]) == ("0", "0")
+            assert cells["nature"] != Nature.ATTAINED
+
+
+def test_every_result_has_its_table(tables):
+    assert set(tables) >= {"peaks", "decision", "probability", "tolerances", "envelope_all-drift1"}
