@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.checks.between_nodes import ground_stray
-from alphacut.frame.decisions.exceeding import exceeding
-from alphacut.frame.exceedance import exceedance, peaks
-from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.questions.peaks import peaks
+from alphacut.frame.questions.probability import probabilities
 from alphacut.fuzzy import Interval
 
 INPUTS = {"k1": Interval(0.9e6, 1.1e6), "m2": Interval(7e3, 9e3)}
@@ -61,20 +59,8 @@ def test_what_the_record_does_between_nodes_is_known() -> None:
     np.testing.assert_allclose(found, [0.0, 1.0, 2.0])
 
 
-def test_decisions_refuse_it_by_name_and_probabilities_count_it() -> None:
-    time = {"duration": 0.6, "step": 0.05}
-    with pytest.raises(ModalError, match="take the absolute ones"):
-        exceeding(frame(), INPUTS, {"ar1": 1.0}, **time)
-    found = exceedance(frame(), INPUTS, {}, limit=1e-3, alpha=(0,), spread=4, **time)
-    assert found.lower[0] == 1
-
-
-def test_warnings_and_facts_call_it_by_its_name_and_peak() -> None:
-    structure = replace(frame(), outputs=("ar1",))
-    time = {"duration": 0.9, "step": 0.05, "alpha": (0,), "integrator": "midpoint"}
-    with pytest.warns(UserWarning, match="% of the peak of ar1;") as told:
-        found = envelope(structure, INPUTS, method="graph-follower", tolerance=1e-3, **time)
-    peak = np.abs([found.lower, found.upper]).max()
-    share = 100 * float(found.facts["step_error"]) / peak
-    assert f", {share:.2g} % of the peak of ar1;" in str(told[0].message)
-    assert " of ar1 against " in str(found.facts["dominant_error"])
+def test_probabilities_count_it() -> None:
+    time = {"duration": 0.6, "step": 0.05, "alpha": (0,), "spread": 4}
+    rng = np.random.default_rng(0)
+    answers = probabilities(frame(), INPUTS, {}, {"ar1": 1e-3}, rng=rng, **time)
+    assert answers["ar1"].lower[0] == 1
