@@ -12,7 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
 PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
-BYTES_PER_PIXEL = 1400  # of both sides together, measured at 1024 × 1024
+BYTES_PER_PIXEL = 2500  # of both sides together, measured at 1024 × 1024
 
 
 def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
@@ -26,7 +26,12 @@ def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
     Raises:
         RefusedError: The file is no plane grey image, holds no numbers, or is too large for memory.
     """
-    values = _array(path) if path.suffix == ".npy" else _picture(path, division, square)
+    try:
+        values = _array(path) if path.suffix == ".npy" else _picture(path, division, square)
+    except (OSError, SyntaxError, EOFError, ValueError) as error:
+        if isinstance(error, RefusedError):
+            raise
+        raise RefusedError(path.name, f"unreadable ({error})", "an image or an array") from error
     if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
         what = f"{values.dtype} of shape {values.shape}"
         raise RefusedError(path.name, what, "one plane of 2 × 2 numbers or more")
@@ -38,39 +43,26 @@ def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
 
 
 def _array(path: Path) -> Array:
-    try:
-        # mapped: one too large for memory must come as far as the question of how large it is
-        return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
-    except (ValueError, EOFError) as error:
-        raise RefusedError(path.name, f"unreadable ({error})", "a NumPy array") from error
+    # mapped: one too large for memory must come as far as the question of how large it is
+    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
 
 
 def _picture(path: Path, division: int, square: bool) -> Array:
-    from PIL import Image, UnidentifiedImageError
+    """Pixels of one page of grey values, read where they fit into memory."""
+    from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # the memory is checked here, before the pixels are read
-    try:
-        with Image.open(path) as picture:
-            _require_plane(path, picture.mode, getattr(picture, "n_frames", 1))
-            if square:
-                _require_square(path, picture.info.get("dpi"))
-            require_memory(picture.height, picture.width, division)
-            return np.asarray(picture)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise RefusedError(path.name, f"unreadable ({error})", "an image") from error
-
-
-def _require_plane(path: Path, mode: str, frames: int) -> None:
-    """Refuses palettes, several channels, several pages."""
-    if mode not in PLANE_MODES or frames > 1:
-        what = f"of mode {mode} with {frames} pages"
-        raise RefusedError(path.name, what, "one page of grey values", "save the one that is meant")
-
-
-def _require_square(path: Path, resolution: tuple[float, float] | None) -> None:
-    if resolution and abs(float(resolution[0]) / float(resolution[1]) - 1) > 0.01:
-        what = f"of pixels {float(resolution[0]):g} by {float(resolution[1]):g} per inch"
-        raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
+    with Image.open(path) as picture:
+        mode, frames = picture.mode, getattr(picture, "n_frames", 1)
+        if mode not in PLANE_MODES or frames > 1:
+            what = f"of mode {mode} with {frames} pages"
+            raise RefusedError(path.name, what, "one page of grey values", "save the one meant")
+        across, up = picture.info.get("dpi", (1, 1))
+        if square and abs(float(across) / float(up) - 1) > 0.01:
+            what = f"of pixels {float(across):g} by {float(up):g} per inch"
+            raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
+        require_memory(picture.height, picture.width, division)
+        return np.asarray(picture)
 
 
 def require_memory(rows: int, columns: int, division: int) -> None:

@@ -47,17 +47,14 @@ def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
     share = np.asarray(fraction, float)
     bulks, shears = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
-    found = []
-    for end in (min, max):
-        bulk, shear = end(bulks), end(shears)
-        around = _around(bulk, shear)
-        found.append(
-            [
-                harmonic_about(share, pair, x)
-                for pair, x in zip((bulks, shears), around, strict=True)
-            ]
-        )
-    return np.swapaxes(np.array(found), 0, 1)
+    ends = [
+        [
+            harmonic_about(share, pair, x)
+            for pair, x in zip((bulks, shears), _around(end(bulks), end(shears)), strict=True)
+        ]
+        for end in (min, max)
+    ]
+    return np.swapaxes(np.array(ends), 0, 1)
 
 
 def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
@@ -75,13 +72,6 @@ def _around(bulk: float, shear: float) -> tuple[float, float]:
     return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
 
 
-def are_ordered(matrix: Phase, inclusion: Phase) -> bool:
-    """Whether one phase has both the larger bulk and the larger shear modulus."""
-    pairs = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
-    first, second = (inner - outer for outer, inner in pairs)
-    return first * second >= 0
-
-
 def shear_against_trace_bounds(
     deviator: float, shear: float, limits: Array, phases: tuple[Phase, Phase]
 ) -> float:
@@ -93,11 +83,13 @@ def shear_against_trace_bounds(
         limits: Hashin and Shtrikman's ends of μ at the same fraction, shape (2,), in Pa.
         phases: Matrix and inclusion.
     """
-    softer, stiffer = sorted(bulk_and_shear(phase)[1] for phase in phases)
+    (bulk, shears), (other, others) = map(bulk_and_shear, phases)
+    softer, stiffer = sorted((shears, others))
+    ordered = (other - bulk) * (others - shears) >= 0
     nearest = min(
         abs(modulus / end - 1) for modulus in (deviator, shear) for end in (softer, stiffer)
     )
-    if not are_ordered(*phases) or nearest < 1e-9:  # too near a phase to tell from round-off
+    if not ordered or nearest < 1e-9:  # too near a phase to tell from round-off
         return 0.0
 
     def mean(around: float) -> float:

@@ -9,8 +9,6 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 
-MODULI = ("K", "(C11-C12)/2", "C44")
-
 
 def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
     """Voigt matrices (…, 6, 6) from K, (C11 − C12)/2 and C44."""

@@ -11,7 +11,7 @@ field comes out; stopping early only widens them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -81,10 +81,6 @@ class ConjugateGradient:
             raise RefusedError("accuracy of the energy", self.accuracy, "(0, 0.1]")
         if self.iterations is not None and self.iterations < 0:
             raise RefusedError("iterations", self.iterations, "0 or more")
-
-    def coarser(self, factor: float) -> ConjugateGradient:
-        """The same rule with less accuracy, for a start."""
-        return replace(self, accuracy=min(LEAST_ACCURATE, factor * self.accuracy))
 
     def solve(self, system: System) -> tuple[Array, int]:
         """Fields that lack no more than the accuracy says, and the iterations.

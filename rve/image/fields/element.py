@@ -21,28 +21,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 
-Polynomial = tuple[Fraction, ...]  # coefficients of 1, x, x², … on [0, 1]
-Basis = tuple[tuple[int, ...], ...]
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """One value of the field in every pixel of a periodic grid.
-
-    Args:
-        component: Component of the field.
-        place: Where in the pixel, (y, x) in [0, 1).
-        slopes: Orders of its derivatives along y and x.
-    """
-
-    component: int
-    place: tuple[float, float]
-    slopes: tuple[int, int]
-
-    @property
-    def odd(self) -> bool:
-        """True if it changes sign under inversion of the plane."""
-        return sum(self.slopes) % 2 == 1
+Basis = tuple[tuple[int, ...], ...]  # coefficients of 1, x, x², … on [0, 1]
+LEGENDRE: Basis = ((1,), (-1, 2), (1, -6, 6), (-1, 12, -30, 20))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +30,8 @@ class Element:
     """Unknowns of a pixel and the modes that they cause.
 
     Args:
-        unknowns: Those of every pixel of the periodic grid.
-        local: For each of the pixel's n local unknowns its number in `unknowns` and the pixel that
+        unknowns: Number of values of the field in every pixel of the periodic grid.
+        local: For each of the pixel's n local unknowns its number among these, and the pixel that
             owns it, so many rows up and columns to the right, 0 or 1.
         modes: Matrix from local unknowns to modes, shape (rows, n); lengths in pixel widths.
         bulk_rows: The first so many modes belong to the trace.
@@ -60,19 +40,17 @@ class Element:
         twice_shear: Factor from the Voigt component 12 to twice the tensor component.
         anchors: For each local unknown the ones to subtract from it, which takes a field without
             strain or stress away.
-        line: Coefficients of the basis functions along one side, of which the pixel's are products.
-        order: Derivatives between the field and its modes.
+        stress: Whether the modes are those of a stress, else of a strain.
     """
 
-    unknowns: tuple[Unknown, ...]
+    unknowns: int
     local: tuple[tuple[int, int, int], ...]
     modes: Array
     bulk_rows: int
     constants: tuple[int, int, int]
     twice_shear: float
     anchors: tuple[tuple[int, ...], ...]
-    line: Basis
-    order: int
+    stress: bool
 
     @property
     def parts(self) -> tuple[slice, slice]:
@@ -98,17 +76,14 @@ def displacement_element(aspect: float = 1.0) -> Element:
         np.hstack([along_x, along_y]), np.hstack([along_x, -along_y]), np.hstack([along_y, along_x])
     )
     return Element(
-        unknowns=tuple(
-            Unknown(c, (y / 2, x / 2), (0, 0)) for c, y, x in product(range(2), repeat=3)
-        ),
+        unknowns=8,
         local=tuple((4 * c + 2 * (y % 2) + x % 2, y // 2, x // 2) for c, y, x in places),
         modes=modes,
         bulk_rows=constants[1],
         constants=constants,
         twice_shear=1.0,
         anchors=tuple((9 * c,) for c, _, _ in places),
-        line=basis,
-        order=1,
+        stress=False,
     )
 
 
@@ -130,15 +105,14 @@ def airy_element(aspect: float = 1.0) -> Element:
         return (origin,) + (slope_y,) * y + (slope_x,) * x
 
     return Element(
-        unknowns=tuple(Unknown(0, (0.0, 0.0), slopes) for slopes in product(range(2), repeat=2)),
+        unknowns=4,
         local=tuple((2 * dy + dx, y, x) for y, dy, x, dx in places),
         modes=modes,
         bulk_rows=constants[1],
         constants=constants,
         twice_shear=2.0,
         anchors=tuple(anchors(*place) for place in places),
-        line=basis,
-        order=2,
+        stress=True,
     )
 
 
@@ -147,36 +121,20 @@ def _tables(basis: Basis) -> list[Array]:
 
     The integrals are rational and exact; each entry is rounded twice, and what is zero is zero.
     """
-    functions = [tuple(map(Fraction, f)) for f in basis]
-    scale, tables = np.sqrt(2 * np.arange(float(len(basis[0]))) + 1), []
+    functions, tables = list(basis), []
+    count = len(basis[0])
     for _ in range(3):
-        exact = [[_integral(_times(_legendre(a), f)) for f in functions] for a in range(scale.size)]
+        exact = [[_integral(one, f) for f in functions] for one in LEGENDRE[:count]]
+        scale = np.sqrt(2 * np.arange(float(count)) + 1)
         tables.append(np.array(exact, dtype=float) * scale[:, None])
         functions = [tuple(n * c for n, c in enumerate(f))[1:] for f in functions]
     return tables
 
 
-@cache
-def _legendre(order: int) -> Polynomial:
-    """The Legendre polynomial shifted to [0, 1]."""
-    if order < 2:
-        return (Fraction(1),) if order == 0 else (Fraction(-1), Fraction(2))
-    rise = _times(_legendre(1), _legendre(order - 1))
-    before = _legendre(order - 2) + (Fraction(0),) * 2
-    return tuple(
-        ((2 * order - 1) * a - (order - 1) * b) / order for a, b in zip(rise, before, strict=True)
-    )
-
-
-def _times(first: Polynomial, second: Polynomial) -> Polynomial:
-    result = [Fraction(0)] * (len(first) + len(second) - 1)
-    for (i, a), (j, b) in product(enumerate(first), enumerate(second)):
-        result[i + j] += a * b
-    return tuple(result)
-
-
-def _integral(polynomial: Polynomial) -> Fraction:
-    return sum((c / (n + 1) for n, c in enumerate(polynomial)), Fraction(0))
+def _integral(first: tuple[int, ...], second: tuple[int, ...]) -> Fraction:
+    """Integral of the product of two polynomials over [0, 1]."""
+    pairs = product(enumerate(first), enumerate(second))
+    return sum((Fraction(a * b, i + j + 1) for (i, a), (j, b) in pairs), Fraction(0))
 
 
 def _stacked(*parts: Array) -> tuple[Array, tuple[int, int, int]]:

@@ -46,7 +46,7 @@ class Operator:
     def load(self, mean_modes: Array) -> Array:
         """Minus the operator on uniform fields of the given modes, shape (mode rows, loads)."""
         count = mean_modes.shape[1]
-        result = np.zeros((count, len(self.element.unknowns), *self.trace.shape))
+        result = np.zeros((count, self.element.unknowns, *self.trace.shape))
         forces = [-self.element.modes[p].T @ mean_modes[p] for p in self.element.parts]
         for rows in blocks(result.shape):
             local = sum(

@@ -1,9 +1,10 @@
-"""Inverse of the operator of one constant material, by Fourier transform.
+"""Inverse of the operator of one constant material, by Fourier transform; the spectrum it leaves.
 
-A constant isotropic material looks the same after an inversion of the plane. So, with the place of
-each unknown in its phase and a factor i for unknowns that change sign, the blocks are real and
-symmetric. It also looks the same after a reflection: half of the blocks give the others by changes
-of sign.
+With t the trace and d the deviator of a periodic fluctuation, ∫d² − ∫t² is the square of its
+rotation for a displacement and zero for a stress of Airy's function. So a part of the coefficient
+of d may stand with that of t, and of the other way round for stresses: the energy of one material
+is at least the smaller of s/s₀ and (b + s)/(b₀ + s₀) times that of another, b being the coefficient
+of t and s that of d. For displacements these are the moduli of shear and of longitudinal waves.
 """
 
 from __future__ import annotations
@@ -11,13 +12,50 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
-from alphacut.rve.image.fields.reference import Reference
 
-Complex = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
+Complex = NDArray[np.complex128]
+ROUNDING = 1e-3  # of the preconditioner
+
+
+@dataclass(frozen=True)
+class Reference:
+    """One constant material.
+
+    Args:
+        trace: Coefficient of the trace, positive.
+        deviator: Coefficient of the deviator, positive.
+    """
+
+    trace: float
+    deviator: float
+
+    @classmethod
+    def between(cls, trace: Array, deviator: Array, *, stress: bool) -> Reference:
+        """The material in the middle of those of an image, so that the spectrum is narrow.
+
+        Args:
+            trace: Coefficients of the pixels, shape (rows, columns).
+            deviator: Same shape.
+            stress: Only the sum of the coefficients counts; the least material's shares then let
+                the sum decide in `least` too.
+        """
+        bulk, shear = float(trace.min()), float(deviator.min())
+        whole = float(np.sqrt((bulk + shear) * (trace.max() + deviator.max())))
+        middle = float(np.sqrt(shear * deviator.max()))
+        if stress:
+            middle = whole * shear / (bulk + shear)
+        return cls(whole - middle, middle)
+
+    def least(self, trace: Array, deviator: Array) -> float:
+        """Energy of fluctuations of an image over that in this material, at least."""
+        bulk, shear = float(trace.min()), float(deviator.min())
+        ratios = shear / self.deviator, (bulk + shear) / (self.trace + self.deviator)
+        return min(ratios) * (1 - ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,79 +63,40 @@ class FourierPreconditioner:
     """Inverse of the constant-coefficient operator on a periodic grid.
 
     Args:
-        inverse: Real blocks at wave numbers 0 … half of those along y, shape (half, unknowns,
-            unknowns, waves along x).
-        phases: Unit factors of the unknowns, along y with shape (unknowns, rows), along x with
-            shape (unknowns, waves along x).
+        inverse: Hermitian blocks, shape (unknowns, unknowns, rows, waves along x).
         shape: Rows and columns of the grid.
     """
 
-    inverse: Array
-    phases: tuple[Complex, Complex]
+    inverse: Complex
     shape: tuple[int, int]
 
     @classmethod
     def of(
         cls, element: Element, constant: Reference, shape: tuple[int, int]
     ) -> FourierPreconditioner:
-        """The preconditioner for a constant material."""
+        """The preconditioner for a constant material; uniform fields cause nothing."""
         ky, kx = 2 * np.pi * np.fft.fftfreq(shape[0]), 2 * np.pi * np.fft.rfftfreq(shape[1])
-        half, count = np.abs(ky[: shape[0] // 2 + 1]), len(element.unknowns)
-        inverse = np.empty((len(half), count, count, len(kx)))
-        for row, block in enumerate(symbol(element, constant, half, kx)):
-            inverse[row] = np.moveaxis(_inverted(block, row == 0), 0, -1)
-        return cls(inverse, phase_factors(element, ky, kx), shape)
+        blocks = symbol(element, constant, ky, kx)
+        uniform = np.linalg.pinv(blocks[0, 0], rcond=1e-10, hermitian=True)
+        blocks[0, 0] = np.eye(element.unknowns)
+        inverse = np.linalg.inv(blocks)
+        inverse[0, 0] = uniform
+        inverse += np.conj(np.swapaxes(inverse, -1, -2))
+        return cls(np.ascontiguousarray(np.moveaxis(inverse / 2, (-2, -1), (0, 1))), shape)
 
     def apply(self, fields: Array) -> Array:
         """The inverse on fields of shape (loads, unknowns, rows, columns)."""
-        spectrum = fft.rfft2(fields)
-        along_y, along_x = self.phases
-        for row in range(self.shape[0]):
-            factor = along_y[:, row, None] * along_x
-            turned = spectrum[..., row, :] * factor.conj()
-            parts = np.stack([turned.real, turned.imag])
-            result = np.einsum("abf,cnbf->cnaf", self.inverse[min(row, self.shape[0] - row)], parts)
-            turned.real, turned.imag = result
-            np.multiply(turned, factor, out=spectrum[..., row, :])
+        spectrum = np.einsum("abyx,nbyx->nayx", self.inverse, fft.rfft2(fields))
         return np.asarray(fft.irfft2(spectrum, s=self.shape, overwrite_x=True))
 
 
-def _inverted(blocks: Array, first: bool) -> Array:
-    """Symmetric inverses of blocks, (waves, unknowns, unknowns); uniform fields cause nothing."""
-    inverse = np.empty_like(blocks)
-    uniform = np.linalg.pinv(blocks[:1], rcond=1e-10, hermitian=True)
-    inverse[:1] = uniform if first else np.linalg.inv(blocks[:1])
-    inverse[1:] = np.linalg.inv(blocks[1:])
-    return np.asarray(inverse + np.swapaxes(inverse, 1, 2)) / 2
-
-
-def symbol(element: Element, constant: Reference, ky: Array, kx: Array) -> Array:
-    """Real symmetric blocks of the operator, shape (len(ky), len(kx), unknowns, unknowns)."""
+def symbol(element: Element, constant: Reference, ky: Array, kx: Array) -> Complex:
+    """Hermitian blocks of the operator, shape (len(ky), len(kx), unknowns, unknowns)."""
     trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
     matrix = constant.trace * trace + constant.deviator * deviator
-    count, steps = len(element.unknowns), np.arange(-2, 3) / 2
-    table = np.zeros((count, count, 5, 5))  # by the distance of two unknowns in half pixels
-    places = [np.add(element.unknowns[kind].place, shift) for kind, *shift in element.local]
-    for j, k in np.ndindex(matrix.shape):
-        y, x = np.rint(2 * (places[k] - places[j])).astype(int) + 2
-        table[element.local[j][0], element.local[k][0], y, x] += matrix[j, k]
-    waves_y, waves_x = np.exp(1j * np.outer(ky, steps)), np.exp(1j * np.outer(steps, kx))
-    turn = np.array([1j if unknown.odd else 1 for unknown in element.unknowns])
-    factor = (turn.conj()[:, None] * turn)[..., None, None]
-    return np.moveaxis((factor * (waves_y @ table @ waves_x)).real, (0, 1), (-2, -1))
-
-
-def phase_factors(element: Element, ky: Array, kx: Array) -> tuple[Complex, Complex]:
-    """Factors of the unknowns along y and along x: the wave at the place in the pixel.
-
-    The block at −ky is the one at ky with the signs of those unknowns changed that change sign
-    under a reflection of y.
-    """
-    along_y, along_x = [], []
-    for unknown in element.unknowns:
-        (y, x), (slope, _) = unknown.place, unknown.slopes
-        reflected = (unknown.component + slope) % 2 == 1
-        sign = np.where((ky < 0) & reflected, -1, 1)
-        along_y.append(np.exp(1j * ky * y) * (1j if unknown.odd else 1) * sign)
-        along_x.append(np.exp(1j * kx * x))
-    return np.array(along_y), np.array(along_x)
+    kind, up, right = np.array(element.local).T
+    table = np.zeros((3, 3, element.unknowns, element.unknowns))  # by the distance in pixels
+    rise, run = up - up[:, None] + 1, right - right[:, None] + 1
+    np.add.at(table, (rise, run, kind[:, None], kind), matrix)
+    waves_y, waves_x = (np.exp(1j * np.outer(k, (-1, 0, 1))) for k in (ky, kx))
+    return np.einsum("yr,xs,rsab->yxab", waves_y, waves_x, table, optimize=True)

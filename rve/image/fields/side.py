@@ -9,19 +9,16 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
-from alphacut.rve.image.fields.division import divided, prolonged
 from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.energy import Energies, energies
 from alphacut.rve.image.fields.grid import Operator
-from alphacut.rve.image.fields.preconditioner import FourierPreconditioner
-from alphacut.rve.image.fields.reference import Reference
+from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
 
 UNIT_LOADS = np.eye(3)
 # the loads that are solved: near an isotropic stiffness's own, so that the soft ones are not
 # drowned in the stiff ones where ν is near 1/2 or −1
 SOLVED_LOADS = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 SMALL = 1 << 17  # pixels up to which the loads are solved together
-COARSER = 10.0  # accuracy of a start on whole pixels over the one of the parts
 
 
 @dataclass(frozen=True)
@@ -80,16 +77,13 @@ def solve_side(
         shear: Shear modulus, same shape and unit.
         solver: Stopping rule.
         aspect: Height of a pixel over its width.
-        division: Parts along each side into which every pixel is divided; the fields of whole
-            pixels are the start.
+        division: Parts along each side into which every pixel is divided: the same image, a larger
+            space of fields.
         start: Fields to start from, on the divided pixels.
     """
     element, whole = side.element(aspect), side.coefficients(bulk, shear)
+    trace, deviator = (np.kron(one, np.ones((division, division))) for one in whole)
     begin = None if start is None else _of_solved_loads(start)
-    if division > 1 and begin is None:
-        coarse, _ = _fields(element, *whole, solver.coarser(COARSER), None)
-        begin = prolonged(element, coarse, division)
-    trace, deviator = (divided(one, division) for one in whole)
     fields, iterations = _fields(element, trace, deviator, solver, begin)
     fields = _of_unit_loads(fields)
     weights = list(zip(element.parts, (trace, deviator), strict=True))
@@ -106,7 +100,7 @@ def _fields(
 ) -> tuple[Array, int]:
     """Fields of the solved loads and the most iterations; large images load by load."""
     modes = element.mean_modes(SOLVED_LOADS)
-    constant = Reference.between(trace, deviator, exchange=element.order == 2)
+    constant = Reference.between(trace, deviator, stress=element.stress)
     preconditioner = FourierPreconditioner.of(element, constant, (len(trace), len(trace[0])))
     operator = Operator(element, trace, deviator)
     scale, least = least_energy(element, trace, deviator, modes), constant.least(trace, deviator)

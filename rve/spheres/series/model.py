@@ -10,6 +10,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
+from alphacut.rve.result import StressCurve
 from alphacut.rve.settings import require_accuracy, require_parts, require_points
 from alphacut.rve.slices.theta_rule import settle_rule
 from alphacut.rve.spheres.cubic import cubic_moduli
@@ -52,6 +53,12 @@ class SphereSeriesModel:
             used.update(zip(radii, zip(cells.errors, cells.degrees, strict=True), strict=True))
             return cells.matrix
 
+        def space_error(curve: StressCurve, k: int) -> Array:
+            """Declared errors of the mean moduli from those at the nodes, shape (3,)."""
+            errors = [used[r][0][k] for r in radius_map(curve.theta)]
+            moduli = curve.weights[:, None] * cubic_moduli(np.asarray(curve.stiffness))
+            return np.asarray((moduli * errors).sum(axis=0) / moduli.sum(axis=0))
+
         curves, gaps, finest = settle_rule(
             radius_map,
             stiffness_at,
@@ -59,24 +66,17 @@ class SphereSeriesModel:
             accuracy=self.accuracy,
             moduli=cubic_moduli,
         )
-        seconds = perf_counter() - start
-        results = []
+        seconds, results = perf_counter() - start, []
         for k, (curve, gap, judge) in enumerate(zip(curves, gaps, finest, strict=True)):
-            left = []
-            for one in (judge, curve):
-                spent = [used[r] for r in radius_map(one.theta)]
-                moduli = one.weights[:, None] * cubic_moduli(np.asarray(one.stiffness))
-                left.append((moduli * [e[k] for e, _ in spent]).sum(0) / moduli.sum(0))
-            degree = max(int(n[k]) for _, n in spent)
-            results.append(
-                HomogenisedSpheres(
-                    curve=curve,
-                    method=self.name,
-                    unknowns=3 * (degree + 2) ** 2 // 16,
-                    seconds={"solve": seconds, "total": seconds},
-                    errors={"space": np.maximum(*left), "theta": gap},
-                    reason=f"{curve.theta.size} nodes in θ, multipoles up to degree {degree}",
-                )
+            degree = max(int(used[r][1][k]) for r in radius_map(curve.theta))
+            space = np.maximum(space_error(curve, k), space_error(judge, k))
+            result = HomogenisedSpheres(
+                curve=curve,
+                method=self.name,
+                unknowns=3 * (degree + 2) ** 2 // 16,
+                seconds={"solve": seconds, "total": seconds},
+                errors={"space": space, "theta": gap},
+                reason=f"{curve.theta.size} nodes in θ, multipoles up to degree {degree}",
             )
-        pairs = zip(results, inclusions, strict=True)
-        return [certified_spheres(result, radius_map, matrix, phase) for result, phase in pairs]
+            results.append(certified_spheres(result, radius_map, matrix, inclusions[k]))
+        return results

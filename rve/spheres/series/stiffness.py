@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
+from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.cubic import cubic_voigt
-from alphacut.rve.spheres.series.interface import scattering, shear_modulus
+from alphacut.rve.spheres.series.scattering import scattering
 from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
 
 MOST_DEGREES = 64  # reaches 1e-8 at r = 0.985
@@ -29,28 +29,24 @@ _TRUNCATION = Truncation(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CubicStiffness:
-    """Stiffness of cells of cubic symmetry by their three moduli, in Pa.
+    """Stiffness of n cells times m inclusions by its moduli.
 
     Args:
-        bulk: K.
-        deviator: (C11 − C12)/2, shear along the diagonals of a face.
-        shear: C44, shear along the edges.
-        errors: Declared relative truncation errors of the three, shape (…, 3).
-        degrees: Largest degree of the multipoles that reached it.
+        moduli: K, (C11 − C12)/2 and C44 in Pa, shape (n, m, 3).
+        errors: Declared relative truncation errors of the three, same shape.
+        degrees: Largest degree of the multipoles that reached it, shape (n, m).
     """
 
-    bulk: Array
-    deviator: Array
-    shear: Array
+    moduli: Array
     errors: Array
     degrees: Array
 
     @property
     def matrix(self) -> Array:
-        """Voigt matrices (11, 22, 33, 23, 13, 12 with 2 ε), shape (…, 6, 6)."""
-        return cubic_voigt(self.bulk, self.deviator, self.shear)
+        """Voigt matrices (11, 22, 33, 23, 13, 12 with 2 ε), shape (n, m, 6, 6)."""
+        return cubic_voigt(*np.moveaxis(self.moduli, -1, 0))
 
 
 def cubic_stiffness(
@@ -65,78 +61,50 @@ def cubic_stiffness(
             a pore and a rigid sphere to as many digits.
         tolerance: Relative truncation error allowed, at least 1e-12.
 
-    Returns:
-        Moduli of shape (n, m).
-
     Raises:
-        ValueError: A radius lies outside [0, 1).
+        RefusedError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (spheres nearly in touch).
     """
     radius = require_radii(radius)
+    rate = 2 * np.arccosh(1 / np.maximum(radius, 1e-3))  # decay of images between two spheres
+    first = np.searchsorted(_DEGREES, np.log(1 / tolerance) / rate)
 
     def solve(rows: Array, degree: int) -> tuple[Array, Array]:
-        return _with_errors(radius[rows], matrix, inclusions, degree)
+        """Moduli and errors; a quarter and a half more degrees tell the error, with a margin."""
+        own, finer, finest = (
+            _moduli(radius[rows], matrix, inclusions, n)
+            for n in (degree, degree + max(2, degree // 4), degree + max(4, degree // 2))
+        )
+        return own, _SAFETY * error_by_more_terms(own, finer, finest) + _ROUND_OFF
 
-    moduli, errors, used = _TRUNCATION.settle(
-        radius,
-        len(inclusions),
-        _first_degrees(radius, tolerance),
-        solve,
-        tolerance=max(tolerance, 2 * _ROUND_OFF),
+    return CubicStiffness(
+        *_TRUNCATION.settle(
+            radius,
+            len(inclusions),
+            _DEGREES[np.minimum(first, _DEGREES.size - 1)],
+            solve,
+            tolerance=max(tolerance, 2 * _ROUND_OFF),
+        )
     )
-    bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
-    return CubicStiffness(bulk, deviator, shear, errors, used)
-
-
-def _first_degrees(radius: Array, tolerance: float) -> Array:
-    """Degree for each radius, from the decay of images between two spheres."""
-    rate = 2 * np.arccosh(1 / np.maximum(radius, 1e-3))
-    needed = np.log(1 / tolerance) / rate
-    place = np.minimum(np.searchsorted(_DEGREES, needed), _DEGREES.size - 1)
-    return np.asarray(_DEGREES[place])
-
-
-def _with_errors(
-    radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int
-) -> tuple[Array, Array]:
-    """Moduli and their declared relative errors, shape (rows, m, 3) each.
-
-    A quarter and a half more degrees tell the error, with a margin.
-    """
-    own, finer, finest = (
-        _moduli(radius, matrix, inclusions, n)
-        for n in (degree, degree + max(2, degree // 4), degree + max(4, degree // 2))
-    )
-    return own, _SAFETY * error_by_more_terms(own, finer, finest) + _ROUND_OFF
 
 
 def _moduli(radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int) -> Array:
     """K, (C11 − C12)/2 and C44 with multipoles up to `degree`, in Pa, shape (rows, m, 3)."""
-    size = 3 * (degree + 2) ** 2 // 16
-    parts = -(-radius.size * len(inclusions) * size**2 // _BATCH)
-    cuts = np.linspace(0, radius.size, min(radius.size, max(1, parts)) + 1).astype(int)
-    batches = [radius[a:b] for a, b in pairwise(cuts)]
-    return np.concatenate([_solve_batch(batch, matrix, inclusions, degree) for batch in batches])
+    size = len(inclusions) * (3 * (degree + 2) ** 2 // 16) ** 2
+    parts = np.array_split(radius, min(radius.size, -(-radius.size * size // _BATCH)))
+    return np.concatenate([_solve_batch(part, matrix, inclusions, degree) for part in parts])
 
 
 def _solve_batch(radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int) -> Array:
-    """The same for few enough radii."""
-    mu, nu, cube = shear_modulus(matrix), matrix.poisson, radius[:, None] ** 3
-    bulk = 2 * mu * (1 + nu) / (3 * (1 - 2 * nu))
+    """The same for few enough radii: mean stress less that of the far field, by force dipoles."""
+    (bulk, mu), nu = bulk_and_shear(matrix), matrix.poisson
     axial, sheared = (
         _dipoles(radius, matrix, inclusions, degree, shear=shear) for shear in (False, True)
     )
-    # mean stress less that of the far field: the force dipoles over the volume
-    return np.stack(
-        [
-            bulk + 8 * np.pi * mu * (1 - nu) / (1 - 2 * nu) * cube * axial[..., 0] / (3 * VOLUME),
-            *(
-                mu - 8 * np.pi * mu * (1 - nu) * cube * dipole / VOLUME
-                for dipole in (axial[..., 1], sheared[..., 0])
-            ),
-        ],
-        axis=-1,
-    )
+    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
+    axial[..., 0] /= -3 * (1 - 2 * nu)
+    dipoles = np.concatenate([axial, sheared], axis=-1)
+    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
 
 
 def _dipoles(
@@ -155,20 +123,16 @@ def _dipoles(
     if not shear:
         unit = -1 / (2 * (1 - 2 * matrix.poisson))  # solution 3 of degree 0 is −2(1 − 2ν) x
         loads.insert(0, (poles.place(3, 0, 0), poles.place(1, 0, 0), unit))
-    found = np.empty((radius.size, len(inclusions), len(loads)))
+    sources, poles_of, units = map(list, zip(*loads, strict=True))
+    columns, dipoles = range(len(loads)), np.empty((radius.size, len(inclusions), len(loads)))
+    far = np.zeros((poles.n.size, len(loads)))
+    far[sources, columns] = units
     for j, inclusion in enumerate(inclusions):
         spheres = scatterers(degree, matrix, inclusion, shear=shear)
-        far = np.zeros((poles.n.size, len(loads)))
-        for column, (source, _, unit) in enumerate(loads):
-            far[source, column] = unit
         system = np.eye(poles.n.size) - spheres.answer(images)
-        amplitudes = np.linalg.solve(
-            system, np.broadcast_to(spheres.answer(far), (*system.shape[:2], len(loads)))
-        )
-        found[:, j] = np.stack(
-            [amplitudes[:, pole, column] for column, (_, pole, _) in enumerate(loads)], axis=-1
-        )
-    return found
+        right = np.broadcast_to(spheres.answer(far), (*system.shape[:2], len(loads)))
+        dipoles[:, j] = np.linalg.solve(system, right)[:, poles_of, columns]
+    return dipoles
 
 
 def _powers(poles: Multipoles) -> tuple[Array, Array]:

@@ -52,7 +52,7 @@ def test_the_product_of_modes_and_unknowns(element):
     count = len(element.local)
     row = int(np.argmax((element.modes != 0).sum(axis=1)))
     used = [k for k in range(count) if element.modes[row, k] != 0 and k not in element.anchors[k]]
-    fields = np.zeros((1, len(element.unknowns), 4, 4))
+    fields = np.zeros((1, element.unknowns, 4, 4))
     for k in used:
         kind, up, right = element.local[k]
         fields[0, kind, 1 + up, 1 + right] = (1.0 if k == used[0] else LOST) / element.modes[row, k]

@@ -7,7 +7,7 @@ import pytest
 
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS
-from alphacut.rve.image.reduced_bounds import reduced_bounds, widths
+from alphacut.rve.image.reduced import reduced_bounds, widths
 from alphacut.rve.image.solve import solve_image
 
 FACTOR = 16.0

@@ -12,13 +12,12 @@ from alphacut.rve.spheres.series import stiffness as series
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 
 MATRIX = Phase(20e9)
-MODULI = ("bulk", "deviator", "shear")
 
 
 def moduli(radius, matrix, inclusion, **options):
     """K, (C11 − C12)/2 and C44 of one cell, in Pa."""
     cell = cubic_stiffness([radius], matrix, [inclusion], **options)
-    return np.array([getattr(cell, name)[0, 0] for name in MODULI])
+    return cell.moduli[0, 0]
 
 
 def material(bulk, shear):
@@ -114,7 +113,7 @@ def test_declared_error_holds_and_is_no_fable():
         tolerance = 10 ** rng.uniform(-8, -2)
         cell = cubic_stiffness([radius], matrix, [inclusion], tolerance=tolerance)
         exact = moduli(radius, matrix, inclusion, tolerance=min(1e-10, tolerance / 1e3))
-        found = np.array([getattr(cell, name)[0, 0] for name in MODULI])
+        found = cell.moduli[0, 0]
         true = abs(found / exact - 1)
         assert (cell.errors[0, 0] + 1e-12 >= true).all(), (radius, matrix, inclusion, tolerance)
         assert cell.errors.max() <= tolerance

@@ -11,11 +11,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-
-
-def shear_modulus(phase: Phase) -> float:
-    """μ = E / 2(1 + ν) in Pa."""
-    return phase.modulus / (2 * (1 + phase.poisson))
+from alphacut.rve.spheres.bounds import bulk_and_shear
 
 
 def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
@@ -30,7 +26,7 @@ def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
         Of solutions 1 and 3, shape (k, 2, 2), and of solution 2, shape (k,).
     """
     n = np.asarray(degrees, float)
-    ratio = shear_modulus(inclusion) / shear_modulus(matrix)
+    ratio = bulk_and_shear(inclusion)[1] / bulk_and_shear(matrix)[1]
     soft, stiff = 1 / (1 + ratio), ratio / (1 + ratio)  # of one scale, pores and rigid alike
     stiffness = _surface_stiffness(n, inclusion.poisson)
 

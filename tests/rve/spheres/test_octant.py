@@ -1,0 +1,42 @@
+"""Finite elements on one eighth of the cell, beside the series: another method, from above."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import Phase
+from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+
+pytest.importorskip("dolfinx")
+from alphacut.rve.spheres.octant import Octant
+
+MATRIX = Phase(20e9)
+
+
+@pytest.mark.parametrize(
+    ("radius", "inclusion", "near"),
+    [(0.5, Phase(80e9), 4e-4), (0.8, Phase(80e9, 0.2), 2e-3), (0.6, Phase(20e5, 0.2), 2e-3)],
+)
+def test_energies_lie_above_the_series_and_near_it(radius, inclusion, near):
+    exact = cubic_stiffness(np.array([radius]), MATRIX, [inclusion]).moduli[0, 0]
+    excess = Octant(radius, 0.25).moduli(MATRIX, inclusion) / exact - 1
+    assert (excess > -1e-6).all()
+    assert (excess < near).all()
+
+
+@pytest.mark.slow
+def test_finer_elements_come_nearer_quickly():
+    exact = cubic_stiffness(np.array([0.5]), MATRIX, [Phase(80e9)]).moduli[0, 0]
+    errors = [Octant(0.5, size).moduli(MATRIX, Phase(80e9)) / exact - 1 for size in (0.18, 0.11)]
+    assert (errors[0] > 3 * errors[1]).all()
+
+
+def test_a_homogeneous_cell_is_exact():
+    result = Octant(0.6, 0.5).moduli(MATRIX, MATRIX)
+    assert result == pytest.approx((20e9 / 1.2, 20e9 / 2.6, 20e9 / 2.6), rel=1e-10)
+
+
+@pytest.mark.parametrize("sizes", [(0.98, 0.3), (1.2, 0.3), (0.5, 0.0)])
+def test_sizes_without_a_mesh_are_refused(sizes):
+    with pytest.raises(RefusedError):
+        Octant(*sizes)
