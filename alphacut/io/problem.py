@@ -98,7 +98,8 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     return f"did you mean {close}?" if (close := nearest(name, known)) else ""
 
 
-EXTRAS = {"skimage": "particles", "gmsh": "mesh", "meshio": "mesh", "h5py": "mesh"}
+ELEMENTS = ("dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py")
+EXTRAS = {"skimage": "particles", **dict.fromkeys(ELEMENTS, "cell")}
 
 
 def missing(error: ImportError) -> str:
@@ -106,4 +107,4 @@ def missing(error: ImportError) -> str:
     library = (error.name or "").partition(".")[0]
     if library in EXTRAS:
         return f"{error}; pip install '.[{EXTRAS[library]}]', or run inside ./enter"
-    return f"{error}; run inside ./enter, or install python3-dolfinx or fenics-dolfinx"
+    return f"{error}; run inside ./enter, or install what brings {library}"
