@@ -36,7 +36,7 @@ from alphacut.frame.modal.optima import Optima, Response, best_of_few, best_of_p
 from alphacut.frame.modal.starting_points import fresh_points, trajectories
 from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.progress_bar import Progress, share
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
@@ -149,7 +149,7 @@ class Search:
             return optima, np.zeros(len(every))
         box = lower, upper, SMALL * tolerance
         refine(way, optima, every, *box)
-        _follow(way, optima, grid, box)
+        _follow(way, optima, grid, box, np.ones(len(every), bool))
         tick(0.5)
         gains = list[Array]()
         for count in range(self.passes):
@@ -185,8 +185,7 @@ class Search:
             rival.offer(way, rival.point.copy(), own)
             refine(way, rival, own, *box)
             improved[optima.offer(way, rival.point, grid[nodes].ravel())] = True
-        if improved.any():
-            _follow(way, optima, grid, box)
+        _follow(way, optima, grid, box, improved)
 
 
 def _exact(model: ModalModel, flow: UnitFlow) -> ExactResponse:
@@ -203,13 +202,17 @@ def _grid(way: Response, optima: Optima) -> Rows:
     return np.arange(len(optima.value)).reshape(len(way.time), -1)
 
 
-def _follow(way: Response, optima: Optima, grid: Rows, box: tuple[Array, Array, float]) -> None:
-    """Try at every node what is best near by, and refine it, until nothing improves."""
+def _follow(
+    way: Response, optima: Optima, grid: Rows, box: tuple[Array, Array, float], fresh: Mask
+) -> None:
+    """Try at every node what is fresh near by, and refine it, until nothing improves."""
     for _ in range(ROUNDS):
-        better = exchange(way, optima, grid)
+        better = exchange(way, optima, grid, fresh)
         if not len(better):
             return
         refine(way, optima, better, *box)
+        fresh = np.zeros(len(optima.value), bool)
+        fresh[better] = True
 
 
 def _missed(gains: list[Array], outputs: int, quiet: float) -> Array:

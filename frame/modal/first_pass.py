@@ -12,7 +12,7 @@ from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.newton import refine
 from alphacut.frame.modal.optima import Optima, Response, best_of_pool
 from alphacut.frame.modal.starting_points import trajectories
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 SAMPLES = 256
 """Trajectories of the model."""
@@ -53,12 +53,21 @@ def first_optima(
     return optima
 
 
-def exchange(model: Response, optima: Optima, grid: Array) -> Array:
-    """Try at each row of `grid` (nodes, 2 m) the points of rows near by; problems that improved."""
+def exchange(model: Response, optima: Optima, grid: Rows, fresh: Mask | None = None) -> Rows:
+    """Try at each row of `grid` (nodes, 2 m) the points of rows near by; problems that improved.
+
+    Args:
+        model: The model.
+        optima: All problems.
+        grid: Their numbers at the nodes that take part.
+        fresh: Problems whose points are tried, shape (N,); all unless given.
+    """
     better = []
     for shift in SHIFTS:
         count = max(len(grid) - shift, 0)
         for here, there in ((shift, 0), (0, shift)):
             to, of = (grid[k : k + count].ravel() for k in (here, there))
+            if fresh is not None:
+                to, of = to[fresh[of]], of[fresh[of]]
             better.append(optima.offer(model, optima.point[of], to))
     return np.unique(np.concatenate(better))

@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, inverse
 from alphacut.frame.structures.modes import eigenvectors
+from alphacut.fuzzy.refused import RefusedError
 
 APART = 1e-6
 """Least relative distance of the squared frequencies of modes with different ratios."""
@@ -29,8 +30,8 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
             frequency.
 
     Raises:
-        ValueError: A stiffness is not positive definite, or two modes of different ratios have the
-            same frequency.
+        RefusedError: A stiffness is not positive definite, or two modes of different ratios have
+            the same frequency.
     """
     operator = inverse(mass) @ stiffness
     if len(ratios) == 1:
@@ -53,7 +54,7 @@ def square_root(operator: Jet, mass: Array) -> Jet:
         mass: M, shape (S, n, n).
 
     Raises:
-        ValueError: A is not positive definite.
+        RefusedError: A is not positive definite.
     """
     lower = np.linalg.cholesky(mass)
     below = np.linalg.inv(lower)
@@ -77,14 +78,13 @@ def square_root(operator: Jet, mass: Array) -> Jet:
 
 def _check(squared: Array, ratios: Array) -> None:
     if not (share := (squared / abs(squared).max(-1, keepdims=True)).min()) > 1e-12:
-        raise ValueError(
-            f"damping ratio: a mode's squared frequency is {share:.1e} of the greatest, not above"
-            " rounding (1e-12): it has no ratio; give dampers, or join storeys that are too stiff"
+        cure = "give dampers, or join storeys that are too stiff"
+        what = f"{share:.1e} of the greatest"
+        raise RefusedError(
+            "squared frequency of a damped mode", what, "above rounding, 1e-12", cure
         )
     close = (np.diff(squared) < APART * squared[:, 1:]) & (np.diff(ratios) != 0)
     if close.any():
         k = int(np.flatnonzero(close.any(0))[0]) + 1
-        raise ValueError(
-            f"damping ratio: modes {k} and {k + 1} have the same frequency but different ratios;"
-            " give both the same one"
-        )
+        what = f"different for modes {k} and {k + 1}, which have the same frequency"
+        raise RefusedError("damping ratio", what, "one ratio for both")

@@ -15,6 +15,7 @@ from alphacut.frame.structures.lagrangian_check import (
     require_dimensions,
 )
 from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.refused import RefusedError
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -41,9 +42,9 @@ class LagrangianSystem:
         force: Generalised forces F(q, v, p), n of them; None for none.
 
     Raises:
-        ValueError: L is not quadratic in v, so that momenta cannot be turned back into velocities,
-            some coordinate has no inertia, a function asks for what is not there or is not smooth,
-            or gives a list of another length.
+        RefusedError: L is not quadratic in v, so that momenta cannot be turned back into
+            velocities, some coordinate has no inertia, a function asks for what is not there or is
+            not smooth, or gives a list of another length.
     """
 
     coordinates: int
@@ -58,33 +59,24 @@ class LagrangianSystem:
         for row in self.symbols.mass.tolist():
             for entry in row:
                 if entry.free_symbols & set(self.symbols.v):
-                    raise ValueError(
-                        f"lagrangian: the mass matrix holds velocities ({entry}); L must be"
-                        " quadratic in v"
-                    )
+                    raise RefusedError("lagrangian", entry, "functions quadratic in v")
         eq = self.symbols
         for name in self.observed:
             self.output(name, eq.v)
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
         modal = {eq.p[name]: value for name, value in self.parameters.items()}
         if abs(eq.mass.subs(start).subs(modal).evalf().det()) < 1e-300:
-            raise ValueError(
-                "lagrangian: the mass matrix is singular at the start of the modal motion; give"
-                " every coordinate inertia"
-            )
+            raise RefusedError("mass of the lagrangian", "singular", "inertia of each coordinate")
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
         """The initial state (q0, v0) in symbols.
 
         Raises:
-            ValueError: It does not consist of one number for each coordinate.
+            RefusedError: It does not consist of one number for each coordinate.
         """
         given = called("initial", self.initial, self.symbols.p)
         if not isinstance(given, Sequence) or len(given) != 2:
-            raise ValueError(
-                f"initial: {given} is not allowed; it must be two lists, the displacements and the"
-                " velocities"
-            )
+            raise RefusedError("initial", given, "two lists, displacements and velocities")
         q0, v0 = (
             listed(f"initial: {part}", x, self.coordinates)
             for part, x in zip(("q0", "v0"), given, strict=True)
@@ -172,13 +164,13 @@ def pendulum(
         cos φ, and the angle "phi".
 
     Raises:
-        ValueError: Mass, length or gravity is not positive, or the damping is negative.
+        RefusedError: Mass, length or gravity is not positive, or the damping is negative.
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         if not value > 0:
-            raise ValueError(f"{name}: {value:g} is not allowed; it must be positive")
+            raise RefusedError(name, value, "positive numbers")
     if damping < 0:
-        raise ValueError(f"damping: {damping:g} is not allowed; it must not be negative")
+        raise RefusedError("damping", damping, "0 or greater")
 
     def lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
         return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from alphacut.frame.calculus.numbers import require_number
+from alphacut.fuzzy.refused import RefusedError
 
 if TYPE_CHECKING:
     from sympy import Expr
 
 T = TypeVar("T")
-SMOOTH = "use arithmetic and the smooth sin, cos and exp of alphacut.frame.calculus.jet"
+SMOOTH = "arithmetic and the smooth sin, cos and exp of alphacut.frame.calculus.jet"
 ROUGH = {"Abs", "sign", "Max", "Min", "Heaviside", "DiracDelta", "Piecewise", "floor", "ceiling"}
 ROUGH |= {"Mod", "arg", "re", "im"}
 """Functions of SymPy that have no second derivative everywhere."""
@@ -20,20 +21,12 @@ ROUGH |= {"Mod", "arg", "re", "im"}
 def require_dimensions(
     coordinates: int, parameters: Mapping[str, float], observed: Mapping[str, object]
 ) -> None:
-    """Refuse systems without coordinates, parameters or outputs, and bad parameters.
-
-    Raises:
-        ValueError: It is one.
-    """
+    """Refuse systems without coordinates, parameters or outputs, and bad parameters."""
     if not isinstance(coordinates, int) or coordinates < 1:
-        raise ValueError(
-            f"coordinates: {coordinates!r} is not allowed; it must be a whole number, 1 or greater"
-        )
+        raise RefusedError("coordinates", coordinates, "whole numbers from 1 on")
     for name, named in (("parameters", parameters), ("observed", observed)):
         if not isinstance(named, Mapping) or not named:
-            raise ValueError(
-                f"{name}: {named!r} is not allowed; it must map names to values, one at least"
-            )
+            raise RefusedError(name, named, "values by name, one at least")
     for name, value in parameters.items():
         require_number(f"parameter {name}", value, "SI units")
 
@@ -41,60 +34,44 @@ def require_dimensions(
 def called(
     name: str, function: Callable[..., T], *arguments: Sequence[Expr] | Mapping[str, Expr]
 ) -> T:
-    """Value of a function for symbols.
-
-    Args:
-        name: What the function is called.
-        function: Of (q, v, p), or of p.
-        arguments: Symbols; p, the last, by name.
+    """Value of a function for symbols: of (q, v, p), or of p, the parameters by name.
 
     Raises:
-        ValueError: It asks for a parameter or coordinate that is not there, or cannot take symbols.
+        RefusedError: It asks for a parameter or coordinate that is not there, or cannot take
+            symbols.
     """
     try:
         return function(*arguments)
     except KeyError as unknown:
-        raise ValueError(
-            f"{name}: there is no parameter {unknown}; known are {', '.join(arguments[-1])}"
-        ) from None
+        raise RefusedError(name, f"of parameter {unknown}", ", ".join(arguments[-1])) from None
     except IndexError:
-        raise ValueError(
-            f"{name}: asks for a coordinate beyond the {len(arguments[0])} that there are; raise"
-            " coordinates"
-        ) from None
+        what = "of a coordinate beyond"
+        raise RefusedError(name, what, f"the {len(arguments[0])} that there are") from None
     except (TypeError, AttributeError) as failure:
-        raise ValueError(
-            f"{name}: cannot be called with symbols ({str(failure).rstrip('.')}); {SMOOTH}"
-        ) from None
+        raise RefusedError(name, f"no function of symbols ({failure})", SMOOTH) from None
 
 
-def listed(name: str, given: Sequence[T], count: int) -> list[T]:
-    """The entries of a sequence, one for each coordinate.
-
-    Raises:
-        ValueError: It is no sequence, or of another length.
-    """
-    entries = list(given) if isinstance(given, Sequence) or hasattr(given, "tolist") else None
+def listed(name: str, values: Sequence[T], count: int) -> list[T]:
+    """The entries of a sequence, one for each coordinate."""
+    entries = list(values) if isinstance(values, Sequence) or hasattr(values, "tolist") else None
     if entries is None or len(entries) != count:
-        raise ValueError(
-            f"{name}: {given} is not allowed; it must be a list of {count}, one for each coordinate"
-        )
+        raise RefusedError(name, values, f"a list of {count}, one for each coordinate")
     return entries
 
 
-def expression(name: str, given: object) -> Expr:
+def expression(name: str, value: object) -> Expr:
     """An expression of SymPy with two derivatives.
 
     Raises:
-        ValueError: It is none, or holds a function without them.
+        RefusedError: It is none, or holds a function without them.
     """
     import sympy
 
     try:
-        found = sympy.sympify(given)
+        made = sympy.sympify(value)
     except sympy.SympifyError:
-        raise ValueError(f"{name}: {given!r} is no expression; {SMOOTH}") from None
-    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(found)} & ROUGH)
-    if rough or not isinstance(found, sympy.Expr):
-        raise ValueError(f"{name}: {rough[0] if rough else given} is not allowed; {SMOOTH}")
-    return found
+        raise RefusedError(name, repr(value), SMOOTH) from None
+    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(made)} & ROUGH)
+    if rough or not isinstance(made, sympy.Expr):
+        raise RefusedError(name, rough[0] if rough else value, SMOOTH)
+    return made

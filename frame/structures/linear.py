@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, variables
+from alphacut.fuzzy.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class Accelerogram:
         acceleration: Samples from t = 0 on, at least two, shape (n,), in m/s².
 
     Raises:
-        ValueError: The step is not positive, or there are not two samples, or one is not finite.
+        RefusedError: The step is not positive, or there are not two samples, or one is not finite.
     """
 
     step: float
@@ -62,10 +63,8 @@ class Accelerogram:
             or np.size(self.acceleration) < 2
             or not np.isfinite(self.acceleration).all()
         ):
-            raise ValueError(
-                f"accelerogram: step {self.step:g} s must be positive and all"
-                f" {np.size(self.acceleration)} samples finite, two or more"
-            )
+            what = f"{np.size(self.acceleration)} samples every {self.step:g} s"
+            raise RefusedError("accelerogram", what, "two or more finite samples, a positive step")
         object.__setattr__(self, "acceleration", np.asarray(self.acceleration, float))
 
     @property
@@ -145,28 +144,10 @@ def evaluate(
 
 
 def check_names(system: LinearSystem, names: Sequence[str]) -> None:
-    """Raises ValueError when a name is no parameter of `system`."""
+    """Raises RefusedError when a name is no parameter of `system`."""
     for name in names:
         if name not in system.parameters:
-            known = ", ".join(system.parameters)
-            raise ValueError(
-                f"uncertain parameter '{name}' is unknown; known are"
-                f" {known}{_members(system, name)}"
-            )
-
-
-def _members(system: LinearSystem, name: str) -> str:
-    """Hint where a name is short for several parameters."""
-    try:
-        group = getattr(system, "group", lambda _: ())(name)
-    except ValueError:
-        return ""
-    return (
-        f"; it is short for {', '.join(group)}: give each a number, as {{name: … for name in"
-        f" frame.group('{name}')}}"
-        if group
-        else ""
-    )
+            raise RefusedError("parameter", name, ", ".join(system.parameters))
 
 
 def round_off(largest: float, slowest: float, time: Array) -> Array:

@@ -2,100 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet, variables
+from alphacut.frame.calculus.jet import Jet, variables
 from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 
-
-def require_factors(kind: str, terms: object, parameters: Mapping[str, float]) -> None:
-    """Refuse terms that are no pairs, and factors without derivatives.
-
-    Args:
-        kind: What the terms make up: mass, damping or stiffness.
-        terms: Pairs (factor, array).
-        parameters: All parameters with their modal values.
-
-    Raises:
-        ValueError: There is one.
-    """
-    if isinstance(terms, str) or not isinstance(terms, Sequence):
-        raise ValueError(
-            f"{kind}: {type(terms).__name__} is no list of terms; give pairs (factor, array), as"
-            " [(1.0, array)]"
-        )
-    for term in terms:
-        if not isinstance(term, Sequence) or isinstance(term, str) or len(term) != 2:
-            raise ValueError(
-                f"{kind}: {type(term).__name__} is no term; give a list of pairs (factor, array),"
-                " as [('m', array)]"
-            )
-        factor = term[0]
-        if isinstance(factor, str) and factor not in parameters:
-            raise ValueError(
-                f"{kind}: factor '{factor}' is no parameter; known are {', '.join(parameters)}"
-            )
-        if callable(factor):
-            _require_smooth(kind, factor, parameters)
-        elif not isinstance(factor, str) and (
-            np.ndim(factor) or np.asarray(factor).dtype.kind not in "iuf" or not np.isfinite(factor)
-        ):
-            shown = type(factor).__name__ if np.ndim(factor) else repr(factor)
-            raise ValueError(
-                f"{kind}: factor {shown} is not allowed; give a number, the name of a parameter or"
-                " a function of all, then the array"
-            )
-
-
-def _require_smooth(kind: str, factor: Any, parameters: Mapping[str, float]) -> None:
-    names, values = list(parameters), np.array([list(parameters.values())], float)
-    try:
-        found = factor(variables(values, names, names[:1]))
-    except KeyError as unknown:
-        raise ValueError(
-            f"{kind}: a factor asks for {unknown}, which is no parameter; known are"
-            f" {', '.join(parameters)}"
-        ) from None
-    except (TypeError, AttributeError, ValueError) as failure:
-        cure = "use arithmetic, as p['k'] ** 0.5, and sin, cos, exp of alphacut.frame.calculus.jet"
-        raise ValueError(
-            f"{kind}: a factor cannot take parameters with derivatives ({failure}); {cure}"
-        ) from None
-    if not isinstance(found, Jet | float | int | np.number):
-        raise ValueError(
-            f"{kind}: a factor gives a {type(found).__name__}; it must give one number"
-        )
-
-
-def _symmetric(kind: str, given: Any, n: int) -> Array:
-    """The array, also a sparse one, without the round-off that parts its triangles."""
-    array = np.asarray(given.toarray() if hasattr(given, "toarray") else given)
-    if array.shape != (n, n):
-        raise ValueError(f"{kind}: an array has shape {array.shape}; all must be ({n}, {n})")
-    require_numbers(kind, array, "SI units")
-    array = array.astype(float)
-    off = np.abs(array - array.T)
-    i, j = np.unravel_index(off.argmax(), off.shape)
-    if off[i, j] <= 1e-9 * np.abs(array).max():
-        even: Array = (array + array.T) / 2
-        return even
-    cure = "mirror the one that is right, or take (A + A.T) / 2 where round-off parts them"
-    if not (np.triu(array, 1).any() and np.tril(array, -1).any()):
-        cure = "only one triangle is there: take A + A.T - np.diag(np.diag(A))"
-    raise ValueError(
-        f"{kind}: an array is not symmetric, by {off[i, j]:.2g}: entry [{i}, {j}] is"
-        f" {array[i, j]:g} and [{j}, {i}] is {array[j, i]:g}; {cure}"
-    )
-
-
+KINDS = ("mass", "damping", "stiffness")
 Factor = Callable[[Mapping[str, Any]], Any]
 Terms = Sequence[tuple[Factor | str | float, Array]]
 
@@ -124,7 +45,7 @@ class MatrixStructure:
             (`frame.damping`).
 
     Raises:
-        ValueError: A shape does not fit, a number is not finite, a factor names no parameter, an
+        RefusedError: A shape does not fit, a number is not finite, a factor names no parameter, an
             array is not symmetric, the modal mass matrix is not positive definite, or a modal ratio
             is outside [0, 1).
     """
@@ -139,86 +60,97 @@ class MatrixStructure:
     ground: Accelerogram | None = None
     pattern: Array | None = None
     ratios: Sequence[str | float] = ()
-    size: int = field(init=False)
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
             require_number(f"parameter {name}", value, "SI units")
-        for kind in ("mass", "damping", "stiffness"):
-            require_factors(kind, getattr(self, kind), self.parameters)
-        rows = self.observed if isinstance(self.observed, Mapping) else ()
-        if not (self.mass and self.stiffness and rows):
-            raise ValueError(
-                "mass, stiffness and observed: each needs at least one entry, observed by name, as"
-                " {'q1': row}"
-            )
-        n = self._usual_size()
-        object.__setattr__(self, "size", n)
-        for kind in ("mass", "damping", "stiffness"):
-            even = tuple((factor, _symmetric(kind, a, n)) for factor, a in getattr(self, kind))
-            object.__setattr__(self, kind, even)
+        for kind in ("mass", "stiffness", "observed"):
+            if not getattr(self, kind):
+                raise RefusedError(kind, None, "one entry at least")
+        for kind in KINDS:
+            terms = [self._term(kind, term) for term in getattr(self, kind)]
+            object.__setattr__(self, kind, tuple(terms))
         self._check_vectors()
         self._check_ratios()
-        self._check_mass()
-
-    def _usual_size(self) -> int:
-        """The size that most arrays have, with one row's vote, so that the odd one is refused."""
-        terms = (*self.mass, *self.damping, *self.stiffness)
-        sizes = [max((1, *np.shape(array))) for _, array in terms]
-        row = max((0, *np.shape(next(iter(self.observed.values())))))
-        return Counter([*sizes, row if row in sizes else row // 2]).most_common(1)[0][0]
-
-    def _check_vectors(self) -> None:
-        n = self.size
-        for name in ("q0", "v0", "pattern"):
-            if getattr(self, name) is not None and np.shape(getattr(self, name)) != (n,):
-                raise ValueError(
-                    f"{name}: shape {np.shape(getattr(self, name))} does not fit; it must be ({n},)"
-                )
-            require_numbers(
-                name, () if getattr(self, name) is None else getattr(self, name), "SI units"
-            )
-        for name, row in self.observed.items():
-            if np.shape(row) not in ((n,), (2 * n,)):
-                raise ValueError(
-                    f"observed: '{name}' has shape {np.shape(row)}; it must be ({n},) or ({2 * n},)"
-                )
-            require_numbers(f"observed: '{name}'", row, "SI units")
-
-    def _check_mass(self) -> None:
-        modal = sum(float(_value(f, self.parameters)) * A for f, A in self.mass)
+        modal = sum(float(value_of(f, self.parameters)) * A for f, A in self.mass)
         if not np.linalg.eigvalsh(modal).min() > 0:
-            raise ValueError(
-                "mass: the matrix at the modal parameters is not positive definite; every unknown"
-                " needs a mass"
-            )
+            raise RefusedError("mass", "not positive definite", "a mass for every unknown")
 
-    def _check_ratios(self) -> None:
-        if isinstance(self.ratios, str) or not isinstance(self.ratios, Sequence):
-            raise ValueError(
-                f"ratios: {self.ratios!r} is not allowed; it must be a list, as [0.02]"
-            )
-        if len(self.ratios) not in (0, 1, self.size):
-            raise ValueError(
-                f"ratios: got {len(self.ratios)}; give one for all modes, or {self.size}, by rising"
-                " frequency"
-            )
-        for ratio in self.ratios:
-            if isinstance(ratio, str) and ratio not in self.parameters:
-                raise ValueError(
-                    f"ratios: '{ratio}' is no parameter; known are {', '.join(self.parameters)}"
-                )
-            value = float(_value(ratio, self.parameters))
-            if not 0 <= value < 1:
-                raise ValueError(
-                    f"ratios: {value:g} is not allowed; it must be 0 or greater and below 1, the"
-                    " critical damping"
-                )
+    @property
+    def size(self) -> int:
+        """Number of unknowns n."""
+        return int(np.shape(self.mass[0][1])[0])
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """Names of the observed quantities, with their units."""
         return tuple(map(Output, self.observed))
+
+    def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
+        """A factor that exists and has derivatives, and its array without round-off."""
+        if isinstance(term, str) or not isinstance(term, Sequence) or len(term) != 2:
+            raise RefusedError(f"term of {kind}", type(term).__name__, "pairs (factor, array)")
+        factor, array = term
+        if isinstance(factor, str) and factor not in self.parameters:
+            raise RefusedError(f"factor of {kind}", factor, ", ".join(self.parameters))
+        if callable(factor):
+            self._require_smooth(kind, factor)
+        elif not isinstance(factor, str):
+            require_number(f"factor of {kind}", factor, "SI units")
+        return factor, self._symmetric(kind, array)
+
+    def _require_smooth(self, kind: str, factor: Factor) -> None:
+        names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
+        allowed = "arithmetic, sin, cos, exp of alphacut.frame.calculus.jet, of parameters"
+        try:
+            value = factor(variables(values, names, names[:1]))
+        except (KeyError, TypeError, AttributeError, ValueError) as failure:
+            raise RefusedError(f"factor of {kind}", repr(failure), allowed) from None
+        if not isinstance(value, Jet | float | int | np.number):
+            raise RefusedError(f"factor of {kind}", type(value).__name__, "functions to one number")
+
+    def _symmetric(self, kind: str, value: Any) -> Array:
+        """The array, also a sparse one, without the round-off that parts its triangles."""
+        array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
+        if array.ndim != 2 or array.shape[0] != array.shape[1]:
+            raise RefusedError(f"array of {kind}", f"of shape {array.shape}", "square arrays")
+        require_numbers(kind, array, "SI units")
+        array = array.astype(float)
+        off = np.abs(array - array.T)
+        i, j = np.unravel_index(off.argmax(), off.shape)
+        if off[i, j] > 1e-9 * np.abs(array).max():
+            what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
+            raise RefusedError(f"array of {kind}", what, "symmetric arrays", "mirror one triangle")
+        even: Array = (array + array.T) / 2
+        return even
+
+    def _check_vectors(self) -> None:
+        n = self.size
+        for kind in KINDS:
+            for _, array in getattr(self, kind):
+                if array.shape != (n, n):
+                    raise RefusedError(f"array of {kind}", f"of shape {array.shape}", f"({n}, {n})")
+        vectors = {name: getattr(self, name) for name in ("q0", "v0", "pattern")}
+        vectors |= {f"observed: {name}": row for name, row in self.observed.items()}
+        for name, value in vectors.items():
+            lengths = (n, 2 * n) if name.startswith("observed") else (n,)
+            if value is None:
+                continue
+            require_numbers(name, value, "SI units")
+            if np.ndim(value) != 1 or len(value) not in lengths:
+                raise RefusedError(name, f"of shape {np.shape(value)}", f"{lengths} numbers")
+
+    def _check_ratios(self) -> None:
+        if isinstance(self.ratios, str) or len(self.ratios) not in (0, 1, self.size):
+            raise RefusedError("ratios", self.ratios, f"lists of one, or {self.size} by frequency")
+        for ratio in self.ratios:
+            if isinstance(ratio, str) and ratio not in self.parameters:
+                raise RefusedError("ratios", ratio, ", ".join(self.parameters))
+            value = float(value_of(ratio, self.parameters))
+            if not 0 <= value < 1:
+                raise RefusedError(
+                    "ratios", f"{value:g}", "0 or greater, below 1, the critical one"
+                )
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""
@@ -226,7 +158,7 @@ class MatrixStructure:
         n, samples = self.size, like.value.size
 
         def lifted(factor: Factor | str | float) -> Jet:
-            value = _value(factor, p)
+            value = value_of(factor, p)
             return value if isinstance(value, Jet) else like.like(np.full(samples, float(value)))
 
         def total(terms: Terms) -> Jet:
@@ -238,13 +170,10 @@ class MatrixStructure:
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
         q0, v0 = (like.like(np.tile(x[None, :, None], (samples, 1, 1))) for x in start)
         pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
-        mass, damping, stiffness = (
-            total(terms) for terms in (self.mass, self.damping, self.stiffness)
-        )
+        mass, damping, stiffness = (total(getattr(self, kind)) for kind in KINDS)
         if self.ratios:
-            damping = damping + modal_damping(
-                mass, stiffness, [lifted(ratio) for ratio in self.ratios]
-            )
+            ratios = [lifted(ratio) for ratio in self.ratios]
+            damping = damping + modal_damping(mass, stiffness, ratios)
         return Matrices(mass, damping, stiffness, q0, v0, pattern)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
@@ -256,7 +185,8 @@ class MatrixStructure:
         return like.like(np.tile(rows, (like.value.size, 1, 1)))
 
 
-def _value(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
+def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:
+    """A factor's value at parameters."""
     if isinstance(factor, str):
         return p[factor]
     return factor(p) if callable(factor) else factor

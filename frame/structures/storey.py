@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
@@ -13,12 +12,7 @@ from alphacut.frame.calculus.jet import Jet, stack
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Matrices
 from alphacut.frame.structures.quantities import Output
-from alphacut.frame.structures.storey_checks import (
-    StoreyValues,
-    check_numbers,
-    check_springs,
-    check_values,
-)
+from alphacut.frame.structures.storey_checks import StoreyValues, check_values
 from alphacut.frame.structures.storey_springs import (
     Ends,
     Entry,
@@ -27,6 +21,7 @@ from alphacut.frame.structures.storey_springs import (
     softening,
     springs,
 )
+from alphacut.fuzzy.refused import RefusedError
 
 
 @dataclass(frozen=True)
@@ -67,31 +62,24 @@ class StoreyFrame(StoreyValues):
             Rayleigh's damping and shears keep k_z.
 
     Raises:
-        ValueError: A length of the lists differs, a mass, length, modulus, moment, stiffness or
+        RefusedError: A length of the lists differs, a mass, length, modulus, moment, stiffness or
             number of columns is not positive, a damper or gravity is negative, a ratio is outside
             [0, 1), the weight buckles a storey, or a stiffness stands beside what makes one.
     """
 
     def __post_init__(self) -> None:
-        check_numbers(self)
-        n = len(self.masses)
-        object.__setattr__(self, "stiffness", tuple(self.stiffness))
-        check_springs(self)
-        single = np.ndim(self.damping_ratio) == 0
-        object.__setattr__(
-            self,
-            "damping_ratio",
-            (self.damping_ratio,) if single else tuple(cast(Sequence[float], self.damping_ratio)),
-        )
-        for name in ("dampers", "q0", "v0"):
-            object.__setattr__(self, name, tuple(getattr(self, name)) or (0.0,) * n)
-        if not self.stiffness:
-            object.__setattr__(self, "columns", tuple(self.columns) or (2.0,) * n)
-        every = [f"q{z + 1}" for z in range(n)]
-        object.__setattr__(
-            self, "outputs", tuple(Output(str(name)) for name in tuple(self.outputs) or every)
-        )
         check_values(self)
+        n, names = len(self.masses), self.outputs or [f"q{z + 1}" for z in range(len(self.masses))]
+        filled = {
+            name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
+        }
+        filled["damping_ratio"] = tuple(np.atleast_1d(self.damping_ratio).tolist())
+        filled["stiffness"] = tuple(self.stiffness)
+        if not filled["stiffness"]:
+            filled["columns"] = tuple(self.columns) or (2.0,) * n
+        for name, values in filled.items():
+            object.__setattr__(self, name, values)
+        object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))
         for output in self.outputs:
             self._output(output)
         self.require_standing({})
@@ -103,7 +91,7 @@ class StoreyFrame(StoreyValues):
             ends: Lower and upper end of parameters, in SI units; others keep their modal values.
 
         Raises:
-            ValueError: One does.
+            RefusedError: One does.
         """
         if self.gravity:
             at = {name: self._worst(name, *both) for name, both in self.ranges(ends).items()}
@@ -153,7 +141,7 @@ class StoreyFrame(StoreyValues):
         """Parameters of a short name: "m" is m1 … mn; any other name is itself.
 
         Raises:
-            ValueError: The name is neither a group nor a parameter.
+            RefusedError: The name is neither a group nor a parameter.
         """
         patterns = {"m": "m{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
         patterns |= {x: x + "{}" for x in "klcI" if f"{x}1" in self.parameters}
@@ -162,10 +150,7 @@ class StoreyFrame(StoreyValues):
         if name == "zeta" and self.ratios:
             return tuple(self.ratios)
         if name not in self.parameters:
-            raise ValueError(
-                f"uncertain parameter '{name}' is unknown; known are"
-                f" {', '.join([*patterns, *self.parameters])}"
-            )
+            raise RefusedError("parameter", name, ", ".join([*patterns, *self.parameters]))
         return (name,)
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
@@ -230,8 +215,6 @@ class StoreyFrame(StoreyValues):
             r"(q|v|ar|a|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
         )
         if not found or int(found[2]) > self.floors:
-            raise ValueError(
-                f"output '{name}' is unknown; allowed are q, v, a, ar, drift or shear with a floor"
-                f" from 1 to {self.floors}, base_shear"
-            )
+            kinds = "q, v, a, ar, drift or shear with a floor"
+            raise RefusedError("output", name, f"{kinds} from 1 to {self.floors}, base_shear")
         return found[1], int(found[2]) - 1

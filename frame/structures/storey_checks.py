@@ -10,29 +10,19 @@ import numpy as np
 
 from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.frame.structures.quantities import (
-    NOT_NEGATIVE,
-    OF_STOREY_FRAME,
-    Parameter,
-    of_storey_frame,
-)
+from alphacut.frame.structures.quantities import NOT_NEGATIVE, Parameter, of_storey_frame
+from alphacut.fuzzy.refused import RefusedError
 
 SYMBOLS = {
     **{"masses": "m", "lengths": "l", "modulus": "E", "second_moment": "I", "dampers": "d"},
     **{"q0": "q", "v0": "v", "columns": "c", "stiffness": "k", "damping_ratio": "zeta"},
 }
 """What each argument's values are called as parameters."""
-UNITS = {name: OF_STOREY_FRAME[symbol][0] for name, symbol in SYMBOLS.items()} | {
-    "rayleigh": "1/s and s",
-    "damping_ratio": "shares of the critical damping",
-    "columns": "columns of each storey",
-    "gravity": "m/s^2",
-}
 
 
 @dataclass(frozen=True)
 class StoreyValues:
-    """What is given of a storey frame, as its springs and its checks see it; see `StoreyFrame`."""
+    """Values of a storey frame, as its springs and its checks see it; see `StoreyFrame`."""
 
     masses: Sequence[float]
     lengths: Sequence[float] = ()
@@ -53,9 +43,7 @@ class StoreyValues:
     @property
     def moments(self) -> tuple[float, ...]:
         """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
-        if self.second_moment is None:
-            return ()
-        return tuple(float(x) for x in np.atleast_1d(self.second_moment))
+        return () if self.second_moment is None else tuple(np.atleast_1d(self.second_moment))
 
     @property
     def ratios(self) -> dict[str, float]:
@@ -66,85 +54,51 @@ class StoreyValues:
         }
 
 
-def check_numbers(frame: StoreyValues) -> None:
-    """Refuse what is no number, and lists with what is none, by ValueError."""
-    for name, unit in UNITS.items():
-        value = getattr(frame, name)
-        if value is None and name in ("modulus", "second_moment"):
-            continue
-        single = name in ("modulus", "gravity") or (
-            name in ("second_moment", "damping_ratio") and np.ndim(value) == 0
-        )
-        (require_number if single else require_numbers)(name, value, unit)
-
-
-def check_springs(frame: StoreyValues) -> None:
-    """Either stiffnesses, or all that makes them; heights where weights press.
+def check_values(frame: StoreyValues) -> None:
+    """Refuse values that are no numbers or out of range, and lists that do not fit the floors.
 
     Raises:
-        ValueError: Both are given, or something is missing.
+        RefusedError: There is one.
     """
+    rules = {name: of_storey_frame(symbol).range for name, symbol in SYMBOLS.items()}
+    for name, rule in {**rules, "rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}.items():
+        values = getattr(frame, name)
+        if values is None:
+            continue
+        single = name in ("modulus", "gravity") or np.ndim(values) == 0
+        (require_number if single else require_numbers)(name, values, "SI units")
+        for value in np.atleast_1d(values):
+            if not Parameter(name, range=rule).admits(value, value):
+                raise RefusedError(name, f"{value:g}", rule or "finite numbers")
+    _check_springs(frame)
+    _check_lengths(frame)
+
+
+def _check_springs(frame: StoreyValues) -> None:
+    """Either stiffnesses, or all that makes them; heights where weights press."""
     made: dict[str, object] = {"modulus": frame.modulus, "second_moment": frame.second_moment}
-    if frame.stiffness:
-        beside = [name for name, value in made.items() if value is not None]
-        if beside := [*beside, *(["columns"] if len(frame.columns) else [])]:
-            raise ValueError(
-                f"stiffness: {', '.join(beside)} beside it would make another one; give one of them"
-            )
+    beside = [name for name, value in made.items() if value is not None]
+    beside += ["columns"] if len(frame.columns) else []
+    if len(frame.stiffness):
+        if beside:
+            raise RefusedError(", ".join(beside), "there", "either stiffness or what makes it")
         made = {}
-    if not frame.stiffness or frame.gravity:
+    if not len(frame.stiffness) or frame.gravity:
         made["lengths"] = frame.lengths if len(frame.lengths) else None
     for name, value in made.items():
         if value is None:
-            raise ValueError(
-                f"{name}: missing; a frame needs lengths, modulus and second_moment, or"
-                " stiffness, and lengths beside it for gravity"
-            )
-
-
-def check_values(frame: StoreyValues) -> None:
-    """One value for each floor, all in their range.
-
-    Raises:
-        ValueError: They are not.
-    """
-    _check_lengths(frame)
-    _check_signs(frame)
-    _check_damping(frame)
+            what = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
+            raise RefusedError(name, None, what)
 
 
 def _check_lengths(frame: StoreyValues) -> None:
-    n, given = len(frame.masses), bool(frame.stiffness)
-    lists = ["masses", *(["stiffness"] if given else ["columns"]), "dampers", "q0", "v0"]
-    lists += ["lengths"] if len(frame.lengths) else []
-    lists += ["moments"] if len(frame.moments) > 1 else []
-    for name in lists:
-        if len(getattr(frame, name)) != n:
-            raise ValueError(
-                f"{name}: {len(getattr(frame, name))} values for {n} floors; give one per floor,"
-                " from below"
-            )
-
-
-def _check_signs(frame: StoreyValues) -> None:
-    ranges = {name: of_storey_frame(symbol).range for name, symbol in SYMBOLS.items()}
-    for name, rule in {**ranges, "rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}.items():
-        given = getattr(frame, name)
-        for value in () if given is None else np.atleast_1d(given):
-            if not Parameter(name, range=rule).admits(value, value):
-                must = rule if np.isfinite(value) else "finite"
-                raise ValueError(f"{name}: {value:g} is not allowed; it must be {must}")
-
-
-def _check_damping(frame: StoreyValues) -> None:
     n = len(frame.masses)
-    if len(frame.ratios) not in (0, 1, n):
-        raise ValueError(
-            f"damping_ratio: {len(frame.ratios)} values for {n} modes; give one for all modes,"
-            f" or {n}, by rising frequency"
-        )
+    lists = ("masses", "lengths", "stiffness", "columns", "dampers", "q0", "v0")
+    sizes = {name: len(getattr(frame, name)) for name in lists}
+    sizes["second_moment"] = len(frame.moments) if len(frame.moments) > 1 else 0
+    sizes["damping_ratio"] = len(frame.ratios) if len(frame.ratios) > 1 else 0
+    for name, size in sizes.items():
+        if size not in (0, n) or not n:
+            raise RefusedError(name, f"a list of {size}", f"one value a floor, {n} from below")
     if frame.damper_placement not in ("ground", "storey"):
-        raise ValueError(
-            f"damper_placement: '{frame.damper_placement}' is unknown; allowed are 'ground' and"
-            " 'storey'"
-        )
+        raise RefusedError("damper_placement", frame.damper_placement, "ground, storey")

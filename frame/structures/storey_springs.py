@@ -13,6 +13,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.storey_checks import StoreyValues
+from alphacut.fuzzy.refused import RefusedError
 
 Entry = Jet | float
 Ends = Mapping[str, tuple[float, float]]
@@ -62,14 +63,14 @@ def require_standing(stiff: Sequence[Jet], soft: Sequence[Jet]) -> None:
     A chain's stiffness is positive definite where that of each storey is positive.
 
     Raises:
-        ValueError: Somewhere k_z is not above P_z / l_z.
+        RefusedError: Somewhere k_z is not above P_z / l_z.
     """
     for z, (k, taken) in enumerate(zip(stiff, soft, strict=True), start=1):
         bad = np.flatnonzero(~(k.value > taken.value))
         if len(bad):
-            raise ValueError(
-                f"P-Delta: storey {z} buckles under the weight above it: its stiffness of"
-                f" {k.value[bad[0]]:.5g} N/m must be greater than weight over height,"
-                f" {taken.value[bad[0]]:.5g} N/m; take stiffer storeys or lighter floors, or narrow"
-                " their supports"
+            raise RefusedError(
+                f"stiffness of storey {z} under P-Delta",
+                f"{k.value[bad[0]]:.5g} N/m",
+                f"more than weight over height, {taken.value[bad[0]]:.5g} N/m",
+                "else it buckles: take stiffer storeys, lighter floors or narrower supports",
             )
