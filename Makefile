@@ -43,7 +43,7 @@ charts:
 	$(IN) python -m benchmarks.rve.charts
 	$(IN) python -m benchmarks.frame.integrators
 	$(IN) python -m benchmarks.frame.envelopes
-	$(IN) python -m benchmarks.frame.failures
+	$(IN) python -m benchmarks.frame.envelopes --wide 3
 
 
 stability:

@@ -27,10 +27,10 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, envelope
-from alphacut.frame.calculus.jet import Array
 from alphacut.frame.dynamics.integrators import INTEGRATORS
-from alphacut.frame.structures.excited import excited
 from alphacut.fuzzy import Interval
+from alphacut.fuzzy.arrays import Array
+from benchmarks.frame.references.excited import excited
 
 WHEEL = "openseespylinux==3.8.0.0"
 STOREYS, BAYS, HEIGHT, WIDTH = 6, 3, 3.2, 6.0

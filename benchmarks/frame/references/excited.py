@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array
 from alphacut.frame.structures.matrix import MatrixStructure, Terms
+from alphacut.fuzzy.arrays import Array
 
 ZERO = 1e-9
 """Share of a matrix's norm, or of a start's, that counts as round-off of zero."""
