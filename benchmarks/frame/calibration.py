@@ -2,7 +2,7 @@
 
 Frames of two to six storeys, one to nine fuzzy inputs, half of them on a record: the proof (up to
 six inputs), the search and the follower. General systems: pendulums, Duffing oscillators, double
-wells. Judges are exact motions at random points and corners, and the proof. The seed is drawn anew unless
+wells. Judges are exact motions at random points and corners. The seed is drawn anew unless
 given. Run `python -m benchmarks.frame.calibration --help`.
 """
 

@@ -1,0 +1,122 @@
+"""Structures refuse what has no meaning, by the argument, the value and what is allowed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy
+
+from alphacut.frame import (
+    Accelerogram,
+    LagrangianFlow,
+    LagrangianSystem,
+    LinearFlow,
+    MatrixStructure,
+    StoreyFrame,
+    pendulum,
+)
+from alphacut.fuzzy.refused import RefusedError
+
+COLUMNS = StoreyFrame((2e4, 1e4), (3.0, 2.5), 25e9, 1e-4)
+SPRINGS = StoreyFrame((2e4, 1e4), (3.0, 2.5), stiffness=(1e6, 1e6))
+
+
+@pytest.mark.parametrize(
+    ("frame", "changes", "message"),
+    [
+        (COLUMNS, {"masses": (2e4, -1.0)}, "masses is -1; allowed: positive"),
+        (COLUMNS, {"masses": (2e4, "1 t")}, "masses is '1 t'; allowed: a number, in SI units"),
+        (COLUMNS, {"modulus": 0.0}, "modulus is 0; allowed: positive"),
+        (COLUMNS, {"modulus": None}, "modulus is missing; allowed: lengths, modulus and"),
+        (COLUMNS, {"lengths": (3.0,)}, "lengths is a list of 1; allowed: one value a floor, 2"),
+        (COLUMNS, {"dampers": (5, -5)}, "dampers is -5; allowed: 0 or greater"),
+        (COLUMNS, {"damping_ratio": 1.0}, "damping_ratio is 1; allowed: 0 or greater and below 1"),
+        (COLUMNS, {"damping_ratio": (0.1,) * 3}, "damping_ratio is a list of 3"),
+        (COLUMNS, {"q0": (0.1, np.nan)}, "q0 is nan; allowed: finite numbers"),
+        (COLUMNS, {"outputs": ("q3",)}, "output is q3; allowed: q, v, a, ar, drift or shear"),
+        (COLUMNS, {"damper_placement": "roof"}, "damper_placement is roof; allowed: ground, storey"),
+        (COLUMNS, {"stiffness": (1e6, 1e6)}, "modulus, second_moment.* either stiffness or what"),
+        (SPRINGS, {"gravity": 500.0}, "storey 1 under P-Delta is 1e.06 N/m; .* it buckles"),
+        (SPRINGS, {"gravity": 9.81, "lengths": ()}, "lengths is missing"),
+    ],
+)  # fmt: skip
+def test_a_storey_frame_refuses(frame, changes, message):
+    with pytest.raises(RefusedError, match=message) as refused:
+        replace(frame, **changes)
+    assert refused.value.key
+    assert refused.value.allowed
+
+
+EYE = np.eye(2)
+MATRICES = MatrixStructure({"m": 1.0, "k": 2.0}, [("m", EYE)], [("k", EYE)], {"q": EYE[0]})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"mass": []}, "mass is missing; allowed: one entry"),
+        ({"mass": [EYE]}, "term of mass is ndarray; allowed: pairs"),
+        ({"mass": [("M", EYE)]}, "factor of mass is M; allowed: m, k"),
+        ({"mass": [(lambda p: p["x"], EYE)]}, "factor of mass is KeyError"),
+        ({"mass": [(lambda p: "x", EYE)]}, "functions to one number"),
+        ({"mass": [(1.0, -EYE)]}, "mass is not positive definite"),
+        ({"stiffness": [("k", np.triu(np.ones((2, 2))))]}, r"not symmetric: \[0, 1\] is 1"),
+        ({"stiffness": [("k", np.eye(3))]}, "array of stiffness is of shape"),
+        ({"stiffness": [("k", np.ones((2, 3)))]}, "square arrays"),
+        ({"q0": np.ones(3)}, "q0 is of shape"),
+        ({"observed": {"q": np.ones(3)}}, "observed: q is of shape"),
+        ({"ratios": [0.1, 0.2, 0.3]}, "ratios is .*; allowed: lists of one, or 2"),
+        ({"ratios": ["zeta"]}, "ratios is zeta; allowed: m, k"),
+        ({"ratios": [1.0]}, "ratios is 1; allowed: 0 or greater"),
+        ({"parameters": {"m": "1 kg", "k": 2.0}}, "parameter m is '1 kg'"),
+    ],
+)
+def test_a_structure_from_matrices_refuses(changes, message):
+    with pytest.raises(RefusedError, match=message):
+        replace(MATRICES, **changes)
+
+
+SYSTEM = {
+    "coordinates": 1,
+    "parameters": {"m": 1.0},
+    "lagrangian": lambda q, v, p: p["m"] * v[0] ** 2 / 2 - q[0] ** 2,
+    "initial": lambda p: ([1.0], [0.0]),
+    "observed": {"q": lambda q, v, p: q[0]},
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"coordinates": 0}, "coordinates is 0"),
+        ({"parameters": {}}, "parameters is"),
+        ({"lagrangian": lambda q, v, p: p["x"] * v[0] ** 2}, "of parameter 'x'; allowed: m"),
+        ({"lagrangian": lambda q, v, p: v[1] ** 2}, "a coordinate beyond"),
+        ({"lagrangian": lambda q, v, p: v[0] ** 3}, "quadratic in v"),
+        ({"lagrangian": lambda q, v, p: q[0] ** 2}, "singular; allowed: inertia"),
+        ({"lagrangian": lambda q, v, p: v[0] ** 2 - sympy.Abs(q[0])}, "lagrangian is Abs"),
+        ({"lagrangian": lambda q, v, p: np.sin(q[0])}, "no function of symbols"),
+        ({"initial": lambda p: [1.0]}, "initial is"),
+        ({"initial": lambda p: ([1.0, 2.0], [0.0])}, "a list of 1"),
+        ({"force": lambda q, v, p: 3.0}, "force is 3.0; allowed: a list of 1"),
+    ],
+)
+def test_a_lagrangian_system_refuses(changes, message):
+    with pytest.raises(RefusedError, match=message):
+        LagrangianSystem(**{**SYSTEM, **changes})
+
+
+def test_motions_refuse_unknown_names_and_odd_durations():
+    for call, message in (
+        (lambda: LinearFlow(COLUMNS, ("m3",), 1.0, 0.1), "parameter is m3; allowed: E, I, m1"),
+        (lambda: LinearFlow(COLUMNS, ("E",), 1.0, 0.3), "whole steps of 0.3 s"),
+        (lambda: LinearFlow(COLUMNS, ("E",), 1.0, -0.1), "step is -0.1 s; allowed: a positive"),
+        (lambda: LagrangianFlow(pendulum(), ("x",), 1.0, 0.1), "parameter is x; allowed: m, l"),
+        (lambda: LagrangianFlow(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
+        (lambda: pendulum(length=-1.0), "length is -1.0; allowed: positive"),
+        (lambda: Accelerogram(0.0, np.ones(3)), "accelerogram is 3 samples every 0 s"),
+    ):
+        with pytest.raises(RefusedError, match=message):
+            call()
