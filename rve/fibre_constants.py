@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
 
 CONSTANTS = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
-_FINE, _COARSER = 128, 96  # nodes in θ
+_FINE, _COARSER = 32, 24  # nodes in θ
 _ROUND_OFF = 1e-12
 
 

@@ -94,6 +94,19 @@ def image_table(document: Document) -> str:
     return table + "".join(shares)
 
 
+def fibres(document: Document) -> str:
+    """Constants of fibres at the lowest and the highest level; empty of spheres."""
+    rows = [
+        (
+            key.replace("_GPa", ", GPa"),
+            *(f"{cuts['lower'][k]:.5g} … {cuts['upper'][k]:.5g}" for k in (0, -1)),
+        )
+        for key, cuts in document["fibres"].items()
+    ]
+    levels = (f"α = {document['alpha'][k]:g}" for k in (0, -1))
+    return text_table(("of fibres", *levels), rows) if rows else ""
+
+
 def summary(document: Document) -> str:
     """The α-cuts as a table, and what they cost."""
     columns = [document[key][side] for key in ("E_GPa", "nu_cuts") for side in ("lower", "upper")]
@@ -103,9 +116,12 @@ def summary(document: Document) -> str:
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")
     low, high = document["references"]["hashin_shtrikman_E_GPa"]
-    return text_table(head, rows) + (
-        f"{document['nature']}; error of the cell's model {sum(document['error'].values()):.1e}"
-        f" of E\nHashin–Shtrikman bounds of E at the modal values: {low:.4f} … {high:.4f} GPa\n"
+    error = sum(document["error"].values())
+    return (
+        text_table(head, rows)
+        + fibres(document)
+        + f"E is {document['nature']}; error of the cell's model {error:.1e} of E\n"
+        f"Hashin–Shtrikman bounds of E at the modal values: {low:.4f} … {high:.4f} GPa\n"
         f"{document['samples']} samples, {document['solves']} linear systems,"
         f" {document['seconds']:.1f} s, {document['method']}\n"
     )

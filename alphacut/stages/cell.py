@@ -14,6 +14,7 @@ from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import versions
 from alphacut.rve import bounds as plane
 from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised, effective_modulus, error_of_means
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
@@ -213,6 +214,7 @@ def document(result: Homogenised) -> Document:
         "E_GPa": result.modulus / GPA,
         "nu": result.poisson,
         "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
+        "fibres": fibres(result),
         "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
         "curve": {
             "theta": result.curve.theta,
@@ -229,6 +231,20 @@ def document(result: Homogenised) -> Document:
         "declared_error": declared_errors(result),
         "checks": dict(result.checks),
         "versions": versions(),
+    }
+
+
+def fibres(result: Homogenised) -> Document:
+    """Constants of fibres with their declared errors, moduli in GPa; none of spheres."""
+    if isinstance(result, HomogenisedSpheres):
+        return {}
+    constants = fibre_constants(result)
+    return {
+        name if name == "nu_LT" else f"{name}_GPa": {
+            "value": value / (1 if name == "nu_LT" else GPA),
+            "error": constants.errors[name] / (1 if name == "nu_LT" else GPA),
+        }
+        for name, value in constants.values.items()
     }
 
 

@@ -29,6 +29,8 @@ from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.provenance import source_digest, versions
+from alphacut.rve.fibre_constants import fibre_constants
+from alphacut.rve.result import Homogenised
 from alphacut.stages.cell import GPA, CellChoice, inputs_of, parts
 from alphacut.stages.store import Stage, Work
 from alphacut.stochastic.radius_map import MapFamily
@@ -51,6 +53,14 @@ BOUNDS = {
     "s11": ("Pa", "mean homogenised stress 11 under ε11 = ε22 = 0.01"),
     "s12": ("Pa", "mean homogenised stress 12 under ε12 = 0.01"),
 }
+FIBRES = {
+    "E_T": ("Pa", "Young's modulus across the fibres"),
+    "E_L": ("Pa", "Young's modulus along the fibres"),
+    "nu_LT": ("1", "Poisson's ratio of a pull along the fibres"),
+    "G_T": ("Pa", "shear modulus across the fibres"),
+    "G_L": ("Pa", "shear modulus along the fibres"),
+}
+"""Constants of cylinders besides; see rve.fibre_constants."""
 CURVES = {"s11": "curve11", "s12": "curve12"}
 """Variables with the stress over θ of each mean stress."""
 
@@ -78,6 +88,7 @@ class CellTask:
             {
                 **{"E": result.modulus, "nu": result.poisson},
                 **dict(zip(("s11", "s12"), result.curve.mean, strict=True)),
+                **self._fibres(result),
                 "systems": len(result.iterations),
                 "curve11": self._shown(result.curve.theta, result.curve.s11),
                 "curve12": self._shown(result.curve.theta, result.curve.s12),
@@ -86,6 +97,12 @@ class CellTask:
             }
             for result in results
         ]
+
+    def _fibres(self, result: Homogenised) -> dict[str, float]:
+        if self.choice.particles == "spheres":
+            return {}
+        values = fibre_constants(result).values
+        return {name: values[name] for name in FIBRES}
 
     def _shown(self, nodes: Array, stress: Array) -> Array:
         return between_nodes(nodes, stress, self.theta)
@@ -237,7 +254,8 @@ def dataset(result: Cuts, task: CellTask, error: Mapping[str, float]) -> xarray.
     import xarray
 
     variables: dict[str, Any] = {}
-    for name, (unit, about) in BOUNDS.items():
+    fibres = FIBRES if task.choice.particles == "cylinders" else {}
+    for name, (unit, about) in (BOUNDS | fibres).items():
         variables |= _cuts(result, name, {"units": unit, "long_name": about})
     variables["point"] = (
         ("sample", "parameter"),
@@ -325,10 +343,22 @@ def document(dataset: xarray.Dataset) -> Document:
         "upper_GPa": ends[0, 1],
         "nu": poisson[-1].mean(),
         "nu_cuts": {"lower": poisson[:, 0], "upper": poisson[:, 1]},
+        "fibres": fibres(dataset),
         **{name: dataset.attrs[name] for name in names},
         "error": listed(dataset, "error"),
         "checks": listed(dataset, "check"),
     }
+
+
+def fibres(dataset: xarray.Dataset) -> Document:
+    """α-cuts of the constants of fibres, moduli in GPa; none of spheres."""
+    cuts = {}
+    for name, (unit, _) in FIBRES.items():
+        if name in dataset:
+            ends = dataset[name].transpose("alpha", "bound").values / (GPA if unit == "Pa" else 1)
+            key = f"{name}_GPa" if unit == "Pa" else name
+            cuts[key] = {"lower": ends[:, 0], "upper": ends[:, 1]}
+    return cuts
 
 
 def require_tolerance(dataset: xarray.Dataset, tolerance: float | None) -> None:

@@ -12,36 +12,31 @@ _FEWEST, _MOST, _SETTLED = 4, 128, 1e-12
 
 
 def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
-    """G13 in Pa of n cells and its declared relative error, both of shape (n,).
+    """G_L in Pa of n cells and its declared relative error, both of shape (n,).
 
     Args:
         radius: Radii over half the cell's side, shape (n,), each in [0, 1).
         matrix: Material outside the particle.
         inclusion: Material of the particle.
     """
-    shears = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
-    values = np.array([_converged(float(r), *shears) for r in radius])
-    return values[:, 0], values[:, 1]
-
-
-def _converged(radius: float, matrix: float, inclusion: float) -> tuple[float, float]:
-    """Modulus and its change by the last harmonics."""
-    count, value = _FEWEST, _modulus(radius, matrix, inclusion, _FEWEST)
+    shears = float(matrix.stiffness[2, 2]), float(inclusion.stiffness[2, 2])
+    count, value = _FEWEST, _moduli(radius, *shears, _FEWEST)
     while True:
         count, before = 2 * count, value
-        value = _modulus(radius, matrix, inclusion, count)
-        change = abs(value / before - 1)
-        if change <= _SETTLED or count >= _MOST:
+        value = _moduli(radius, *shears, count)
+        change = np.abs(value / before - 1)
+        if change.max() <= _SETTLED or count >= _MOST:
             return value, change + _SETTLED
 
 
-def _modulus(radius: float, matrix: float, inclusion: float, count: int) -> float:
+def _moduli(radius: Array, matrix: float, inclusion: float, count: int) -> Array:
+    """G_L of n cells by so many harmonics, shape (n,)."""
     orders = 2 * np.arange(count) + 1
-    scale = radius**orders
-    coupling = lattice_images(lattice_sums(4 * _MOST), orders, orders) * scale[:, None] * scale
+    scale = radius[:, None] ** orders
+    images = lattice_images(lattice_sums(4 * _MOST), orders, orders)
     factor = (matrix - inclusion) / (matrix + inclusion)
-    source = np.zeros(count)
-    source[0] = factor * radius
-    first = np.linalg.solve(np.eye(count) - factor * coupling, source)[0]
-    turn = ZETA_PERIOD * radius * first
-    return float(matrix * (1 - turn) / (1 + turn))
+    system = np.eye(count) - factor * images * scale[:, :, None] * scale[:, None, :]
+    source = np.zeros((radius.size, count, 1))
+    source[:, 0, 0] = factor * radius
+    turn = ZETA_PERIOD * radius * np.linalg.solve(system, source)[:, 0, 0]
+    return np.asarray(matrix * (1 - turn) / (1 + turn))
