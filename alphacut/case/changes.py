@@ -70,6 +70,8 @@ def _value(text: str) -> object:
     """Value of a change: TOML where it is TOML, names with commas as an array, else text."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
+    except RecursionError:
+        raise RefusedError("--set", text, "a value", "it is nested too deeply") from None
     except tomllib.TOMLDecodeError:
         pass
     if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):

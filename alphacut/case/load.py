@@ -20,9 +20,6 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput, Problem, nearest
 from alphacut.io.toml_lines import lines_of_keys
 
-DEEPEST = 20
-"""Brackets within brackets in a line of a case."""
-
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     """Reads a case file.
@@ -57,14 +54,14 @@ def _text(path: Path) -> str:
         raise BadInput.of(str(path), (error.strerror or str(error)).lower()) from None
     except UnicodeDecodeError as error:
         raise BadInput.of(str(path), f"byte {error.start} is not UTF-8") from None
-    if any(line.count("[") > DEEPEST for line in text.splitlines()):
-        raise BadInput.of(str(path), "a value is nested too deeply", allowed=f"{DEEPEST} brackets")
     return text
 
 
 def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
+    except RecursionError:
+        raise BadInput.of(str(path), "a value is nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         where = re.search(r"\(at line (\d+), column \d+\)", str(error))
         lines = text.splitlines()

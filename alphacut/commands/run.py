@@ -15,8 +15,7 @@ from alphacut.commands import options as common
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import as_json, rank, say, write_text
-from alphacut.io.output_paths import alone, unwritable
-from alphacut.io.problem import refuse
+from alphacut.io.output_paths import alone, require_writable
 from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.stages import shares
 from alphacut.stages.chain import Chain
@@ -39,7 +38,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Computes, draws, reports."""
     common.require_workers(options.workers)
     case, folder = load(options.case, options.set), folder_of(options)
-    refuse(unwritable("--out", folder, folder=True))
+    require_writable("--out", str(folder), folder=True)
     store = Store(folder, case.text, options.fresh, options.quiet, options.workers)
     with alone("--out", folder) if rank() == 0 else nullcontext():
         document = computed(case, store, petsc, figures=not options.no_figures)

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.io.output_paths import hint
 from alphacut.io.problem import BadInput, Problem
 from alphacut.io.units import factor
 from alphacut.stochastic.particles.csv_columns import NUMBER
@@ -83,7 +82,7 @@ class CsvFile:
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             what = f"the {self.what} cannot be read: {reason}"
-            raise self.unreadable(what, hint(self.path)) from None
+            raise self.unreadable(what, self.allowed) from None
 
     def unreadable(self, what: str, allowed: str) -> BadInput:
         """The error of the file as a whole."""

@@ -6,6 +6,7 @@ import atexit
 import json
 import math
 import os
+import shutil
 import sys
 import threading
 from collections.abc import Iterator, Mapping
@@ -15,6 +16,13 @@ from typing import Any, NoReturn, TextIO
 
 import numpy as np
 
+from alphacut.fuzzy.refused import FailedError
+from alphacut.io.printable import printable
+
+FULL = 1 << 20
+"""Bytes that a disk has at least where it is not full."""
+LONGEST = 1000
+"""Characters of a line to people."""
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 
@@ -84,6 +92,10 @@ def whole_file(path: Path | str) -> Iterator[Path]:
     try:
         yield partial
         os.replace(partial, path)
+    except (OSError, RuntimeError):
+        if shutil.disk_usage(path.parent).free < FULL:
+            raise FailedError(f"the disk of {path.parent} is full", "free some space") from None
+        raise
     finally:
         partial.unlink(missing_ok=True)
 
@@ -149,4 +161,4 @@ def say(message: str) -> None:
     """One line to people, on standard error; the first rank alone speaks."""
     if rank() == 0:
         with suppress(OSError):
-            print(f"alphacut: {message}", file=sys.stderr, flush=True)
+            print(f"alphacut: {printable(message, LONGEST)}", file=sys.stderr, flush=True)

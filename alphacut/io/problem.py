@@ -76,16 +76,6 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
         return type(self)([p if p.file else replace(p, file=file) for p in self.problems])
 
 
-def refuse(problems: Iterable[Problem]) -> None:
-    """Raise the problems, where there are any.
-
-    Raises:
-        BadInput: There are.
-    """
-    if every := tuple(problems):
-        raise BadInput(every)
-
-
 def nearest(name: str, known: Iterable[str]) -> str:
     """The known name that comes nearest to `name`; empty if none comes near."""
     folded = {option.lower(): option for option in known}
