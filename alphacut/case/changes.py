@@ -44,7 +44,7 @@ def _full_name(name: str, table: Table) -> str:
     if len(full) > 1:
         full = [key for key in full if _has(table, key)]
     if len(full) != 1:
-        near = suggestion(name, known) or suggestion(name, [x.rpartition(".")[2] for x in known])
+        near = suggestion(name, [x.rpartition(".")[2] for x in known]) or suggestion(name, known)
         raise RefusedError("--set", name, "the full name of a key", near)
     return full[0]
 

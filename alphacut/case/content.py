@@ -19,7 +19,7 @@ from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
 from alphacut.case.structure import Structure
 from alphacut.case.structures import Frame, Pendulum
-from alphacut.case.types import Names, Section
+from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.questions.question import Limited
 from alphacut.questions.table import QUESTIONS
@@ -32,7 +32,7 @@ class Content(Section):
 
     title: str = Field(description="one line, for figures and the report")
     about: str = Field(default="", description="a paragraph: what the case shows")
-    stages: Annotated[tuple[Stage, ...], Names.__metadata__[1]] = Field(
+    stages: Annotated[tuple[Stage, ...], Some, after(unlike)] = Field(
         description="stages that `alphacut run` computes"
     )
     microstructure: Microstructure | None = None

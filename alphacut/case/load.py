@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 from alphacut.case.case import Case
 from alphacut.case.changes import apply_changes
 from alphacut.case.content import CONTENT
-from alphacut.case.keys import Keys, every_key
+from alphacut.case.keys import Keys, every_key, sections
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput, Problem, nearest
 from alphacut.io.toml_lines import lines_of_keys
@@ -51,9 +51,10 @@ def _text(path: Path) -> str:
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except OSError as error:
-        raise BadInput.of(str(path), (error.strerror or str(error)).lower()) from None
+        reason = (error.strerror or str(error)).lower()
+        raise BadInput.of(str(path), f"cannot be read: {reason}") from None
     except UnicodeDecodeError as error:
-        raise BadInput.of(str(path), f"byte {error.start} is not UTF-8") from None
+        raise BadInput.of(str(path), f"is not UTF-8 at byte {error.start}") from None
     return text
 
 
@@ -61,13 +62,13 @@ def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
-        raise BadInput.of(str(path), "a value is nested too deeply") from None
+        raise BadInput.of(str(path), "has a value that is nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         where = re.search(r"\(at line (\d+), column \d+\)", str(error))
         lines = text.splitlines()
         line = int(where[1]) if where else max(1, len(lines))
         shown = lines[line - 1].strip() if len(lines) >= line else ""
-        what = f"this is not TOML: {str(error).partition(' (at')[0].lower()}"
+        what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
         raise BadInput.of(shown or "the file", what, file=str(path), line=line) from None
 
 
@@ -104,7 +105,8 @@ def _unknown(key: str, value: object, missing: set[str]) -> Problem:
     section, _, name = key.rpartition(".")
     plain = re.sub(r"\[\d+\]", "", section)
     here: Keys = {x: y for x, y in every_key().items() if x.rpartition(".")[0] == plain}
-    close = nearest(name, [x.rpartition(".")[2] for x in here])
+    inner = [x.removeprefix(f"{plain}.") for x in sections() if x.startswith(plain) and x != plain]
+    close = nearest(name, [*(x.rpartition(".")[2] for x in here), *inner])
     lone = [x for x in missing if x.rpartition(".")[0] == section]
     if not close:
         elsewhere = {x.rpartition(".")[2]: x for x in every_key()}

@@ -147,7 +147,24 @@ def _not_empty(value: object) -> object:
     return value
 
 
-Each = BeforeValidator(one_or_many)
+class _Each:
+    """An array of which one entry may stand without brackets."""
+
+    def __get_pydantic_core_schema__(
+        self, source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """The validation of the array."""
+        return core_schema.no_info_before_validator_function(one_or_many, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The JSON Schema: the array, or an entry."""
+        array = handler(schema)
+        return {"anyOf": [array["items"], array]}
+
+
+Each = _Each()
 Some = BeforeValidator(_not_empty)
 
 

@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field
+from pydantic import ValidationInfo
 
 from alphacut.case.structure import Structure
-from alphacut.case.types import Some
+from alphacut.case.types import Some, Text
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io import quantity
@@ -46,7 +46,7 @@ class Limit:
         return self.value * number.modal if self.share and number else self.value
 
 
-def _limit(value: object) -> Limit:
+def _limit(value: object, info: ValidationInfo) -> Limit:
     """Limit that a text says.
 
     Raises:
@@ -67,9 +67,7 @@ def _limit(value: object) -> Limit:
 
 
 Limits = Annotated[
-    tuple[
-        Annotated[Limit, BeforeValidator(_limit), Field(json_schema_extra={"type": "string"})], ...
-    ],
+    tuple[Annotated[Limit, Text(_limit)], ...],
     Some,
 ]
 

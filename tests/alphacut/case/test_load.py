@@ -1,0 +1,178 @@
+"""A case is read once; every problem has its key, line, value and cure."""
+
+from pathlib import Path
+
+import pytest
+
+from alphacut.case.load import load
+from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.problem import BadInput
+from tests.alphacut.small import CELL, FRAME
+
+ROOT = Path(__file__).parents[3]
+SHIPPED = sorted((ROOT / "cases").glob("*.toml"))
+
+
+def read(folder, text, changes=()):
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return load(path, changes).content
+
+
+def problems(folder, text, changes=()):
+    with pytest.raises((BadInput, RefusedError)) as caught:
+        read(folder, text, changes)
+    if isinstance(caught.value, RefusedError):
+        return [caught.value]
+    return list(caught.value.problems)
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_shipped_case_is_read(path):
+    case = load(path)
+    assert case.name == path.stem
+    assert case.content.title
+    assert case.traces()["envelope"] or "envelope" not in case.stages
+
+
+def test_sections_hold_objects_in_si(tmp_path):
+    content = read(tmp_path, FRAME)
+    assert content.frame.modulus == Triangular(22e9, 24e9, 26e9)
+    assert content.envelope.duration == 2.0
+    assert content.envelope.tolerance.value == 1e-4
+    assert content.structure.inputs(("E", "m")).keys() == {"E", "m1"}
+
+
+def test_a_cell_is_round_or_an_image(tmp_path):
+    assert read(tmp_path, CELL).round.particles == "cylinders"
+    assert load(ROOT / "cases/composite.toml").content.picture.pairs[0][0] == Triangular(
+        19e9, 20e9, 21e9
+    )
+
+
+WRONG = [  # text in the case, its replacement; key, and what the message says
+    ('"10 mm"', '"10 q"', "frame.displacements[0]", 'unit "q"'),
+    ('"3 m"', '"-3 m"', "frame.lengths[0]", "above 0"),
+    ('"3 m"', "3", "frame.lengths[0]", "the unit is missing"),
+    ("[22, 24, 26]", "[24, 22, 26]", "frame.modulus", "rise"),
+    ("lengths", "lenghts", "frame.lenghts", "did you mean lengths?"),
+    ("[frame]", "[frmae]", "frmae", "unknown section; did you mean frame?"),
+    ('"graph-follower"', '"graph-folower"', "envelope.method", "did you mean graph-follower?"),
+    ('"ground"', '"floor"', "frame.damper_placement", "ground"),
+    ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "n"]', "envelope.fuzzy", "n; allowed"),
+    ('fuzzy = ["E", "m"]', 'fuzzy = ["E", "E"]', "envelope.fuzzy", "each name once"),
+    ("[0, 0.5, 1]", "[0.5, 0, 1]", "envelope.alpha", "rising order"),
+    ("[0, 0.5, 1]", "[0, 2]", "envelope.alpha[1]", "up to 1"),
+    ('duration = "2 s"', "", "envelope.duration", "is missing"),
+    ('step = "0.02 s"', 'step = "0.03 s"', "envelope.duration", "whole multiples"),
+    ('displacements = "10 mm"', "", "frame.displacements", "nothing moves the frame"),
+    ('tolerance = "0.1 mm"', 'tolerance = "1 kg"', "envelope.tolerance", "a share"),
+    ('second_moment = "1e-5 m^4"', "", "frame.second_moment", "frame.stiffness"),
+    ('stages = ["envelope"]', 'stages = ["modulus"]', "radius", "stage modulus needs"),
+    ('stages = ["envelope"]', "stages = []", "stages", "one entry"),
+    ('masses = ["[9, 10, 11] t"]', "masses = []", "frame", ""),
+    ('"[9, 10, 11] t"', '"9 t", "9 t"', "envelope.fuzzy", "fuzzy"),
+    ("title", "tilte", "tilte", "did you mean title?"),
+    ('"1e-5 m^4"', '"1e-5 m^4" "x"', "", "is not TOML"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "key", "words"), WRONG)
+def test_what_is_wrong_is_said_with_its_key(tmp_path, old, new, key, words):
+    assert old in FRAME
+    first, *_ = problems(tmp_path, FRAME.replace(old, new))
+    assert key in first.key
+    assert words in str(first)
+    assert len(str(first)) <= 1000
+
+
+def test_all_problems_come_at_once_in_the_order_of_their_lines(tmp_path):
+    text = FRAME.replace("10 mm", "10 q").replace("3 m", "3 q").replace('"2 s"', '"2 q"')
+    every = problems(tmp_path, text)
+    assert [p.key for p in every] == [
+        "frame.lengths[0]", "frame.displacements[0]", "envelope.duration",
+    ]  # fmt: skip
+    assert [p.line for p in every] == [6, 11, 18]
+
+
+CELLS = [
+    ("a3 = 0.6", "a3 = 1.6", "radius.a3"),
+    ("a2 = [0.1, 0.2, 0.3]", "a2 = 9", "radius"),
+    ("a2 = [0.1, 0.2, 0.3]\n", "", "radius.a2"),
+    ("matrix_poisson = 0.3", "matrix_poisson = 0.5", "cell.matrix_poisson"),
+    ('method = "series"', 'method = "prism"\n[cell2]\n', "cell2"),
+    ("[cell]", '[cell]\nparticles = "spheres"', ""),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "key"), CELLS[:-1])
+def test_what_is_wrong_with_a_cell(tmp_path, old, new, key):
+    assert key in [p.key for p in problems(tmp_path, CELL.replace(old, new))]
+
+
+def test_spheres_need_a_method_of_spheres(tmp_path):
+    text = CELL.replace("[cell]", '[cell]\nparticles = "spheres"')
+    assert read(tmp_path, text).round.particles == "spheres"
+    (problem,) = problems(tmp_path, text.replace('"series"', '"slices"'))
+    assert problem.key == "modulus.method"
+
+
+CHANGES = [
+    ("envelope.duration=1 s", lambda c: c.envelope.duration, 1.0),
+    ("duration=1 s", lambda c: c.envelope.duration, 1.0),
+    ("fuzzy=E,m1", lambda c: c.envelope.fuzzy, ("E", "m1")),
+    ("alpha=0,1", lambda c: c.envelope.alpha, (0.0, 1.0)),
+    ("frame.modulus=[20, 30] GPa", lambda c: c.frame.modulus, Interval(20e9, 30e9)),
+    ('frame.damping_ratio="5 %"', lambda c: c.frame.damping_ratio[0].modal, 0.05),
+]
+
+
+@pytest.mark.parametrize(("change", "value", "expected"), CHANGES)
+def test_a_key_is_changed_from_the_command_line(tmp_path, change, value, expected):
+    assert value(read(tmp_path, FRAME, [change])) == expected
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (["nothing=1"], "full name of a key"),
+        (["durations=1 s"], "did you mean duration?"),
+        (["duration"], "KEY=VALUE"),
+        (["duration=1 s", "envelope.duration=2 s"], "each key once"),
+        (["duration=1 q"], "command line: envelope.duration"),
+    ],
+)
+def test_a_wrong_change_is_refused(tmp_path, changes, words):
+    assert words in str(problems(tmp_path, FRAME, changes)[0])
+
+
+def test_studies_have_names_of_files(tmp_path):
+    study = '[[study]]\nname = "NAME"\nfuzzy = ["E"]\nduration = "1 s"\n'
+    assert read(tmp_path, FRAME + study.replace("NAME", "E-1s")).study[0].name == "E-1s"
+    for name in ("..", "../x", "a/b", "", "x" * 65, "a..b", ".hidden", "a\\u0007"):
+        (problem,) = problems(tmp_path, FRAME + study.replace("NAME", name))
+        assert problem.key == "study[0].name"
+    both = study.replace("NAME", "E") * 2
+    assert "a name of its own" in str(problems(tmp_path, FRAME + both)[0])
+
+
+def test_files_are_beside_the_case(tmp_path):
+    text = FRAME.replace('displacements = "10 mm"', 'accelerogram = "record.csv"')
+    assert "a file, from the folder" in str(problems(tmp_path, text)[0])
+    (tmp_path / "record.csv").write_text("time [s],acceleration [g]\n0,0\n0.02,0.1\n0.04,0\n")
+    assert read(tmp_path, text).frame.accelerogram.step == pytest.approx(0.02)
+
+
+def test_questions_have_sections(tmp_path):
+    text = FRAME + '[decision]\nlimits = ["q1 <= 9 mm"]\n'
+    assert set(read(tmp_path, text).questions) == {"decision"}
+    for wrong, words in (("q1 < 9 mm", "<="), ("q1 <= 9 kg", "no unit of"), ("q1 <= 0 mm", "<=")):
+        (problem,) = problems(tmp_path, text.replace("q1 <= 9 mm", wrong))
+        assert problem.key == "decision.limits[0]"
+        assert words in str(problem)
+
+
+def test_a_key_that_nobody_knows_gets_the_ordinary_message(tmp_path):
+    (problem,) = problems(tmp_path, FRAME + "certify = 3\n")
+    assert (problem.key, problem.what) == ("envelope.certify", "is an unknown key")

@@ -1,0 +1,75 @@
+"""Quantities as engineers write them become SI."""
+
+import pytest
+
+from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
+from alphacut.io.quantity import fuzzy, number
+from alphacut.io.units import engineering
+
+RIGHT = [
+    ("80 GPa", "Pa", Crisp(80e9)),
+    ("[75, 85] GPa", "Pa", Interval(75e9, 85e9)),
+    ("[75 GPa, 80000 MPa, 85 GPa]", "Pa", Triangular(75e9, 80e9, 85e9)),
+    ("[1, 2, 3, 4] mm", "m", Trapezoidal(1e-3, 2e-3, 3e-3, 4e-3)),
+    ("20 t ± 5 %", "kg", Interval(19e3, 21e3)),
+    ("20 t ± 1 t", "kg", Interval(19e3, 21e3)),
+    ("\u22120.5 m/s", "m/s", Crisp(-0.5)),
+    ("5 %", "", Crisp(0.05)),
+    (0.3, "", Crisp(0.3)),
+    ([1, 2], "", Interval(1, 2)),
+    ("0.25 g", "m/s^2", Crisp(0.25 * 9.80665)),
+    ("3 cm4", "m^4", Crisp(3e-8)),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "value"), RIGHT)
+def test_a_quantity_is_read(text, unit, value):
+    assert fuzzy(text, unit) == value
+
+
+WRONG = [
+    ("80", "Pa", "the unit is missing"),
+    ("80 kg", "Pa", "no unit of"),
+    ("80 qq", "Pa", "no unit of"),
+    ("GPa", "Pa", "does not begin with a number"),
+    ("1_0 GPa", "Pa", "is no number"),
+    ("٣ GPa", "Pa", "does not begin with a number"),
+    ("1,5 GPa", "Pa", "is no number"),
+    ("1e400 Pa", "Pa", "magnitudes"),
+    ("1e308 mm", "m", "magnitudes"),
+    ("1e-300 mm", "m", "magnitudes"),
+    ("nan GPa", "Pa", "does not begin with a number"),
+    ("inf GPa", "Pa", "does not begin with a number"),
+    ("[3, 2, 1] m", "m", "rise"),
+    ("[1, 2, 3, 4, 5] m", "m", "one to four"),
+    ("[] m", "m", "does not begin with a number"),
+    (True, "m", "no quantity"),
+    ("5 %", "m", "wrong"),
+    ("3 px", "m", "wrong"),
+    ("9" * 2000, "", "too long"),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "words"), WRONG)
+def test_what_is_no_quantity_is_refused(text, unit, words):
+    with pytest.raises(ValueError, match=words):
+        fuzzy(text, unit)
+
+
+def test_one_number_is_one():
+    assert number("2.5 m", "m") == number("250 cm", "m") == 2.5
+    with pytest.raises(ValueError, match="2 values"):
+        number("[1, 2] m", "m")
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [
+        (-3.59e6, "N", "−3.590 MN"),
+        (0.0155, "m", "15.50 mm"),
+        (0.0, "m", "0 m"),
+        (1e5, "", "100000"),
+    ],
+)
+def test_numbers_for_people(value, unit, words):
+    assert engineering(value, unit) == words

@@ -1,0 +1,51 @@
+"""Cases of a second for the tests of the front door."""
+
+FRAME = """
+title = "One floor"
+stages = ["envelope"]
+[frame]
+masses = ["[9, 10, 11] t"]
+lengths = "3 m"
+modulus = "[22, 24, 26] GPa"
+second_moment = "1e-5 m^4"
+dampers = "50 N s/m"
+damper_placement = "ground"
+displacements = "10 mm"
+[envelope]
+fuzzy = ["E", "m"]
+alpha = [0, 0.5, 1]
+method = "graph-follower"
+tolerance = "0.1 mm"
+integrator = "exact"
+duration = "2 s"
+step = "0.02 s"
+"""
+CELL = """
+title = "Fibres"
+stages = ["modulus"]
+[radius]
+a1 = 0.3
+a2 = [0.1, 0.2, 0.3]
+a3 = 0.6
+a4 = 0.2
+[cell]
+matrix_modulus = "20 GPa"
+matrix_poisson = 0.3
+inclusion_modulus = "[75, 80, 85] GPa"
+inclusion_poisson = 0.3
+[modulus]
+method = "series"
+plan = "reduced"
+alpha = [0, 1]
+tolerance = 1e-6
+"""
+
+
+def written(folder, text=FRAME, **changes):
+    """A case file with texts replaced, each of which must be there."""
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
