@@ -6,8 +6,6 @@ import re
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import ValidationInfo
-
 from alphacut.case.structure import Structure
 from alphacut.case.types import Some, Text
 from alphacut.frame.structures.quantities import Output
@@ -46,7 +44,7 @@ class Limit:
         return self.value * number.modal if self.share and number else self.value
 
 
-def _limit(value: object, info: ValidationInfo) -> Limit:
+def _limit(value: object) -> Limit:
     """Limit that a text says.
 
     Raises:
@@ -67,7 +65,7 @@ def _limit(value: object, info: ValidationInfo) -> Limit:
 
 
 Limits = Annotated[
-    tuple[Annotated[Limit, Text(_limit)], ...],
+    tuple[Annotated[Limit, Text(lambda value, info: _limit(value))], ...],
     Some,
 ]
 
