@@ -1,4 +1,4 @@
-"""Progress of a computation: told to the caller, or a bar on a terminal or in a notebook."""
+"""Progress of a computation: told to the caller, or a bar on a terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import Any
 
 from alphacut.fuzzy.refused import require
 
@@ -53,11 +52,11 @@ class Stages:
 
 @contextmanager
 def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """What to tell the share done to.
+    """Function that the share done goes to.
 
     Args:
-        progress: The caller's function; None (or True) for a bar, if there is a terminal or a
-            notebook to show it; False for nothing.
+        progress: The caller's function; None (or True) for a bar, if there is a terminal to show
+            it; False for nothing.
 
     Raises:
         RefusedError: It is neither.
@@ -67,7 +66,7 @@ def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
     if callable(progress) or progress is False:
         yield progress or None
         return
-    bar = _Bar(_notebook() or (_on_terminal if sys.stderr.isatty() else None))
+    bar = _Bar(_on_terminal if sys.stderr.isatty() else None)
     try:
         yield bar if bar.show else None
     finally:
@@ -96,26 +95,3 @@ class _Bar:
 def _on_terminal(text: str) -> None:
     sys.stderr.write(f"\r\x1b[K{text}")
     sys.stderr.flush()
-
-
-def _notebook() -> Callable[[str], None] | None:
-    """What shows a text in the notebook that this runs in; None elsewhere."""
-    python: Any = sys.modules.get("IPython")
-    shell = python.get_ipython() if python else None
-    if shell is None or not hasattr(shell, "kernel"):
-        return None
-    from html import escape
-
-    from IPython.display import HTML, display
-
-    handle: Any = None
-
-    def show(text: str) -> None:
-        nonlocal handle
-        page = HTML(f"<code>{escape(text)}</code>" if text else "")  # type: ignore[no-untyped-call]
-        if handle is None:
-            handle = display(page, display_id=True)  # type: ignore[no-untyped-call]
-        else:
-            handle.update(page)
-
-    return show

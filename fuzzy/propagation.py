@@ -78,8 +78,8 @@ def propagate(
         identity: What a sample depends on besides its inputs (case, options, versions), as JSON can
             say it; a store needs it, not empty. The store cannot see that the function changed: say
             so here, by a version or a hash of its text.
-        progress: Called with the share done. If not given, a bar appears on a terminal or in a
-            notebook after a second; False shows none.
+        progress: Called with the share done. If not given, a bar appears on a terminal after
+            a second; False shows none.
 
     Raises:
         RefusedError: An argument is wrong, or the budget does not carry the method.

@@ -46,7 +46,7 @@ class Nature(StrEnum):
 
     @property
     def sentence(self) -> str:
-        """What the nature promises."""
+        """Promise of the nature."""
         return {
             "attained": "values at points in the box; the true range may reach further",
             "estimated": "attained, with an error that an independent pass estimated",
@@ -172,7 +172,7 @@ class Bounds(Shown):
 
     @property
     def _near(self) -> Array:
-        """What rounding explains, shape (m,)."""
+        """Difference that rounding explains, shape (m,)."""
         axes = tuple(range(self.lower.ndim - 1))
         size = np.maximum(np.abs(self.lower), np.abs(self.upper)).max(axis=axes)
         return np.asarray(ROUND_OFF * size)
@@ -184,7 +184,7 @@ class Bounds(Shown):
 
     @cached_property
     def attained(self) -> Ends:
-        """What the true range reaches at least: NaN where nothing attained is known.
+        """Ends that the true range reaches at least; NaN where nothing attained is known.
 
         Bounds that are not guaranteed are taken less their error.
         """
@@ -195,7 +195,7 @@ class Bounds(Shown):
 
     @cached_property
     def proved(self) -> Ends:
-        """What the true range is proved to lie inside; infinite where nothing is proved."""
+        """Ends that the true range is proved to lie inside; infinite where nothing is proved."""
         wide = np.full(self.lower.shape, np.inf)
         outer = self.outer or Ends(-wide, wide)
         lower = np.where(self._guaranteed, self.lower, outer.lower)
@@ -203,7 +203,7 @@ class Bounds(Shown):
 
     @property
     def claim(self) -> JointClaim:
-        """What the cuts claim, and which inputs are opinions."""
+        """Claim of the cuts, and which inputs are opinions."""
         return JointClaim.of(self.inputs).resting_on(self.nature)
 
     def said(self) -> tuple[str, ...]:

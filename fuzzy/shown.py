@@ -130,7 +130,7 @@ class Shown:
         raise NotImplementedError
 
     def said(self) -> tuple[str, ...]:
-        """What is to be known of the bounds, one sentence each."""
+        """Sentences on the bounds that a reader must know."""
         raise NotImplementedError
 
     def nature_of(self, output: str) -> str:

@@ -60,7 +60,7 @@ class Row(NamedTuple):
 
     @property
     def whole(self) -> bool:
-        """Whether the row is what was written."""
+        """True if the row is what was written."""
         with suppress(TypeError, AttributeError):
             return _checksum(*self[:4]) == self.checksum
         return False
@@ -199,7 +199,7 @@ def _prepare(connection: sqlite3.Connection) -> None:
 
 
 def _is_damage(error: Exception) -> bool:
-    """Whether an error tells of damage; one of locks, space or rights is raised."""
+    """True if an error tells of damage; one of locks, space or rights is raised."""
     name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
     if any(word in name for word in _TROUBLE):
         raise error

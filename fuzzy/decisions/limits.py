@@ -2,8 +2,8 @@
 
 Passing is possible to the degree of the highest cut that reaches beyond the limit, and necessary to
 one minus the degree to which staying below is possible (Dubois and Prade, Possibility Theory,
-chapter 1). Proved bounds give the highest degrees that are not refuted, attained ones the lowest
-that are certain. Inputs with claims make the possibility a bound of the probability.
+chapter 1). Proved and estimated bounds give the highest degrees that are not refuted, attained ones
+the lowest that are certain. Inputs with claims make the possibility a bound of the probability.
 """
 
 from __future__ import annotations
@@ -103,15 +103,17 @@ def decide(bounds: Bounds, limits: Mapping[str, float]) -> Decision:
 def _reaches(bounds: Bounds) -> tuple[Array, Array, Array, Array]:
     """Greatest values not excluded and attained, least ones likewise, four (levels, outputs).
 
-    Proofs exclude, and where nothing is proved the stated error. Over time the greatest value
-    counts; its least is not below any lower bound, but nothing says that one motion attains it.
+    Proofs exclude, and the error of estimated bounds; attained bounds exclude nothing. Over time
+    the greatest value counts; its least is not below any lower bound, but nothing says that one
+    motion attains it.
     """
-    error, (low, high) = np.nan_to_num(bounds.error), bounds.proved
-    inner = bounds.attained
+    inner, (low, high) = bounds.attained, bounds.proved
+    estimated = [bounds.nature_of(name) is Nature.ESTIMATED for name in bounds.outputs]
+    error = np.where(estimated, bounds.error, np.inf)
     ends = (
-        np.where(np.isfinite(high), high, bounds.upper + error),
+        np.minimum(high, bounds.upper + error),
         np.nan_to_num(inner.upper, nan=-np.inf),
-        np.where(np.isfinite(low), low, bounds.lower - error),
+        np.maximum(low, bounds.lower - error),
         np.nan_to_num(inner.lower, nan=np.inf),
     )
     if bounds.time is None:

@@ -90,7 +90,7 @@ def _widened(number: Claimed, rule: Joint) -> Claimed:
 
 @dataclass(frozen=True)
 class JointClaim:
-    """What a result of several inputs claims.
+    """Claim of a result of several inputs.
 
     Args:
         rule: How the claims were joined; None where no input has one.

@@ -64,7 +64,7 @@ class Observations:
 
     @property
     def exact(self) -> bool:
-        """Whether every value is known exactly."""
+        """True if every value is known exactly."""
         return bool((self.lower == self.upper).all())
 
     def mapped(self, function: np.ufunc) -> Observations:

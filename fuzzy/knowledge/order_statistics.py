@@ -77,7 +77,7 @@ def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
 def _takes_lower(
     gaps: tuple[Array, Array, Array], low: int, high: int, open_ends: tuple[bool, bool]
 ) -> bool:
-    """Whether the next gap goes from below.
+    """True if the next gap goes from below.
 
     An open end goes first, then the less probable gap, then the end with less taken away.
     """

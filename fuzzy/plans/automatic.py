@@ -174,7 +174,7 @@ class _Passes:
         )
 
     def _missed(self, bounds: Bounds, column: int, near: float) -> Array | None:
-        """What agreeing fresh descents lack of the bounds, shape (levels,); None where few do."""
+        """Distance of agreeing fresh descents to the bounds, (levels,); None where few agree."""
         missed, agreeing, count = np.zeros(len(self.domain.alpha)), 0, 0
         for sign, bound in ((1.0, bounds.lower), (-1.0, bounds.upper)):
             for level, end in self.ends.get((bounds.outputs[column], sign), []):
@@ -185,7 +185,7 @@ class _Passes:
         return missed if count and agreeing >= _AGREEING * count else None
 
     def _smooth(self, bounds: Bounds, column: int) -> bool:
-        """Whether an output has nearly no slope where its bounds are attained inside a cut."""
+        """True if an output has nearly no slope where its bounds are attained inside a cut."""
         try:
             return all(
                 cut.steepest(cut.unit(places[cut.level, column][None])[0], bounds.outputs[column])

@@ -98,7 +98,7 @@ class LevelSearch:
         return np.array(chosen)
 
     def along(self, place: Array, output: str, sign: float, rounds: int) -> Array:
-        """Where it leads to leave a place along each input, to both ends of the cut.
+        """End of leaving a place along each input, towards both ends of the cut.
 
         What is better is joined, and descended from: a hill of many inputs is often left by
         several at once.

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.drawing import draw_membership, new_axes
 from alphacut.fuzzy.refused import real, require
-from alphacut.fuzzy.tables import membership_svg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,10 +91,6 @@ class FuzzyNumber(ABC):
         draw_membership(axes, *self.cuts, name=name)
         axes.set_xlabel(quantity)
         return axes
-
-    def _repr_html_(self) -> str:
-        """The membership function as a small drawing, for notebooks."""
-        return membership_svg(*self.cuts)
 
 
 def level(alpha: float) -> float:

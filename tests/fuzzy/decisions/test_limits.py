@@ -56,6 +56,14 @@ def test_an_error_that_reaches_the_limit_leaves_it_open():
     assert decide(replace(proved, inner=None), {"y": 1.6}).nature is Nature.GUARANTEED
 
 
+def test_attained_bounds_exclude_nothing():
+    attained = replace(bounds(), nature=Nature.ATTAINED, natures=(), inner=None)
+    decision = decide(attained, {"y": 2.5})
+    assert decision.possibility == (0, 1)
+    assert decision.verdict == "undecided"
+    assert decide(attained, {"y": 1.6}).possibility == (0.25, 1)
+
+
 def test_any_of_several_limits_counts_and_margins_are_in_their_units():
     inputs = {"x": Triangular(0.0, 1.0, 2.0)}
     both = bounds(inputs, function=lambda x: {"u": x, "v": 10 * x})
