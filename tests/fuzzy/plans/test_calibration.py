@@ -13,6 +13,12 @@ from alphacut.fuzzy import (
     Triangular,
     propagate,
 )
+from alphacut.fuzzy.campaign.call import Call
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.plans.alpha_cut_optimisation import attained
+from alphacut.fuzzy.plans.automatic import _Passes
+from alphacut.fuzzy.samples.model import Memo
+from alphacut.fuzzy.sets.boxes import Domain
 
 GRID = 41
 
@@ -149,19 +155,24 @@ def test_the_error_of_a_metamodel_is_tight(boxes):
     assert lack <= result.error.min() <= 6 * lack
 
 
-@pytest.mark.parametrize("seen", [0.4, 0.45])
-def test_what_the_last_pass_finds_counts_twice(seen):
-    """A spike of height 1, of which the one fresh point that meets it sees a share."""
+def judged(gain, *lacks):
+    """Bounds of x² after passes that improved by `gain` and whose ends lack so much."""
+    domain = Domain({"x": Interval(0, 1)}, (0.0,))
+    memo = Memo(Campaign(Call(lambda x: x * x, ("x",))))
+    memo(np.linspace(0, 1, 11)[:, None])
+    passes = _Passes(Automatic(tolerance=1e-3), memo, domain, ("y",))
+    passes.gain = np.array([[gain]])
+    passes.ends = {("y", 1.0): [(0, lack) for lack in lacks]}
+    return passes.judged(attained(memo, domain, "automatic", spent=False), spent=False)
 
-    def run(centre, height, tolerance):
-        def function(x):
-            spike = height * np.exp(-(((x - centre) / 1e-4) ** 2))
-            return {"y0": x / 10 + spike} | {f"y{k}": k * x for k in range(1, 14)}
 
-        method = Automatic(passes=1, tolerance=tolerance, outputs=("y0",))
-        return propagate(function, {"x": Interval(0, 1)}, method, alpha=(0.0,), vectorised=True)
+def test_what_a_pass_improves_or_lacks_counts_twice():
+    assert judged(4e-4, 0.0).error[0, 0] == pytest.approx(8e-4, rel=1e-4)
+    assert judged(0.0, 0.0, 7e-4).error[0, 0] == pytest.approx(14e-4, rel=1e-4)
+    assert judged(0.0, 0.0).nature is Nature.ESTIMATED
 
-    plain = run(0.5, 0.0, 0.9)
-    fresh = plain.samples.points[-8, 0]  # of the pass, before its descents
-    result = run(fresh + 1e-4 * np.sqrt(-np.log(seen)), 1.0, 0.9)
-    assert result.nature_of("y0") in (Nature.ESTIMATED, Nature.ATTAINED)
+
+@pytest.mark.parametrize(("gain", "lacks"), [(2e-3, [0.0]), (0.0, [0.0, 0.1, 0.1]), (0.0, [])])
+def test_a_pass_that_still_improves_or_disagrees_leaves_no_error(gain, lacks):
+    assert judged(gain, *lacks).nature is Nature.ATTAINED
+    assert judged(gain, *lacks).error[0, 0] == 0
