@@ -14,7 +14,7 @@ from alphacut.figures import envelope, follower, frame, identified, image, modul
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
-from alphacut.io.files import as_json, write_text
+from alphacut.io.files import Document, as_json, write_text
 from alphacut.io.progress import progress
 from alphacut.io.provenance import NESTED, fingerprint, version_of
 from alphacut.questions.table import QUESTIONS
@@ -135,7 +135,7 @@ def drawn(
     return [*_particles(results), *names]
 
 
-def _kept(folder: Path) -> dict[str, object]:
+def _kept(folder: Path) -> Document:
     """Fingerprint and names of an earlier run's figures; empty where there are none."""
     try:
         return dict(json.loads((folder / KEPT).read_text(encoding="utf-8")))

@@ -13,6 +13,7 @@ from alphacut.figures import style as look
 from alphacut.figures.captions import INPUTS
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.arrays import Array
 from alphacut.io.units import engineering
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.results import Results
@@ -55,7 +56,7 @@ def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure
     return drawn
 
 
-def error_band(axes: Axes, time: object, lowest: xarray.Dataset, nature: str) -> str:
+def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str) -> str:
     """Draws the error outside the lowest band, and says how large it is."""
     if "error" not in lowest or nature == "guaranteed":
         return ""
@@ -66,10 +67,9 @@ def error_band(axes: Axes, time: object, lowest: xarray.Dataset, nature: str) ->
     return f", error up to {engineering(float(error.max()), unit, digits=2)} (dashed)"
 
 
-def time_axes(axes: Axes, time: object, output: str) -> None:
+def time_axes(axes: Axes, time: Array, output: str) -> None:
     """Axes of an output over time."""
-    values = np.asarray(time, float)
-    axes.set_xlim(values[0], values[-1])
+    axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time t (s)")
     look.prefix_axis(axes, output, Output(output).unit)
 

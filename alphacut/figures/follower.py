@@ -25,33 +25,31 @@ TITLES = (
 )
 
 
-def follower(results: Results, study: EnvelopeTask) -> Figure:
+def follower(results: Results, task: EnvelopeTask) -> Figure:
     """Five panels: from the first guess to the envelope, for one output at the lowest level."""
     import matplotlib.pyplot as plt
 
-    found, output = recorded(results, study)
+    walk, output = recorded(results, task)
     drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
     panels = [named[letter] for letter in "12345"]
-    new = [step for step in found.steps if step.found >= 0]
+    new = [step for step in walk.steps if step.found >= 0]
     first = [step for step in new if step.node == new[0].node]
     later = next(
-        (step for step in new if step.node > 0.5 * len(found.time) and step.guess > 0), new[-1]
+        (step for step in new if step.node > 0.5 * len(walk.time) and step.guess > 0), new[-1]
     )
-    base(panels[0], found, [0], node=first[0].node, last=0)
-    panels[0].plot(found.time, found.graphs[0], color=BLUE, lw=1.3)
-    base(
-        panels[1], found, [0, *(step.found for step in first)], node=first[0].node, last=len(first)
-    )
-    base(panels[2], found, range(later.found + 1), node=later.node, last=1)
-    panels[2].plot(found.time, found.graphs[later.guess], color=BLUE, lw=1.3, label="guess")
+    base(panels[0], walk, [0], node=first[0].node, last=0)
+    panels[0].plot(walk.time, walk.graphs[0], color=BLUE, lw=1.3)
+    base(panels[1], walk, [0, *(step.found for step in first)], node=first[0].node, last=len(first))
+    base(panels[2], walk, range(later.found + 1), node=later.node, last=1)
+    panels[2].plot(walk.time, walk.graphs[later.guess], color=BLUE, lw=1.3, label="guess")
     panels[2].legend(loc="lower right", fontsize=8)
-    base(panels[3], found, range(len(found.graphs)), node=None, last=0)
-    for local, final in ((found.local_lower, found.lower), (found.local_upper, found.upper)):
-        panels[3].plot(found.time, local, color=BLUE, lw=1.0)
-        panels[3].plot(found.time, final, color=INK, lw=1.3)
-    panels[4].fill_between(found.time, found.lower, found.upper, color=BLUE, alpha=0.2, lw=0)
-    for final in (found.lower, found.upper):
-        panels[4].plot(found.time, final, color=INK, lw=1.3)
+    base(panels[3], walk, range(len(walk.graphs)), node=None, last=0)
+    for local, final in ((walk.local_lower, walk.lower), (walk.local_upper, walk.upper)):
+        panels[3].plot(walk.time, local, color=BLUE, lw=1.0)
+        panels[3].plot(walk.time, final, color=INK, lw=1.3)
+    panels[4].fill_between(walk.time, walk.lower, walk.upper, color=BLUE, alpha=0.2, lw=0)
+    for final in (walk.lower, walk.upper):
+        panels[4].plot(walk.time, final, color=INK, lw=1.3)
     for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
         panel.set_title(
             f"{f'Fig. {20 + number}' if results.is_paper else number}: {title}",
@@ -65,39 +63,39 @@ def follower(results: Results, study: EnvelopeTask) -> Figure:
 
 
 def base(
-    panel: Axes, found: FollowerRecord, graphs: range | list[int], *, node: int | None, last: int
+    panel: Axes, walk: FollowerRecord, graphs: range | list[int], *, node: int | None, last: int
 ) -> None:
     """Stored graphs in grey, the newest `last` of them in orange, and the node under treatment."""
     shown = list(graphs)
     for index, graph in enumerate(shown):
         fresh = index >= len(shown) - last
         panel.plot(
-            found.time,
-            found.graphs[graph],
+            walk.time,
+            walk.graphs[graph],
             color=ORANGE if fresh else GREY,
             lw=1.3 if fresh else 0.4,
         )
     if node is not None:
-        panel.axvline(found.time[node], color=INK, lw=0.8, ls=":")
+        panel.axvline(walk.time[node], color=INK, lw=0.8, ls=":")
 
 
-def recorded(results: Results, study: EnvelopeTask) -> tuple[FollowerRecord, str]:
+def recorded(results: Results, task: EnvelopeTask) -> tuple[FollowerRecord, str]:
     """A run of the Graph Follower that keeps every step, and the output it followed."""
-    wanted = results.structure
-    assert wanted is not None
-    cuts = boxes(wanted.inputs(study.fuzzy), (0.0,))
+    structure = results.structure
+    assert structure is not None
+    cuts = boxes(structure.inputs(task.fuzzy), (0.0,))
     steps = max(
-        1, min(round(DURATION / study.section.step), round(study.duration / study.section.step))
+        1, min(round(DURATION / task.section.step), round(task.duration / task.section.step))
     )
     flow = UnitFlow(
-        wanted.flow(cuts.names, steps * study.section.step, study.section.step),
+        structure.flow(cuts.names, steps * task.section.step, task.section.step),
         cuts,
-        not study.tolerance(wanted).unit,
+        not task.tolerance(structure).unit,
     )
     output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
-        fine = share * study.section.gain * study.tolerance(wanted).value
-        found = record_flow(flow, output=output, tolerance=fine)
-        if any(step.found >= 0 for step in found.steps):
+        fine = share * task.section.gain * task.tolerance(structure).value
+        walk = record_flow(flow, output=output, tolerance=fine)
+        if any(step.found >= 0 for step in walk.steps):
             break
-    return found, flow.outputs[output]
+    return walk, flow.outputs[output]

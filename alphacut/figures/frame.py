@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.structures import Frame
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, figure
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, figure
 from alphacut.fuzzy import Crisp
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def columns(
 def beam(axes: Axes, floor: int, level: float, mass: float, span: float) -> None:
     """A floor with its mass and the arrow of its displacement."""
     axes.plot([-0.03 * span, 1.03 * span], [level, level], color=INK, lw=6, solid_capstyle="butt")
-    above = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center", "va": "bottom"}
+    above: Look = {"xytext": (0, 6), "textcoords": "offset points", "ha": "center", "va": "bottom"}
     words = f"$m_{{{floor}}}$ = {mass / 1000:g} t"
     axes.annotate(words, (span / 2, level), fontsize=8, **above)
     arrow = {"arrowstyle": "-|>", "color": ORANGE}

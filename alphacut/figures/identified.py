@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alphacut.figures.envelope import time_axes
-from alphacut.figures.style import BLUE, GREY, figure, title
+from alphacut.figures.style import BLUE, GREY, Look, figure, title
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
 
@@ -24,7 +24,12 @@ def bands(dataset: xarray.Dataset, output: str) -> Figure:
     looks = {"prior": (GREY, 0.55, "before"), "posterior": (BLUE, 0.9, "after")}
     for knowledge, (colour, opacity, words) in looks.items():
         band = shown.sel(knowledge=knowledge)
-        fill = {"color": colour, "alpha": opacity, "lw": 0, "label": f"{words} the measurement"}
+        fill: Look = {
+            "color": colour,
+            "alpha": opacity,
+            "lw": 0,
+            "label": f"{words} the measurement",
+        }
         axes.fill_between(time, band["lower"], band["upper"], **fill)
     time_axes(axes, time, output)
     title(axes, f"{output} at α = {float(dataset['alpha'].values[0]):g}")
@@ -40,14 +45,14 @@ def inputs(document: Document) -> Figure:
     """
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
     drawn, axes = figure(height=0.9 + 0.32 * len(names))
-    places = np.arange(len(names))[::-1]
+    places = np.arange(len(names), dtype=float)[::-1]
     prior = np.array([document["prior"][name] for name in names], float)
     unit = prior.mean(axis=1)
     _bars(axes, places, prior / unit[:, None], height=0.7, color=GREY, alpha=0.45, label="before")
     for row, level in enumerate(alpha):
         after = [[document["inputs"][x][side][row] for side in ("lower", "upper")] for x in names]
         words = f"after, α = {level:g}" if row in (0, len(alpha) - 1) else None
-        look = {"height": 0.5 - 0.3 * level, "color": BLUE, "alpha": 0.35 + 0.6 * level}
+        look: Look = {"height": 0.5 - 0.3 * level, "color": BLUE, "alpha": 0.35 + 0.6 * level}
         _bars(axes, places, np.array(after) / unit[:, None], label=words, **look)
     axes.set_yticks(places, names)
     axes.set_xlabel("value over the middle of what it was before")
@@ -55,6 +60,6 @@ def inputs(document: Document) -> Figure:
     return drawn
 
 
-def _bars(axes: Axes, places: Array, ends: Array, **look: object) -> None:
+def _bars(axes: Axes, places: Array, ends: Array, **look: Any) -> None:
     """Horizontal bars between two ends each, shape (n, 2)."""
     axes.barh(places, np.ptp(ends, axis=1), left=ends[:, 0], lw=0, **look)

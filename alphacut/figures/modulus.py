@@ -77,7 +77,7 @@ def fuzzy_modulus(dataset: xarray.Dataset, frame: Frame | None) -> Figure:
     look.shaded_cuts(axes, alpha, *ends.T)
     if frame is not None and frame.modulus is not None:
         cuts = np.array([frame.modulus.cut(level) for level in (0.0, 1.0)]) / GPA
-        line = {"color": look.BLUE, "lw": 1.2, "ls": "--", "label": "quoted in the case"}
+        line: look.Look = {"color": look.BLUE, "lw": 1.2, "ls": "--", "label": "quoted in the case"}
         axes.plot(look.outline(*cuts.T), [0, 1, 1, 0], **line)
         axes.plot([], [], color=look.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
@@ -101,7 +101,7 @@ def membership(dataset: xarray.Dataset) -> Figure:
     axes.vlines([lower, upper], 0, SHOWN_LEVEL, color=look.ORANGE, lw=0.8, ls=":")
     words, spot = f"α-cut at {SHOWN_LEVEL:g}: {lower:.2f} … {upper:.2f}", (lower + upper) / 2
     axes.annotate(words, (spot, SHOWN_LEVEL + 0.03), ha="center", color=look.ORANGE)
-    beside = {"xytext": (8, -2), "textcoords": "offset points", "va": "center"}
+    beside: look.Look = {"xytext": (8, -2), "textcoords": "offset points", "va": "center"}
     axes.annotate("core", ((left[-1] + right[-1]) / 2, 1.0), **beside)
     look.membership_axes(axes, "fuzzy parameter, here E (GPa)")
     return drawn
@@ -121,7 +121,7 @@ def response(dataset: xarray.Dataset) -> Figure:
     left.set_xlabel(f"homogenised {name} (GPa)")
     quantiles(right, dataset)
     look.membership_axes(right, f"quantile of {name} (GPa)")
-    small = {"title": "probability", "fontsize": 8, "title_fontsize": 8}
+    small: look.Look = {"title": "probability", "fontsize": 8, "title_fontsize": 8}
     right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
     return drawn
 
@@ -147,6 +147,6 @@ def quantiles(axes: Axes, dataset: xarray.Dataset) -> None:
     alpha = dataset["alpha"].values
     for number, probability in enumerate(dataset["probability"].values):
         ends = dataset["quantile"].sel(probability=probability).transpose("bound", "alpha")
-        line = {"color": MARKS[number % len(MARKS)], "lw": 1.3, "marker": "o", "ms": 3}
+        line: look.Look = {"color": MARKS[number % len(MARKS)], "lw": 1.3, "marker": "o", "ms": 3}
         line["label"] = f"{probability:g}"
         axes.plot(look.outline(*ends.values / GPA), look.outline(alpha, alpha), **line)

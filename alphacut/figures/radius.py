@@ -64,7 +64,7 @@ def p_box(section: RadiusMap) -> Figure:
     corners = maps(section, 0.0)
     low = min(radius.extremes()[0] for radius in corners)
     high = max(radius.extremes()[1] for radius in corners)
-    at = np.linspace(low, high, 600)
+    at = np.asarray(np.linspace(low, high, 600), float)
     family = np.array([distribution(radius, at) for radius in corners])
     axes.fill_between(
         at, family.min(0), family.max(0), color=PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"

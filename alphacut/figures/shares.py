@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from alphacut.figures.captions import INPUTS, in_words
-from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, WIDTH, prefix_axis, title
+from alphacut.figures.style import BLUE, GREY, ORANGE, PURPLE, WIDTH, Look, prefix_axis, title
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 
@@ -79,7 +79,7 @@ def _panel(axes: Axes, dataset: xarray.Dataset, output: str) -> None:
     axes.patch.set_visible(False)
     for index, name in enumerate(map(str, dataset["input"].values)):
         share = weighted(dataset["share"].sel(input=name).values, width, half)
-        look = {"color": COLOURS[index % 4], "ls": STYLES[(index // 4) % 4], "lw": 1.3}
+        look: Look = {"color": COLOURS[index % 4], "ls": STYLES[(index // 4) % 4], "lw": 1.3}
         axes.plot(time, share, label=INPUTS.get(name) or in_words(name), **look)
     axes.set_xlim(time[0], time[-1])
     axes.set_ylim(0, 1)
@@ -103,7 +103,11 @@ def _bars(axes: Axes, shares: xarray.DataArray, quantity: str) -> None:
     for index, name in enumerate(names):
         share = [float(shares.sel(cell_input=name, alpha=level)) for level in levels]
         places = np.arange(len(levels)) + (index - (len(names) - 1) / 2) * thick
-        look = {"color": COLOURS[index % 4], "hatch": HATCHES[index // 4 % 3], "edgecolor": "white"}
+        look: Look = {
+            "color": COLOURS[index % 4],
+            "hatch": HATCHES[index // 4 % 3],
+            "edgecolor": "white",
+        }
         axes.bar(places, share, thick, label=in_words(name), lw=0, **look)
     axes.set_xticks(range(len(levels)), [f"α = {level:g}" for level in levels])
     axes.set_ylabel(f"share of the width of {quantity}")

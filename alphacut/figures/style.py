@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,8 @@ INK, BLUE, ORANGE, GREY = look.INK, look.BLUE, look.ORANGE, look.GREY
 PURPLE = "#7b3294"  # differs from Okabe's and Ito's blue and orange in lightness
 WIDTH, HEIGHT = 7.2, 3.8  # inches
 Colour = tuple[float, float, float, float]
+Look = dict[str, Any]
+"""Keywords of a drawing function of Matplotlib."""
 
 
 def style() -> AbstractContextManager[None]:
@@ -63,7 +65,7 @@ def alpha_legend(axes: Axes, alpha: Array) -> None:
     shades = zip(alpha[:-1], colours(alpha), strict=False)
     patches = [Patch(facecolor=shade, label=f"α = {level:g}") for level, shade in shades]
     top = Line2D([], [], color=INK, lw=1, label=f"α = {alpha[-1]:g}")
-    small = {"title": "α-cut", "fontsize": 8, "title_fontsize": 8}
+    small: Look = {"title": "α-cut", "fontsize": 8, "title_fontsize": 8}
     axes.legend(handles=[*patches, top], loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
 
 
@@ -99,5 +101,5 @@ def shaded_cuts(axes: Axes, alpha: Array, lower: Array, upper: Array) -> None:
     """A membership function from its α-cuts, each cut as a bar at its level."""
     for level, low, high, shade in zip(alpha, lower, upper, colours(alpha), strict=True):
         axes.plot([low, high], [level, level], color=shade, lw=3, solid_capstyle="butt", zorder=2)
-    line = {"color": INK, "lw": 1.2, "marker": "o", "ms": 3.5, "zorder": 3}
+    line: Look = {"color": INK, "lw": 1.2, "marker": "o", "ms": 3.5, "zorder": 3}
     axes.plot(outline(lower, upper), outline(alpha, alpha), **line)

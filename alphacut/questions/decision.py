@@ -33,7 +33,8 @@ def answer(section: Decision, motion: Motion) -> Document:
     bounds = envelope(
         motion.observed(tuple(limits)),
         motion.inputs,
-        **motion.times,
+        duration=motion.duration,
+        step=motion.step,
         alpha=motion.alpha,
         relative=True,
         tolerance=PRECISION,

@@ -63,11 +63,6 @@ class Motion:
         """Fuzzy inputs by parameter."""
         return self.structure.inputs(self.fuzzy)
 
-    @property
-    def times(self) -> dict[str, float]:
-        """Duration and step, as the questions of `alphacut.frame` take them."""
-        return {"duration": self.duration, "step": self.step}
-
     def observed(self, outputs: tuple[str, ...]) -> StoreyFrame | LagrangianSystem:
         """The model, of a storey frame with these outputs alone."""
         frame = self.structure.frame

@@ -34,7 +34,8 @@ def answer(section: Tolerances, motion: Motion) -> Document:
         motion.observed(tuple(limits)),
         motion.inputs,
         limits,
-        **motion.times,
+        duration=motion.duration,
+        step=motion.step,
         most=section.most,
         progress=motion.progress,
     )

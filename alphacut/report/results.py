@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from alphacut.frame.structures.quantities import Output
@@ -14,10 +15,10 @@ HEAD = ("quantity", "most plausible", "widest range", "nature", "error up to")
 Row = tuple[str, str, str, str, str]
 
 AVERAGES = {
-    "cylinders": "of the square array's axes (eq. 16)",
-    "axes": "of the square array's axes (eq. 16)",
+    "cylinders": "average of the axes (eq. 16)",
+    "axes": "average of the axes (eq. 16)",
     "isotropic": "isotropic average",
-    "spheres": "of spheres, isotropic average",
+    "spheres": "isotropic average of spheres",
 }
 """Averages of the stiffness that E and ν are of."""
 NATURES = {
@@ -50,13 +51,14 @@ def moduli(summary: Document) -> Iterator[Row]:
         cuts = (_cut(young, -1, " GPa"), _cut(young, 0, " GPa"))
         yield (f"Young's modulus E, {mean}", *cuts, nature, f"{most:.1g} GPa")
         if poisson:
-            cuts = (_cut(poisson, -1, places=4), _cut(poisson, 0, places=4))
+            cuts = (_cut(poisson, -1), _cut(poisson, 0))
             yield (f"Poisson's ratio ν, {mean}", *cuts, nature, "–")
     if image := summary.get("image"):
         ends, nature = image["cuts"]["E_GPa"], image["cuts"]["nature"]
         worth = str(nature_of(nature if isinstance(nature, str) else nature[0]))
         cuts = (_cut(ends, -1, " GPa"), _cut(ends, 0, " GPa"))
-        yield ("Young's modulus E of the image as segmented", *cuts, worth, "none outside")
+        name = f"Young's modulus E of the image, {AVERAGES.get(str(image.get('average')), '')}"
+        yield (name.rstrip(", "), *cuts, worth, "inside the bounds")
 
 
 def peaks(summary: Document) -> Iterator[Row]:
@@ -64,7 +66,7 @@ def peaks(summary: Document) -> Iterator[Row]:
     studies = summary.get("envelopes", {})
     if not studies:
         return
-    study = max(studies.values(), key=lambda one: (len(one["fuzzy"]), one["max"].__len__()))
+    study = max(studies.values(), key=lambda one: (len(one["fuzzy"]), len(one["max"])))
     yield from peak_rows(study)
 
 
@@ -75,19 +77,23 @@ def peak_rows(study: Document) -> Iterator[Row]:
     for name, one in of.items():
         unit = Output(name).unit
         error = max(one["error"]) if "error" in one else 0.0
-        cuts = tuple(
+        top, whole = (
             _peak(one, level, unit, largest[unit], attained=nature is Nature.ATTAINED)
             for level in (-1, 0)
         )
-        yield (f"peak of |{name}|", *cuts, str(nature), engineering(error, unit, digits=2))
+        yield f"peak of |{name}|", top, whole, str(nature), engineering(error, unit, digits=2)
 
 
 def _peak(one: Document, level: int, unit: str, beside: float, *, attained: bool) -> str:
     """Range of a peak with its error; of attained bounds what is reached at least."""
     error = one["error"][level] if "error" in one else 0.0
     if attained:
-        return f"≥ {engineering(max(one['upper'][level] - error, 0), unit, beside=beside)}"
-    ends = max(one["lower"][level] - error, 0.0), one["upper"][level] + error
+        reached = outward(max(one["upper"][level] - error, 0.0), up=False)
+        return f"≥ {engineering(reached, unit, beside=beside)}"
+    ends = (
+        outward(max(one["lower"][level] - error, 0.0), up=False),
+        outward(one["upper"][level] + error, up=True),
+    )
     return " … ".join(dict.fromkeys(engineering(end, unit, beside=beside) for end in ends))
 
 
@@ -97,10 +103,22 @@ def nature_of(text: object) -> Nature:
     return next((nature for nature in Nature if [str(nature)] == first), Nature.ATTAINED)
 
 
-def _cut(ends: Document, level: int, unit: str = "", *, places: int = 3) -> str:
-    """One cut of a quantity, rounded outwards by no more than the last place."""
-    both = (f"{ends[side][level]:.{places}f}" for side in ("lower", "upper"))
-    return " … ".join(dict.fromkeys(both)) + unit
+def outward(value: float, *, up: bool, digits: int = 4) -> float:
+    """A bound at so many digits that is not narrower, but for rounding in the tenth."""
+    if value == 0 or not math.isfinite(value):
+        return value
+    scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
+    slack = 1e-10 * abs(value) * scale
+    whole = math.ceil(value * scale - slack) if up else math.floor(value * scale + slack)
+    return whole / scale
+
+
+def _cut(ends: Document, level: int, unit: str = "") -> str:
+    """One cut of a quantity, rounded outwards; one value where both ends are the same."""
+    low, high = float(ends["lower"][level]), float(ends["upper"][level])
+    if high - low <= 1e-9 * abs(high):
+        return f"{low:.5g}{unit}"
+    return f"{outward(low, up=False, digits=5):.5g} … {outward(high, up=True, digits=5):.5g}{unit}"
 
 
 def extremes(study: Document) -> list[tuple[str, ...]]:
@@ -111,7 +129,10 @@ def extremes(study: Document) -> list[tuple[str, ...]]:
     return [
         (
             name,
-            *(engineering(study[x][name], unit, beside=largest[unit]) for x in ("min", "max")),
+            *(
+                engineering(outward(study[x][name], up=x == "max"), unit, beside=largest[unit])
+                for x in ("min", "max")
+            ),
             engineering(errors[name], unit, digits=2) if name in errors else "not estimated",
             str(nature_of(study["nature"])),
         )

@@ -90,8 +90,15 @@ def tolerances(
 
     def step_at(scale: float) -> _Step:
         numbers = scaled(inputs, scale)
-        times = {"duration": duration, "step": step}
-        bounds = envelope(model, numbers, **times, alpha=[0.0], method=method, progress=False)
+        bounds = envelope(
+            model,
+            numbers,
+            duration=duration,
+            step=step,
+            alpha=[0.0],
+            method=method,
+            progress=False,
+        )
         tried[scale] = _judged(peaks(bounds), limits)
         if progress:
             progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
@@ -101,7 +108,7 @@ def tolerances(
     if low == 0.0 and step_at(0.0).kept:
         low = _halved(step_at, low, most, precision * most)
     passed = min((scale for scale, one in tried.items() if one.passed), default=np.inf)
-    supports = {name: tuple(x.support) for name, x in scaled(inputs, low).items()}
+    supports = {name: (x.support.lower, x.support.upper) for name, x in scaled(inputs, low).items()}
     best = tried[low]
     return Tolerances(low if best.kept else None, passed, supports, best.nature, len(tried))
 

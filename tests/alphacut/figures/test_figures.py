@@ -59,7 +59,9 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     data = study(nature, error=0.25 * np.ones((2, 11, 1)))
     with style.style():
         _, axes = style.figure()
-        words = envelope.error_band(axes, data["time"], data.sel(output="q1").isel(alpha=0), nature)
+        words = envelope.error_band(
+            axes, data["time"].values, data.sel(output="q1").isel(alpha=0), nature
+        )
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
     assert ends == [-1.25, 1.25][:lines]
     assert ("error up to 250 mm" in words) == bool(lines)

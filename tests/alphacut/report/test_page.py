@@ -10,7 +10,7 @@ import pytest
 
 from alphacut.fuzzy.result import Nature
 from alphacut.report.page import report
-from alphacut.report.results import nature_of, peak_rows
+from alphacut.report.results import nature_of, outward, peak_rows
 from alphacut.report.results import results as rows_of
 from alphacut.report.safe import MOST, cleaned, figures, plain_name
 from alphacut.report.tables import write_tables
@@ -119,6 +119,14 @@ def test_a_least_peak_is_stated_with_its_error():
 def test_attained_bounds_say_what_is_reached_and_no_more():
     (row,) = peak_rows({**STUDY, "nature": "attained"})
     assert row[1:4] == ("≥ 10.90 m", "≥ 11.80 m", "attained")
+
+
+@pytest.mark.parametrize("value", [24.77334, -0.0123456, 1e9 / 7, 0.0, 25.0])
+def test_a_printed_bound_is_no_narrower_than_it_was(value):
+    low, high = outward(value, up=False), outward(value, up=True)
+    assert low <= value <= high
+    assert high - low <= 1e-3 * abs(value)
+    assert float(f"{high:.4g}") == pytest.approx(high, rel=1e-12)
 
 
 def test_the_first_table_has_a_row_for_every_result(results):
