@@ -112,7 +112,8 @@ def to_dataset(result: Microstructure) -> xarray.Dataset:
 
     box, fit = result.pbox, result.pbox.fit
     radius = np.linspace(fit.a1, fit.a3, 501)
-    theta = np.linspace(fit.distribution.lower, fit.distribution.upper, 5001)
+    law = fit.distribution
+    theta = np.asarray(np.linspace(law.lower, law.upper, 5001), float)
     low, high = box.bounds(theta)
     share = fit.distribution.cdf(theta)
     columns = {

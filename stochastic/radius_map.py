@@ -103,13 +103,13 @@ class HermiteMap:
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Reduced radius at `theta`, any shape."""
-        return np.polynomial.polynomial.polyval(self.xi(theta), self.monomials)  # eq. 12
+        radius = np.polynomial.polynomial.polyval(self.xi(theta), self.monomials)  # eq. 12
+        return np.asarray(radius, float)
 
     def slope(self, theta: ArrayLike) -> Array:
         """dr/dξ at `theta`, any shape."""
-        return np.polynomial.polynomial.polyval(
-            self.xi(theta), np.polynomial.polynomial.polyder(self.monomials)
-        )
+        derivative = np.polynomial.polynomial.polyder(self.monomials)
+        return np.asarray(np.polynomial.polynomial.polyval(self.xi(theta), derivative), float)
 
     def extremes(self) -> tuple[float, float]:
         """Least and greatest radius on the support."""

@@ -53,7 +53,9 @@ def section_of(particles: Particles) -> Section:
     """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
     if particles.shape is not DISCS:
         count = len(particles)
-        return Section(particles, np.arange(count), cell_volumes(particles), np.ones(count))
+        return Section(
+            particles, np.arange(count, dtype=np.intp), cell_volumes(particles), np.ones(count)
+        )
     diagram = apollonius(particles)
     whole = whole_cells(diagram)
     return Section(particles, whole.disc, diagram.areas[whole.disc], whole.weight, diagram)

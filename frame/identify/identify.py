@@ -130,7 +130,7 @@ class Identified:
         logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
         ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
         hertz = np.sqrt(np.maximum(np.array(ranges), 0.0)) / (2 * np.pi)  # (A, 2, n)
-        drawn = np.full((0, len(chain.mass)), np.nan)
+        drawn: Array = np.full((0, len(chain.mass)), np.nan)
         if self.height[0] >= self.alpha[0]:
             drawn = np.sqrt(chain.modes(self.samples(number, seed=seed))[0]) / (2 * np.pi)
         used = {mode.mode: mode.frequency for mode in self.agreement.measured.modes}

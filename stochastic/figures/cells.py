@@ -47,8 +47,8 @@ def plot_cells(
     from matplotlib.collections import LineCollection
 
     discs = diagram.discs
-    angle = np.linspace(diagram.start, diagram.end, 24)
-    rho = diagram.radius_at(np.arange(len(diagram.cell)), angle)
+    angle = np.asarray(np.linspace(diagram.start, diagram.end, 24), float)
+    rho = diagram.radius_at(np.arange(len(diagram.cell), dtype=np.intp), angle)
     points = discs.centres[diagram.cell] + rho[..., None] * np.stack(
         [np.cos(angle), np.sin(angle)], axis=-1
     )
@@ -132,7 +132,8 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
 
     reach = 3.5 * discs.spacing
     centre = int(np.argmin(np.hypot(*(discs.centres - discs.size / 2).T)))
-    apart = discs.separation(np.full(len(discs), centre), np.arange(len(discs)))
+    every = np.arange(len(discs), dtype=np.intp)
+    apart = discs.separation(np.full(len(discs), centre, np.intp), every)
     near = np.flatnonzero((np.hypot(*apart.T) < reach) & (np.arange(len(discs)) != centre))
     direct = neighbours(discs)
     touching = {tuple(np.round(v, 12)) for v in direct.apart[direct.first == centre]}
@@ -182,7 +183,7 @@ def _around(axes: Axes, places: Array, radius: float, reach: float, colours: lis
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((0, 0), 1e3 * radius, color=ORANGE))
-    for (x, y), colour in zip(places, colours, strict=True):
+    for (x, y), colour in zip(places.tolist(), colours, strict=True):
         axes.add_patch(
             Circle((1e3 * x, 1e3 * y), 1e3 * radius, facecolor=colour, edgecolor=GREY, alpha=0.8)
         )

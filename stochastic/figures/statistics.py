@@ -157,7 +157,8 @@ def draw_map(result: Microstructure) -> Figure:
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
     fit, box = result.pbox.fit, result.pbox
-    theta = np.linspace(fit.distribution.lower, fit.distribution.upper, 601)
+    law = fit.distribution
+    theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
     axes.step(theta, result.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
     axes.plot(
         theta,

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 
 
@@ -28,7 +28,7 @@ class AreaWeighted:
 
     values: Array
     weights: Array
-    groups: Array
+    groups: Rows
 
     @classmethod
     def of(

@@ -58,7 +58,7 @@ class HermiteFit:
         share[-1] = 1.0
         # ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
         right = np.diff(self._integrals(share), axis=1) @ sample.values - self._ends
-        best = np.linalg.solve(self._gram, right)
+        best = np.asarray(np.linalg.solve(self._gram, right), float)
         a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
         return float(max(a2, 0)), float(max(a4, 0))
 

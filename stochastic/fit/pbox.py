@@ -51,7 +51,8 @@ class PBox:
         step = np.append(np.diff(sample.values) > 0, True)
         before = np.concatenate([[0.0], sample.cumulated[step][:-1]])
         values, after = sample.values[step], sample.cumulated[step]
-        grid = np.linspace(self.fit.distribution.lower, self.fit.distribution.upper, 20_001)
+        law = self.fit.distribution
+        grid = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
         low, high = self.bounds(grid)
         share = self.fit.distribution.cdf(grid)
         # bounds of the distribution function

@@ -95,7 +95,7 @@ class SectionImage:
         phase = self._particles(picture)
         labels = _pieces(phase)
         inside, odd = [], 0.0
-        for piece in measure.regionprops(labels):
+        for piece in measure.regionprops(labels):  # type: ignore[no-untyped-call]
             top, left, bottom, right = piece.bbox
             if min(top, left) == 0 or bottom == phase.shape[0] or right == phase.shape[1]:
                 continue
@@ -120,8 +120,8 @@ class SectionImage:
         """Mask of the particles' pixels."""
         from skimage import filters
 
-        smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)
-        bright = smooth > filters.threshold_otsu(smooth)
+        smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)  # type: ignore[no-untyped-call]
+        bright = smooth > filters.threshold_otsu(smooth)  # type: ignore[no-untyped-call]
         greys = [smooth[part] for part in (bright, ~bright) if part.any()]
         contrast = float(np.ptp([np.median(grey) for grey in greys]))
         noise = float(np.sqrt(np.mean([np.var(grey) for grey in greys])))
@@ -134,7 +134,7 @@ class SectionImage:
         dark = self.particles == "dark"
         if self.particles == "auto":
             dark = _convexity(~bright) > _convexity(bright)
-        phase = ~bright if dark else bright
+        phase: Mask = ~bright if dark else bright
         if (apart := _unevenness(smooth, ~phase) / contrast) > UNEVEN:
             value = f"light that differs by {apart:.2g} of the contrast"
             cure = "subtract the background, for example by skimage.restoration.rolling_ball"
@@ -148,12 +148,11 @@ def _pieces(phase: Mask) -> NDArray[np.int_]:
     from skimage import feature, measure, segmentation
 
     depth = ndimage.gaussian_filter(ndimage.distance_transform_edt(phase), 1.0)
-    peaks = feature.peak_local_max(
-        depth, round(SMALLEST), labels=measure.label(phase), exclude_border=False
-    )
+    parts = measure.label(phase)  # type: ignore[no-untyped-call]
+    peaks = feature.peak_local_max(depth, round(SMALLEST), labels=parts, exclude_border=False)  # type: ignore[no-untyped-call]
     seeds = np.zeros(phase.shape, int)
     seeds[tuple(peaks.T)] = np.arange(1, len(peaks) + 1)
-    labels: NDArray[np.int_] = segmentation.watershed(-depth, seeds, mask=phase)
+    labels: NDArray[np.int_] = segmentation.watershed(-depth, seeds, mask=phase)  # type: ignore[no-untyped-call]
     return labels
 
 
@@ -161,7 +160,7 @@ def _convexity(phase: Mask) -> float:
     """Area of all pieces over that of their convex hulls."""
     from skimage import measure
 
-    pieces = measure.regionprops(_pieces(phase))
+    pieces = measure.regionprops(_pieces(phase))  # type: ignore[no-untyped-call]
     large = [piece for piece in pieces if piece.area >= np.pi * SMALLEST**2]
     hulls = sum(piece.area_convex for piece in large)
     return float(sum(piece.area for piece in large) / hulls) if hulls else 0.0

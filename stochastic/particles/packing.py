@@ -77,7 +77,8 @@ class Packing:
         Radii are drawn until the box holds the largest of them. On average this keeps the law's
         shares (Wald's identity), as drawing all of them anew does not.
         """
-        radii, side = np.empty(0), -np.inf
+        radii: Array = np.empty(0)
+        side = -np.inf
         room = 2.0 * (self.shape.dimensions - 1)  # a sphere's cell has room for its own images
         while not len(radii) or room * radii.max() + self.gap > side:
             if len(radii) >= max(MOST, self.number):
@@ -125,7 +126,7 @@ def random_sequential(
     """
     order = np.argsort(-radii, kind="stable")
     grown = radii[order] + gap / 2
-    centres = np.zeros((0, len(box)))
+    centres: Array = np.zeros((0, len(box)))
     while len(centres) < len(order):
         block = slice(len(centres), min(len(order), max(64, int(1.5 * len(centres)))))
         standing = _Standing(centres, grown[: len(centres)], box)

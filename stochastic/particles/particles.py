@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError
 
 
@@ -75,20 +75,22 @@ class Particles:
 
     def __post_init__(self) -> None:
         size = np.array(self.size, float).ravel()
-        centres = np.array(self.centres, float).reshape(-1, len(size))
+        centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()
         if not 0 < len(radii) == len(centres):
             allowed = f"{len(centres)} positions, of one particle or more"
             raise RefusedError("radii", f"{len(radii)} numbers", allowed)
         if not (np.isfinite(size).all() and (size > 0).all()):
             raise RefusedError("size", size.tolist(), "positive, finite lengths in m")
-        _refuse(~np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
+        _refuse(
+            np.asarray(~np.isfinite(centres).all(axis=1)), "centres", centres, "finite lengths in m"
+        )
         _refuse(~((radii >= 0) & (radii < np.inf)), "radii", radii, "finite lengths from 0 m on")
         if self.periodic:
             wrapped = np.mod(centres, size)
             centres = np.where(wrapped < size, wrapped, 0.0)
         else:
-            outside = ((centres < 0) | (centres > size)).any(axis=1)
+            outside = np.asarray(((centres < 0) | (centres > size)).any(axis=1))
             _refuse(outside, "centres", centres, f"places in the window of {size.tolist()} m")
         for name, value in (("centres", centres), ("radii", radii), ("size", size)):
             object.__setattr__(self, name, value)
@@ -116,9 +118,9 @@ class Particles:
         """Side of the square or cube of one particle's share, in m."""
         return float((self.measure / len(self)) ** (1 / len(self.size)))
 
-    def separation(self, first: Array, second: Array) -> Array:
+    def separation(self, first: Rows, second: Rows) -> Array:
         """Vectors from centres `first` to the nearest images of `second`, shape (…, d), in m."""
-        apart = self.centres[second] - self.centres[first]
+        apart: Array = self.centres[second] - self.centres[first]
         return apart - self.size * np.round(apart / self.size) if self.periodic else apart
 
 

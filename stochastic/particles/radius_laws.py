@@ -160,7 +160,8 @@ class MeasuredRadii:
     @cached_property
     def _grade(self) -> Array:
         """Distribution function at the values; a step where some are equal, or there is one."""
-        return np.linspace(0, 1, len(self.values)) if len(self.values) > 1 else np.ones(1)
+        count = len(self.values)
+        return np.asarray(np.linspace(0, 1, count) if count > 1 else np.ones(1), float)
 
     def cdf(self, radius: ArrayLike) -> Array:
         """P(r ≤ radius), any shape, `radius` in m."""
@@ -169,4 +170,4 @@ class MeasuredRadii:
 
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """`number` independent radii, shape (number,), in m."""
-        return np.interp(generator.random(number), self._grade, self.values)
+        return np.asarray(np.interp(generator.random(number), self._grade, self.values), float)

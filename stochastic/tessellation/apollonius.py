@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.circle_envelope import (
     Arcs,
@@ -48,8 +48,8 @@ class Apollonius:
 
     discs: Particles
     areas: Array
-    cell: Array
-    neighbour: Array
+    cell: Rows
+    neighbour: Rows
     apart: Array
     start: Array
     end: Array
@@ -60,7 +60,7 @@ class Apollonius:
         return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
     @property
-    def cut(self) -> Array:
+    def cut(self) -> Mask:
         """True if the cell touches the edge of the window, shape (n,)."""
         touched = np.zeros(len(self.discs), bool)
         touched[self.cell[self.neighbour < 0]] = True
@@ -70,7 +70,7 @@ class Apollonius:
         """Sums d + Δ and differences d − Δ of every arc (see `wall`), shape (m,), in m."""
         return _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
 
-    def radius_at(self, arc: Array, angle: Array) -> Array:
+    def radius_at(self, arc: Rows, angle: Array) -> Array:
         """Distance from the centre to the wall of `arc` at `angle` (broadcast), in m."""
         near, far = (side[arc] for side in self.wall())
         psi = angle - np.arctan2(self.apart[arc, 1], self.apart[arc, 0])
@@ -103,11 +103,11 @@ def apollonius(discs: Particles) -> Apollonius:
 
 def _walls(discs: Particles, reach: Array) -> Iterator[tuple[Rows, _Walls]]:
     """Cells of portions of the discs with all others within reach as their neighbours."""
-    for of, pairs in pairs_within(discs, np.arange(len(discs)), reach):
+    for of, pairs in pairs_within(discs, np.arange(len(discs), dtype=np.intp), reach):
         yield of, _Walls.towards(discs, pairs, of=of)
 
 
-def _near_far(radii: Array, first: Array, second: Array, apart: Array) -> tuple[Array, Array]:
+def _near_far(radii: Array, first: Rows, second: Rows, apart: Array) -> tuple[Array, Array]:
     """Sums d + Δ and differences d − Δ of pairs; a window's edge is a wall to an equal disc."""
     distance = np.hypot(apart[:, 0], apart[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
@@ -153,9 +153,8 @@ class _Walls:
 
     def areas(self) -> Array:
         """Cell areas, shape (n,)."""
-        return np.bincount(
-            self.arcs.owner, sector_area(*self._anomalies()), minlength=len(self.discs)
-        )
+        sectors = sector_area(*self._anomalies())
+        return np.asarray(np.bincount(self.arcs.owner, sectors, len(self.discs)), float)
 
     def largest_radius(self) -> Array:
         """Upper bound of the distance from the centre to the cell's boundary, shape (n,).
@@ -177,7 +176,7 @@ class _Walls:
         return largest
 
 
-def _bounds(discs: Particles, of: Array) -> Pairs:
+def _bounds(discs: Particles, of: Rows) -> Pairs:
     """Bounds of every cell: own images in a periodic box, mirror images in a window."""
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size

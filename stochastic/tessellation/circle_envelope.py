@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 
 
@@ -66,13 +66,13 @@ class Arcs:
         end: φ at which it ends, `start` ≤ `end`, shape (m,).
     """
 
-    owner: Array
-    function: Array
+    owner: Rows
+    function: Rows
     start: Array
     end: Array
 
 
-def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
+def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
     """Upper envelopes of consecutive groups of functions.
 
     Args:
@@ -84,11 +84,11 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
     Raises:
         FailedError: A sweep does not close; this would be an error of the program.
     """
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(int)
+    first = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.intp)
     order = np.argsort(counts, kind="stable")
     order = order[counts[order] > 0]
-    nothing = np.zeros(0, int)
-    parts: list[tuple[Array, Array, Array, Array]] = [(nothing, nothing, np.zeros(0), np.zeros(0))]
+    nothing = np.zeros(0, np.intp)
+    parts: list[tuple[Rows, Rows, Array, Array]] = [(nothing, nothing, np.zeros(0), np.zeros(0))]
     while len(order):
         # groups of like size share one padded table, small enough for the cache; the padding
         # repeats the last function
@@ -108,14 +108,14 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Array) -> Arcs:
 
 
 def _sweep(
-    a: Array, b: Array, c: Array, table: Array, group: Array
-) -> tuple[Array, Array, Array, Array]:
+    a: Array, b: Array, c: Array, table: Rows, group: Rows
+) -> tuple[Rows, Rows, Array, Array]:
     """Walk once around the circle with all rows; arcs as (owner, function, start, end)."""
-    row = np.arange(len(a))
+    row = np.arange(len(a), dtype=np.intp)
     summit = np.argmax(np.hypot(a, b) + c, axis=1)  # the highest of all is on the envelope
     phi = np.arctan2(b[row, summit], a[row, summit])
     live, limit = row, phi + 2 * np.pi
-    took: list[tuple[Array, Array, Array]] = []  # row, function that takes over, angle
+    took: list[tuple[Rows, Rows, Array]] = []  # row, function that takes over, angle
     for step in range(4 * a.shape[1] + 16):
         beyond = phi + STRIDE if step else phi
         current, ahead = _next_crossing(a, b, c, beyond)
@@ -132,8 +132,8 @@ def _sweep(
 
 
 def _arcs(
-    took: list[tuple[Array, Array, Array]], table: Array, group: Array
-) -> tuple[Array, Array, Array, Array]:
+    took: list[tuple[Rows, Rows, Array]], table: Rows, group: Rows
+) -> tuple[Rows, Rows, Array, Array]:
     """Join the take-overs of each row into arcs, across the start of the circle too."""
     live, function, start = (np.concatenate(column) for column in zip(*took, strict=True))
     order = np.argsort(live, kind="stable")
@@ -150,7 +150,7 @@ def _arcs(
     return group[live[keep]], function[keep], start[keep], end[keep]
 
 
-def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Array, Array]:
+def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Array]:
     """Uppermost function of each row at φ, and the angle at which another rises above it.
 
     With g ≤ 0 the difference of another function to the uppermost, h = −g(φ) and slope q = g'(φ),

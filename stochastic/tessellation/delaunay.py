@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius
 
@@ -23,8 +23,8 @@ class Neighbours:
         apart: Vector to the other end, shape (m, 2), in m.
     """
 
-    number: Array
-    first: Array
+    number: Rows
+    first: Rows
     apart: Array
 
     @property
@@ -44,7 +44,7 @@ def neighbours(discs: Particles) -> Neighbours:
     tiles = (0, 1, -1) if discs.periodic else (0,)
     layer = LAYER * discs.spacing
     points = np.concatenate([discs.centres + discs.size * (i, j) for i in tiles for j in tiles])
-    near = ((points > -layer) & (points < discs.size + layer)).all(axis=1)
+    near = np.asarray(((points > -layer) & (points < discs.size + layer)).all(axis=1))
     near[: len(discs)] = True
     points = points[near]
     try:

@@ -69,8 +69,9 @@ def pairs_within(discs: Particles, of: Rows, reach: Array) -> Iterator[tuple[Row
 
 def _images(discs: Particles, margin: float) -> tuple[Rows, Array]:
     """Indices of all discs, and shifts to all their images within `margin` of the rectangle."""
-    every = np.arange(len(discs))
-    indices, shifts = [every], [np.zeros((len(discs), 2))]
+    every = np.arange(len(discs), dtype=np.intp)
+    indices: list[Rows] = [every]
+    shifts: list[Array] = [np.zeros((len(discs), 2))]
     tiles = np.ceil(margin / discs.size).astype(int) if discs.periodic else (0, 0)
     for tile in itertools.product(*(range(-number, number + 1) for number in tiles)):
         image = discs.centres + discs.size * tile

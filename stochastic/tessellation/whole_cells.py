@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic.tessellation.apollonius import Apollonius
 
@@ -34,7 +34,7 @@ class WholeCells:
         weight: Cells that each stands for, shape (k,); 1 in a periodic box.
     """
 
-    disc: Array
+    disc: Rows
     weight: Array
 
 
@@ -57,7 +57,7 @@ def whole_cells(diagram: Apollonius) -> WholeCells:
             inner - np.stack([reach[disc, :2].sum(axis=1), reach[disc, 2:].sum(axis=1)], axis=1)
         ).prod(axis=1)
         return WholeCells(disc, discs.measure / fits)
-    return WholeCells(np.arange(len(discs)), np.ones(len(discs)))
+    return WholeCells(np.arange(len(discs), dtype=np.intp), np.ones(len(discs)))
 
 
 def _reach(diagram: Apollonius) -> Array:
@@ -66,8 +66,8 @@ def _reach(diagram: Apollonius) -> Array:
     The greatest of `ANGLES` on each arc, its ends among them: their second order is far below what
     the largest disc beyond the edge is known by.
     """
-    angle = np.linspace(diagram.start, diagram.end, ANGLES)
-    rho = diagram.radius_at(np.arange(len(diagram.cell)), angle)
+    angle = np.asarray(np.linspace(diagram.start, diagram.end, ANGLES), float)
+    rho = diagram.radius_at(np.arange(len(diagram.cell), dtype=np.intp), angle)
     reach = np.full((len(diagram.discs), 4), -np.inf)
     for edge, direction in enumerate(EDGES):
         out = (rho * (1 + np.cos(angle - direction))).max(axis=0)

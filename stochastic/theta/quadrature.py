@@ -26,7 +26,7 @@ class ThetaRule:
 
     def mean(self, values: Array) -> Array:
         """Mean of `values`, shape (n, …), under f_Θ."""
-        return np.tensordot(self.weights, values, axes=1)
+        return np.asarray(np.tensordot(self.weights, values, axes=1), float)
 
 
 _MOST_PANELS = 64  # to begin with
@@ -40,7 +40,7 @@ def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRu
     layers; where the density is smooth, the error of the mean of a smooth function falls with the
     power 2·points of the layer height.
     """
-    edges = np.linspace(distribution.lower, distribution.upper, layers + 1)
+    edges = np.asarray(np.linspace(distribution.lower, distribution.upper, layers + 1), float)
     return _weighted(distribution, edges, np.polynomial.legendre.leggauss(points))
 
 
@@ -90,7 +90,8 @@ def gauss_rule(
 def _fine_rule(law: ThetaLaw, points: int, between: tuple[float, float] | None) -> ThetaRule:
     """Legendre rule in panels of at most 1 that integrates the density between two ends."""
     lower, upper = between or (law.lower, law.upper)
-    edges = np.linspace(lower, upper, min(math.ceil(upper - lower), _MOST_PANELS) + 1)
+    panels = min(math.ceil(upper - lower), _MOST_PANELS)
+    edges = np.asarray(np.linspace(lower, upper, panels + 1), float)
     rule = np.polynomial.legendre.leggauss(points)
     return _weighted(law, panel_edges(law, edges, rule), rule)
 

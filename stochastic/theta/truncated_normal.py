@@ -56,7 +56,8 @@ class TruncatedNormal:
 
     def cdf(self, theta: ArrayLike) -> Array:
         """P(Θ ≤ theta), any shape."""
-        return self._below(np.clip(np.asarray(theta, float), self.lower, self.upper)) / self.mass
+        inside = np.clip(np.asarray(theta, float), self.lower, self.upper)
+        return np.asarray(self._below(inside) / self.mass, float)
 
     def quantile(self, probability: ArrayLike) -> Array:
         """The θ below which a share `probability` in [0, 1] lies, any shape."""
