@@ -183,7 +183,7 @@ def _around(axes: Axes, places: Array, radius: float, reach: float, colours: lis
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((0, 0), 1e3 * radius, color=ORANGE))
-    for (x, y), colour in zip(places.tolist(), colours, strict=True):
+    for x, y, colour in zip(places[:, 0], places[:, 1], colours, strict=True):
         axes.add_patch(
             Circle((1e3 * x, 1e3 * y), 1e3 * radius, facecolor=colour, edgecolor=GREY, alpha=0.8)
         )
