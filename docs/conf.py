@@ -74,17 +74,28 @@ def without_modules(
     context["script_files"] = [one for one in scripts if "scripts/furo.js" not in str(one)]
 
 
-def with_fields(
+def with_keys(
     _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
 ) -> None:
     """Adds the keys of a section of a case to its description, from the model's own fields."""
+    from alphacut.case.keys import allowed
+
     for key, field in getattr(documented, "model_fields", {}).items():
         needed = " (needed)" if field.is_required() else ""
-        lines += ["", f"- ``{key}``{needed}: {field.description or 'a section'}"]
+        ends = f" Allowed: {values}." if (values := allowed(field)) else ""
+        lines += ["", f"``{key}``{needed}: {field.description or 'a section of its own'}.{ends}"]
+
+
+def without_signature(
+    _app: Sphinx, _what: str, _name: str, documented: object, *_: object
+) -> tuple[str, str] | None:
+    """Leaves out the signature of a section, whose keys are listed."""
+    return ("", "") if hasattr(documented, "model_fields") else None
 
 
 def setup(app: Sphinx) -> None:
     """Hooks into the build."""
     app.connect("builder-inited", copy_mathjax)
-    app.connect("autodoc-process-docstring", with_fields)
+    app.connect("autodoc-process-docstring", with_keys)
+    app.connect("autodoc-process-signature", without_signature)
     app.connect("html-page-context", without_modules, priority=900)
