@@ -22,6 +22,14 @@ def every_key() -> Keys:
     return dict(_keys("", CONTENT))
 
 
+def sections() -> dict[str, list[type[Section]]]:
+    """The models of every section by its name; that of an image and of a round cell have one."""
+    models: dict[str, list[type[Section]]] = {"": [CONTENT]}
+    for name, model in _nested("", CONTENT):
+        models.setdefault(name, []).append(model)
+    return models
+
+
 def _keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo]]:
     for name, info in model.model_fields.items():
         full = f"{prefix}{info.alias or name}"
@@ -30,6 +38,13 @@ def _keys(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo]]:
             yield full, info
         for one in inner:
             yield from _keys(f"{full}.", one)
+
+
+def _nested(prefix: str, model: type[Section]) -> Iterator[tuple[str, type[Section]]]:
+    for name, info in model.model_fields.items():
+        for inner in _models(info.annotation):
+            yield f"{prefix}{name}", inner
+            yield from _nested(f"{prefix}{name}.", inner)
 
 
 def _models(annotation: Any) -> Iterator[type[Section]]:
