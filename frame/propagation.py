@@ -32,7 +32,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.progress_bar import Progress, told
+from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import RefusedError
 
 
@@ -87,7 +87,7 @@ def envelope(
     cuts, which = over.boxes.distinct()
     over = replace(over, boxes=cuts)
     steps = step_error(over)
-    with told(progress) as tick:
+    with showing(progress) as tick:
         found = way.run(over, tick)
     steps = step_error_at_bounds(found, over, steps)
     found = with_stray(with_step_error(found, over, steps), over)

@@ -1,4 +1,4 @@
-"""Progress of a computation: told to the caller, or a bar on a terminal."""
+"""Progress of a computation: reported to the caller, or as a bar on a terminal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ Progress = Callable[[float], None]
 _WAIT = 1.0  # seconds before a bar appears
 _EVERY = 0.2  # seconds between its moves
 _WIDTH = 30
-_TAKEN = 0.9  # share of what is left that a stage takes
 
 
 def share(progress: Progress | None, first: float, last: float) -> Progress:
@@ -29,29 +28,8 @@ def stage(progress: Progress | None, what: str) -> None:
         tell(what)
 
 
-class Stages:
-    """Progress of stages that follow each other until one succeeds: it never falls.
-
-    Where stages are shown by name each begins anew; elsewhere each leaves a share to the next.
-    """
-
-    def __init__(self, progress: Progress) -> None:
-        self.progress, self.named = progress, hasattr(progress, "stage")
-        self.first = self.reached = 0.0
-
-    def stage(self, what: str) -> None:
-        """Another one begins."""
-        self.first = self.reached
-        stage(self.progress, what)
-
-    def __call__(self, done: float) -> None:
-        """Tell the share done of this one."""
-        self.reached = max(self.reached, self.first + _TAKEN * (1 - self.first) * done)
-        self.progress(done if self.named else self.reached)
-
-
 @contextmanager
-def told(progress: Progress | bool | None) -> Iterator[Progress | None]:
+def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
     """Function that the share done goes to.
 
     Args:

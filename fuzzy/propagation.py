@@ -18,7 +18,7 @@ from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.method import Method
-from alphacut.fuzzy.progress_bar import Progress, told
+from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, levels
@@ -98,7 +98,7 @@ def propagate(
     call = Call(function, domain.names, tuple(shared), vectorised)
     key = b"" if store is None else model_key(identity or {})
     with (
-        told(progress) as tell,
+        showing(progress) as tell,
         nullcontext(executor) if executor else pool(workers) as running,
         nullcontext(store) if isinstance(store, Store | None) else Store(store) as shelf,
     ):

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.counted import ranged
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.tables import html_table
@@ -52,10 +51,10 @@ class Decision:
 
     def __str__(self) -> str:
         """The decision, the margin to each limit at the lowest level, and what is claimed."""
-        possible, necessary = ranged(*self.possibility), ranged(*self.necessity)
+        possible, necessary = _ranged(*self.possibility), _ranged(*self.necessity)
         head = f"{self.verdict}: possibility of passing {possible}, necessity {necessary}"
         margins = [
-            f"margin of {name} {ranged(low[0], high[0])} at α = {self.alpha[0]:g}"
+            f"margin of {name} {_ranged(low[0], high[0])} at α = {self.alpha[0]:g}"
             for name, (low, high) in self.margin.items()
         ]
         claim = [self.claim] if self.claim else []
@@ -134,3 +133,8 @@ def _highest(alpha: Array, holds: Mask) -> float:
     if not len(rows):
         return float(alpha[0])
     return float(alpha[rows[-1] + 1]) if rows[-1] + 1 < len(alpha) else 1.0
+
+
+def _ranged(low: float, high: float) -> str:
+    """Such as 0.25 … 0.5; one number where both ends read the same."""
+    return " … ".join(dict.fromkeys((f"{low:.6g}", f"{high:.6g}")))
