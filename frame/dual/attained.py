@@ -35,9 +35,11 @@ def attained(
         places: Nodes and outputs, each shape (S,).
         time: All nodes, in s.
     """
+    pieces = np.array_split(np.arange(len(points[0])), -(-len(points[0]) // PIECE))
+    (physical, unit), (node, output) = points, places
     parts = [
-        _piece(system, structure, names, [x[rows] for x in (*points, *places)], time)
-        for rows in np.array_split(np.arange(len(points[0])), -(-len(points[0]) // PIECE))
+        _piece(system, structure, names, physical[i], unit[i], node[i], output[i], time)
+        for i in pieces
     ]
     return np.concatenate(parts)
 
@@ -46,10 +48,12 @@ def _piece(
     system: LinearSystem,
     structure: Classical,
     names: Sequence[str],
-    where: Sequence[Array],
+    points: Array,
+    unit: Array,
+    node: Rows,
+    output: Rows,
     time: Array,
 ) -> Array:
-    points, unit, node, output = where
     matrices, seen = evaluate(system, names, points, derivatives=False)
     M, K = matrices.mass.value, matrices.stiffness.value
     n = M.shape[-1]
@@ -76,7 +80,7 @@ def _piece(
     return np.asarray((read * wave).sum(-1))
 
 
-def _load(system: LinearSystem, sigma: Array, node: Array, time: Array) -> Array:
+def _load(system: LinearSystem, sigma: Array, node: Rows, time: Array) -> Array:
     """ρ(σ; t) at one node for each point, shape (S, n)."""
     assert system.ground is not None
     left, right, last, phases, which = phases_of(system.ground, time)
@@ -85,8 +89,11 @@ def _load(system: LinearSystem, sigma: Array, node: Array, time: Array) -> Array
     return out
 
 
-@numba.njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
-def _march(sigma, left, right, h, phase, last, out):
+@numba.njit(cache=True, parallel=True)
+def _march(
+    sigma: Array, left: Array, right: Array, h: float, phase: Array, last: Rows, out: Array
+) -> None:
+    """Writes ρ at the node of each point, by recursion over the record."""
     for s in numba.prange(len(sigma)):
         J = np.empty(4, np.complex128)
         for k in range(sigma.shape[1]):

@@ -29,18 +29,17 @@ from math import comb
 import numpy as np
 from scipy.linalg import eigh
 
-from alphacut.frame.dual import homogeneous
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, symmetric
-from alphacut.frame.dual.homogeneous import Series, packed, tensor
+from alphacut.frame.dual.homogeneous import Series, packed, product, tensor
 from alphacut.frame.dual.structure import Classical, UncoveredError
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 MOST_MONOMIALS = 33_000
 """Monomials of the series' highest degree, at most."""
 DEGREES = (4, 10)
 """Least and greatest degree of the series."""
-ROUGH = 0.03
-"""Doubt of λ, as a share of it, above which a mode is better left in the group."""
+ROUGH = 0.05
+"""Doubt of λ or of x·M x, as a share of it, above which a mode is better left in the group."""
 ROUNDS = 60
 """Most rounds in which the bounds of an eigenpair are widened until they hold."""
 REFINED = 8
@@ -64,6 +63,11 @@ class Mode:
     shape: Series
     moved: Series
     norm: Series
+
+    @property
+    def sharp(self) -> bool:
+        """Whether the mode's own bounds say more than what it adds to a group."""
+        return all(x.rest[0] < ROUGH * x.parts[0][0, 0] for x in (self.squared, self.norm))
 
     def cut(self, degree: int) -> Mode:
         """The same to a lower degree."""
@@ -101,14 +105,10 @@ def modes(structure: Classical) -> Modes:
     heavy, stiff = _form(mass, np.ones(len(middle))), _form(stiffness, middle**-0.5)
     if not (heavy < 1 and stiff < 1):
         raise UncoveredError("dual: the structure may lose its stiffness", "take narrower inputs")
-    used = np.flatnonzero(sum(x.parts[1] != 0 for x in (mass, stiffness)).any((0, 1)))
+    used = np.union1d(mass.present(), stiffness.present())
     of_mass, of_stiffness = (x.on(used) for x in (mass, stiffness))
     enclosed = {k: _enclosed(k, of_mass, of_stiffness, used) for k in range(len(middle))}
-    single = {
-        k: mode
-        for k, mode in enclosed.items()
-        if mode is not None and mode.squared.rest[0] < ROUGH * middle[k]
-    }
+    single = {k: mode for k, mode in enclosed.items() if mode is not None and mode.sharp}
     low, high = middle * (1 - stiff) / (1 + heavy), middle * (1 + stiff) / (1 - heavy)
     return Modes(single, basis, mass, low, high)
 
@@ -147,15 +147,18 @@ def _series(k: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array],
     apart[k] = np.inf
     heavy, stiff = ([packed(part, a) for a, part in enumerate(x.parts)] for x in (mass, stiffness))
     unit = np.eye(len(middle))[k][None]
-    rate, shape, moved = [np.full((1, 1), middle[k])], [unit], [unit]
+    rate: list[Array] = [np.full((1, 1), middle[k])]
+    shape: list[Array] = [unit]
+    moved: list[Array] = [unit]
     for m in range(1, _degree(d) + 1):
-        lower = range(1, min(m, 3) + 1)
-        of_mass = sum(homogeneous.product(heavy[b], shape[m - b], (b, m - b), d) for b in lower)
-        right = middle[k] * of_mass
-        right -= sum(homogeneous.product(stiff[a], shape[m - a], (a, m - a), d) for a in lower)
+        of_mass, of_stiffness = (
+            np.sum([product(x[b], shape[m - b], (b, m - b), d) for b in range(1, min(m, 3) + 1)], 0)
+            for x in (heavy, stiff)
+        )
+        right = middle[k] * of_mass - of_stiffness
         for a in range(1, m):
             column = moved[m - a][:, :, None]
-            right += homogeneous.product(column, rate[a], (m - a, a), d)
+            right += product(column, rate[a], (m - a, a), d)
         rate.append(-right[:, k : k + 1])
         shape.append(right / apart)
         moved.append(of_mass + shape[m])
@@ -175,7 +178,7 @@ def _sizes(part: Array) -> Array:
     return np.asarray(np.abs(part).sum(0))
 
 
-def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Array) -> Mode | None:
+def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode | None:
     """Mode k proved, or None where it is not enclosed."""
     n = len(mass.rest)
     middle = np.diag(stiffness.parts[0])
@@ -195,14 +198,11 @@ def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Array) -> Mod
         beyond = beyond + of_m[b] @ sum((x[j] for j in range(N + 1 - b, N + 1)), np.zeros(n))
     x_series, moved_series = Series(shape, np.zeros(n), used), Series(moved, beyond, used)
     norm = (x_series * moved_series).through(np.ones((1, n)))
-    side = sum(_sizes(part) for part in moved) + beyond
+    side: Array = np.sum([_sizes(part) for part in moved], axis=0) + beyond
     heavy = mass.size()
     comparison = _Comparison.of(pencil, np.abs(middle - middle[k]), o)
-    least, L, Y = (
-        float(2 * norm.parts[0][0, 0] - sum(norm.sizes())[0] - norm.rest[0]),
-        0.0,
-        np.zeros(n - 1),
-    )
+    least, L = float(2 * norm.parts[0][0, 0] - np.sum(norm.sizes()) - norm.rest[0]), 0.0
+    Y: Array = np.zeros(n - 1)
     for _ in range(ROUNDS):
         below = least - float(side[o] @ Y)
         solved = comparison.solved(missed[o] + L * side[o], L * heavy[np.ix_(o, o)])
@@ -241,8 +241,8 @@ class _Comparison:
     turned: float
 
     @classmethod
-    def of(cls, pencil: _Pencil, distance: Array, o: Array) -> _Comparison:
-        total = sum(pencil.sizes[1:])[np.ix_(o, o)]
+    def of(cls, pencil: _Pencil, distance: Array, o: Rows) -> _Comparison:
+        total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
         diagonal = distance[o] - np.diag(total)
         scale = distance[o] ** -0.5
         turned = sum(pencil.norm(m, o, scale) for m in range(1, len(pencil.sizes)))
@@ -251,15 +251,15 @@ class _Comparison:
     def solved(self, right: Array, more: Array) -> Array | None:
         """Bounds of |y| where |r| ≤ right, T off by `more` besides; None if it may be singular."""
         scale = self.distance**-0.5
-        known, y = False, np.full(len(right), np.inf)
+        y: Array = np.full(len(right), np.inf)
         left = 1 - self.turned - float(np.linalg.norm(scale[:, None] * more * scale, 2))
         if left > 0:
-            known, y = True, scale * np.linalg.norm(scale * right) / left
+            y = np.asarray(scale * np.linalg.norm(scale * right) / left)
         comparison = np.diag(self.diagonal) - self.off - more
         inverse = np.linalg.inv(comparison)
         if (inverse >= 0).all():
-            known, y = True, np.minimum(y, inverse @ right)
-        if not known:
+            y = np.minimum(y, inverse @ right)
+        if not np.isfinite(y).all():
             return None
         diagonal, off = np.diag(comparison), self.off + more - np.diag(np.diag(more))
         for _ in range(REFINED):
@@ -304,7 +304,7 @@ class _Pencil:
             out[m] = np.minimum(out[m], np.abs(parts[m]).sum(tuple(range(2, 2 + m))))
         return cls(out, parts)
 
-    def norm(self, m: int, o: Array, scale: Array) -> float:
+    def norm(self, m: int, o: Rows, scale: Array) -> float:
         """Bound of the norm of one part of the block o, scaled."""
         block, weight = np.ix_(o, o), scale[:, None] * scale
         least = float(np.linalg.norm(self.sizes[m][block] * weight, 2))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 ROUND_OFF = 1e-11
 """Share of a function's size that covers the round-off of its coefficients."""
@@ -83,7 +83,13 @@ class Expansion:
                 )
         return np.asarray(total)
 
-    def on(self, inputs: Array) -> Expansion:
+    def present(self) -> Rows:
+        """Inputs that the functions depend on."""
+        return np.flatnonzero(
+            [any(np.take(part, i, -1).any() for part in self.parts[1:]) for i in range(self.inner)]
+        )
+
+    def on(self, inputs: Rows) -> Expansion:
         """The same as functions of some inputs alone; they depend on no others."""
         parts = (part[(..., *np.ix_(*[inputs] * m))] for m, part in enumerate(self.parts))
         return Expansion(tuple(parts), self.rest)

@@ -17,14 +17,14 @@ import numpy as np
 from numba import njit
 
 from alphacut.frame.dual.expansion import Expansion
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 MOST = 24
 """Greatest degree that places are counted for."""
 
 
 @cache
-def monomials(d: int, degree: int) -> Array:
+def monomials(d: int, degree: int) -> Rows:
     """All rising lists of `degree` out of d variables by place, shape (monomials, degree)."""
     every = list(combinations_with_replacement(range(d), degree))
     rows = np.array(every, np.int64).reshape(len(every), degree)
@@ -32,12 +32,12 @@ def monomials(d: int, degree: int) -> Array:
 
 
 @cache
-def binomials(d: int) -> Array:
+def binomials(d: int) -> Rows:
     """C(i + k, k + 1) for variables i and k, shape (d, MOST)."""
     return np.array([[comb(i + k, k + 1) for k in range(MOST)] for i in range(d)], np.int64)
 
 
-def places(lists: Array, d: int) -> Array:
+def places(lists: Rows, d: int) -> Rows:
     """Places of rising lists (N, m), shape (N,)."""
     table = binomials(d)
     return np.asarray(
@@ -46,7 +46,22 @@ def places(lists: Array, d: int) -> Array:
 
 
 @njit(cache=True)
-def multiply(a, b, of_a, of_b, table, out):
+def place_of_both(one: Rows, other: Rows, table: Rows) -> int:
+    """Place of the product of two monomials."""
+    m, q = len(one), len(other)
+    place, i, j = 0, 0, 0
+    for k in range(m + q):
+        if j == q or (i < m and one[i] <= other[j]):
+            place += table[one[i], k]
+            i += 1
+        else:
+            place += table[other[j], k]
+            j += 1
+    return place
+
+
+@njit(cache=True)
+def multiply(a: Array, b: Array, of_a: Rows, of_b: Rows, table: Rows, out: Array) -> None:
     """Adds products: out[monomial of both, i] += a[α, i, j] b[β, j].
 
     Args:
@@ -57,7 +72,6 @@ def multiply(a, b, of_a, of_b, table, out):
         table: `binomials`.
         out: Vector polynomial, shape (monomials, n).
     """
-    m, q = of_a.shape[1], of_b.shape[1]
     n, width = a.shape[1], a.shape[2]
     for x in range(len(a)):
         used = False
@@ -67,14 +81,7 @@ def multiply(a, b, of_a, of_b, table, out):
         if not used:
             continue
         for y in range(len(b)):
-            place, i, j = 0, 0, 0
-            for k in range(m + q):
-                if j == q or (i < m and of_a[x, i] <= of_b[y, j]):
-                    place += table[of_a[x, i], k]
-                    i += 1
-                else:
-                    place += table[of_b[y, j], k]
-                    j += 1
+            place = place_of_both(of_a[x], of_b[y], table)
             for i in range(n):
                 total = 0.0
                 for j in range(width):
@@ -90,19 +97,11 @@ def product(a: Array, b: Array, degrees: tuple[int, int], d: int) -> Array:
 
 
 @njit(cache=True)
-def multiply_each(a, b, of_a, of_b, table, out):
+def multiply_each(a: Array, b: Array, of_a: Rows, of_b: Rows, table: Rows, out: Array) -> None:
     """Adds products entry by entry: out[monomial of both, i] += a[α, i] b[β, i]."""
-    m, q = of_a.shape[1], of_b.shape[1]
     for x in range(len(a)):
         for y in range(len(b)):
-            place, i, j = 0, 0, 0
-            for k in range(m + q):
-                if j == q or (i < m and of_a[x, i] <= of_b[y, j]):
-                    place += table[of_a[x, i], k]
-                    i += 1
-                else:
-                    place += table[of_b[y, j], k]
-                    j += 1
+            place = place_of_both(of_a[x], of_b[y], table)
             for i in range(a.shape[1]):
                 out[place, i] += a[x, i] * b[y, i]
 
@@ -116,12 +115,15 @@ def each(a: Array, b: Array, degrees: tuple[int, int], d: int) -> Array:
     return out
 
 
-def packed(tensor: Array, degree: int) -> Array:
+def packed(whole: Array, degree: int) -> Array:
     """Coefficients (monomials, …) of a symmetric tensor (…, d, …, d)."""
-    d = tensor.shape[-1] if degree else 1
+    if degree == 0:
+        return whole[None]
+    d, kept = whole.shape[-1], whole.shape[: whole.ndim - degree]
     lists = monomials(d, degree)
-    values = tensor[(..., *lists.T)] if degree else tensor[..., None]
-    return np.moveaxis(values * orders(lists), -1, 0)
+    at = np.ravel_multi_index(tuple(lists.T), (d,) * degree)
+    values = whole.reshape(*kept, d**degree)[..., at]
+    return np.asarray(np.moveaxis(values * orders(lists), -1, 0))
 
 
 def tensor(coefficients: Array, d: int, degree: int) -> Array:
@@ -129,17 +131,18 @@ def tensor(coefficients: Array, d: int, degree: int) -> Array:
     if degree == 0:
         return np.asarray(coefficients[0])
     lists = monomials(d, degree)
-    every = np.sort(np.indices([d] * degree).reshape(degree, -1).T, axis=1)
+    every: Rows = np.sort(np.indices([d] * degree).reshape(degree, -1).T, axis=1).astype(np.int64)
     values = np.moveaxis(coefficients, 0, -1) / orders(lists)
     return np.asarray(values[..., places(every, d)].reshape(*coefficients.shape[1:], *[d] * degree))
 
 
-def orders(lists: Array) -> Array:
+def orders(lists: Rows) -> Array:
     """In how many orders each list may be written, shape (N,)."""
     degree = lists.shape[1]
     if degree == 0:
         return np.ones(1)
-    run, repeats = np.ones(len(lists)), np.ones(len(lists))
+    run: Array = np.ones(len(lists))
+    repeats: Array = np.ones(len(lists))
     for k in range(1, degree):
         run = np.where(lists[:, k] == lists[:, k - 1], run + 1, 1.0)
         repeats = repeats * run
@@ -158,7 +161,7 @@ class Series:
 
     parts: list[Array]
     rest: Array
-    inputs: Array
+    inputs: Rows
 
     def sizes(self) -> list[Array]:
         """Bounds of the parts over the box, each (n,)."""
@@ -182,7 +185,9 @@ class Series:
         """Products, entry by entry, or with one function."""
         N, d = len(self.parts) - 1, len(self.inputs)
         parts = [
-            sum(each(self.parts[i], other.parts[m - i], (i, m - i), d) for i in range(m + 1))
+            np.sum(
+                [each(self.parts[i], other.parts[m - i], (i, m - i), d) for i in range(m + 1)], 0
+            )
             for m in range(N + 1)
         ]
         s, t = self.sizes(), other.sizes()
@@ -213,7 +218,16 @@ class Series:
         own, rest = len(self.inputs), self.rest + sum(self.sizes()[4:])
         parts = []
         for m, part in enumerate(self.parts[:4]):
-            whole = np.zeros(part.shape[1:] + (d,) * m)
-            whole[(..., *np.ix_(*[self.inputs] * m))] = tensor(part, own, m)
-            parts.append(whole)
+            whole = np.zeros((*part.shape[1:], d**m))
+            at = _within(self.inputs, d, m)
+            whole[..., at] = tensor(part, own, m).reshape(*part.shape[1:], -1)
+            parts.append(whole.reshape(*part.shape[1:], *[d] * m))
         return Expansion(tuple(parts), np.asarray(rest))
+
+
+def _within(inputs: Rows, d: int, degree: int) -> Rows:
+    """Places of a tensor of some inputs in that of all d, both flat."""
+    at = np.zeros(1, np.int64)
+    for _ in range(degree):
+        at = (at[:, None] * d + inputs).ravel()
+    return at

@@ -76,7 +76,9 @@ def oscillators(
         "start": structure.start[0],
     }
     excited = stacked([vectors[name] for name in sources])
-    excited = product(excited, Expansion.constant(inverse.T, zero.inner), "si,ij->sj")
+    excited = product(
+        excited, Expansion.constant(np.asarray(inverse.T, float), zero.inner), "si,ij->sj"
+    )
     d = zero.inner
     found, shares, read, driven = [], [], [], []
     for k, mode in modes.single.items():

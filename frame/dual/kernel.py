@@ -17,18 +17,33 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from alphacut.fuzzy.arrays import Array, Rows
+
 PATIENCE = 12
 """Steps without half the expected gain after which less is expected."""
-FLOOR = 1.2
+FLOOR = 1.0
 """Multiple of the remainders' own part of a bound below which no effort is made."""
 LOOSE = 0.1
 """Gap that suffices at nodes that lie far below the peak, as a share of how far."""
+EXPECTED = 0.5
+"""Share of the cubic parts' sizes that is expected of their sum, in which they partly cancel."""
 ASCENTS = 8
 """Most steps of the model's ascent from one point."""
+Pair = tuple[Array, Array]
+Triple = tuple[Array, Array, Array]
+Models = tuple[Array, Array, Array, Array, Array]
+Data = tuple[Array, Pair, tuple[Array, Array, tuple[int, int]], Pair, Pair, Models, Triple]
+"""Table (K, sources, T, Q W); scaled ω and g of its points; start, step and numbers of its grid;
+centres and radii of ω and g (K, 2), and of the shares (K, sources); of all scaled variables linear
+and packed quadratic parts, remainders with `EXPECTED` of the cubic parts, these and their sizes; of
+the group its responses, linear and quadratic parts."""
+
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+loops = njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def box_maximum(linear, quadratic, u):
+@loops
+def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
     """Bound of max over the box of linear·u + Σ_{i ≤ j} q_ij u_i u_j, and where about.
 
     The q_ij are packed by rows, i ≤ j; `u` is written.
@@ -72,8 +87,8 @@ def box_maximum(linear, quadratic, u):
     return total
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def products(u, out):
+@loops
+def products(u: Array, out: Array) -> None:
     """u_i u_j, packed by rows, i ≤ j."""
     at = 0
     for i in range(len(u)):
@@ -82,15 +97,15 @@ def products(u, out):
             at += 1
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def add(out, factor, row):
+@loops
+def add(out: Array, factor: float, row: Array) -> None:
     """Adds factor × row."""
     for i in range(len(out)):
         out[i] += factor * row[i]
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def dot(a, b):
+@loops
+def dot(a: Array, b: Array) -> float:
     """a·b."""
     total = 0.0
     for i in range(len(a)):
@@ -98,8 +113,10 @@ def dot(a, b):
     return total
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def dual(mu, slab, node, side, data, gradient, u):
+@loops
+def dual(
+    mu: Array, slab: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
+) -> float:
     """D(μ) without its constants, a subgradient, and the inputs u at which its second line is met.
 
     `slab` holds, for each mode, the first and last place along ω and along q that its table is read
@@ -109,7 +126,7 @@ def dual(mu, slab, node, side, data, gradient, u):
     omega, decay = place
     count = grid[2][1]
     middle, radius = share
-    linear, quadratic, doubt = models
+    linear, quadratic, doubt = models[:3]
     group_size, group_linear, group_quadratic = group
     modes, sources = middle.shape
     width, d = 2 + sources, linear.shape[1]
@@ -158,14 +175,14 @@ def dual(mu, slab, node, side, data, gradient, u):
     return total
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def model(u, node, side, data, gradient):
+@loops
+def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
     """The output's model at inputs u, side × its value, and its gradient."""
     table, _, grid, scale, share, models, group = data
     start, step, count = grid
     centre, radius_z = scale
     middle, radius = share
-    linear, quadratic, _ = models
+    linear, quadratic = models[:2]
     group_size, group_linear, group_quadratic = group
     modes, sources = middle.shape
     width = 2 + sources
@@ -217,8 +234,8 @@ def model(u, node, side, data, gradient):
     return total
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def ascend(u, node, side, data):
+@loops
+def ascend(u: Array, node: int, side: float, data: Data) -> float:
     """Improve u by steps towards the ends of the box that its gradient names; the model's value."""
     d = len(u)
     slope, trial, other = np.empty(d), np.empty(d), np.empty(d)
@@ -239,8 +256,19 @@ def ascend(u, node, side, data):
     return value
 
 
-@njit(cache=True, nogil=True)
-def minimise(mu, slab, node, side, data, steps, target, aim, weight, u):
+@compiled
+def minimise(
+    mu: Array,
+    slab: Rows,
+    node: int,
+    side: float,
+    data: Data,
+    steps: int,
+    target: float,
+    aim: float,
+    weight: Array,
+    u: Array,
+) -> tuple[float, int]:
     """The least D(μ) that a deflected subgradient method meets in `steps`, and its μ in `mu`.
 
     Args:
@@ -296,11 +324,22 @@ def minimise(mu, slab, node, side, data, steps, target, aim, weight, u):
         for z in range(nz):
             mu[z] -= size * direction[z]
     mu[:] = best
-    return least, used
+    return least + cancelled(mu, data[5]), used
 
 
-@njit(cache=True, nogil=True)
-def divided(slab, weight, sources, parts):
+@loops
+def cancelled(mu: Array, models: Models) -> float:
+    """Bound of Σ μ (cubic part) over the box, less what D(μ) has expected of it."""
+    cubic, size = models[3], models[4]
+    total, expected = np.zeros(cubic.shape[1]), 0.0
+    for z in range(len(mu)):
+        add(total, mu[z], cubic[z])
+        expected += abs(mu[z]) * size[z]
+    return np.abs(total).sum() - EXPECTED * expected
+
+
+@compiled
+def divided(slab: Rows, weight: Array, sources: int, parts: Rows) -> bool:
     """Halve the slab along the ω or q whose sides differ most; whether there is one to halve."""
     most, at, axis = 0.0, -1, 0
     for k in range(len(slab)):
@@ -319,8 +358,21 @@ def divided(slab, weight, sources, parts):
     return True
 
 
-@njit(cache=True, nogil=True)
-def bounds(nodes, side, most, steps, enough, top, constant, data, mu, u, out, at):
+@compiled
+def bounds(
+    nodes: Rows,
+    side: float,
+    most: int,
+    steps: int,
+    enough: float,
+    top: float,
+    constant: Array,
+    data: Data,
+    mu: Array,
+    u: Array,
+    out: Array,
+    at: Array,
+) -> None:
     """Bounds at rising nodes, each begun with the multipliers of the one before.
 
     Where a bound is too far from the model's own value, the ranges of the modes' tables are halved,
@@ -388,7 +440,7 @@ def bounds(nodes, side, most, steps, enough, top, constant, data, mu, u, out, at
         at[j] = u
 
 
-@njit(cache=True, nogil=True)
-def _aim(reached, enough, top, constant):
+@compiled
+def _aim(reached: float, enough: float, top: float, constant: Array) -> float:
     """Value of D at which a bound is left."""
     return reached + enough + LOOSE * max(0.0, top - reached - constant[0]) - constant[1]

@@ -24,7 +24,7 @@ import numba
 import numpy as np
 
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 TERMS = 40
 """Terms of a power series in σ h; at |σ h| ≤ `LONGEST` they leave less than round-off."""
@@ -212,8 +212,8 @@ def loaded(sigma: Array, ground: Accelerogram, time: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def step_integrals(sigma, h, out):
+@numba.njit(cache=True)
+def step_integrals(sigma: complex, h: float, out: Array) -> None:
     """∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3."""
     z = sigma * h
     for n in range(4):
@@ -225,8 +225,18 @@ def step_integrals(sigma, h, out):
         out[n] = total * h ** (n + 1)
 
 
-@numba.njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
-def _march(sigma, left, right, h, phases, which, last, out):
+@numba.njit(cache=True, parallel=True)
+def _march(
+    sigma: Array,
+    left: Array,
+    right: Array,
+    h: float,
+    phases: Array,
+    which: Rows,
+    last: Rows,
+    out: Array,
+) -> None:
+    """Writes ρ and two derivatives at nodes, by recursion over the record."""
     for s in numba.prange(len(sigma)):
         whole = np.empty(4, np.complex128)
         step_integrals(sigma[s], h, whole)

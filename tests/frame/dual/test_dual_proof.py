@@ -5,7 +5,7 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dual import kernel
-from alphacut.frame.dual.level import Level, _grid_numbers, _places
+from alphacut.frame.dual.level import Level, Problem
 from alphacut.frame.dual.proof import DualProof, over_box, sources
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -199,25 +199,19 @@ def test_any_multipliers_bound_any_motion():
     rng = np.random.default_rng(5)
     unit = rng.uniform(-1, 1, (200, 7)).round(rng.integers(0, 2))
     values = LinearFlow(model, list(fuzzy), 4.0, 0.5, Exact()).values(centre + radius * unit)
-    for o, order in enumerate(level.structure.order.tolist()):
-        scale, share, models = level._models(o)
-        for side in (-1.0, 1.0):
-            group, constant = level._group(o, order, side)
-            data = (
-                level.tables.value[order],
-                _places(level.tables.grids, scale),
-                _grid_numbers(level.tables.grids),
-                scale,
-                share,
-                models,
-                group,
-            )
-            whole = np.tile([0, 69, 0, 9], (len(level.single), 1))
+    for o in range(len(level.structure.order)):
+        for s, side in enumerate((-1.0, 1.0)):
+            problem = Problem.of(level, o, s, 1.0)
+            rows, columns = problem.data[2][2]
+            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.single), 1))
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
-                mu = size * rng.normal(size=len(models[0]))
-                bound = kernel.dual(mu, whole, node, side, data, np.empty(len(mu)), np.empty(7))
-                assert (side * values[:, node, o] <= bound + constant[:, node].sum()).all()
+                mu = size * rng.normal(size=len(problem.data[5][0]))
+                bound = kernel.dual(
+                    mu, whole, node, side, problem.data, np.empty(len(mu)), np.empty(7)
+                )
+                bound += problem.constant[:, node].sum() + kernel.cancelled(mu, problem.data[5])
+                assert (side * values[:, node, o] <= bound).all()
 
 
 def test_the_quadratic_over_a_box_is_bounded():
