@@ -19,7 +19,7 @@ from alphacut.questions.question import Limited, Motion, Question, Row
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PRECISION = 2e-3
+PRECISION = 5e-3
 """Error of the peaks that is aimed at, as a share of each."""
 
 

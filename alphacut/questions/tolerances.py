@@ -12,6 +12,7 @@ from alphacut.case.types import Quantity
 from alphacut.figures.style import BLUE, GREY, INK, figure
 from alphacut.frame.questions.tolerances import tolerances
 from alphacut.io.files import Document
+from alphacut.questions.decision import PRECISION
 from alphacut.questions.limits import in_si
 from alphacut.questions.question import Limited, Motion, Question, Row
 
@@ -37,6 +38,7 @@ def answer(section: Tolerances, motion: Motion) -> Document:
         duration=motion.duration,
         step=motion.step,
         most=section.most,
+        error=PRECISION,
         progress=motion.progress,
     )
     modal = {name: number.modal for name, number in motion.inputs.items()}

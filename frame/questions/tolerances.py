@@ -65,6 +65,7 @@ def tolerances(
     method: str | None = None,
     most: float = 2.0,
     precision: float = 0.01,
+    error: float = 1e-3,
     progress: Progress | None = None,
 ) -> Tolerances:
     """Largest scale of the supports at which no magnitude passes its limit.
@@ -75,9 +76,10 @@ def tolerances(
         limits: Largest magnitude allowed by output, in SI units.
         duration: Length of the motion, in s.
         step: Distance of nodes, in s.
-        method: Method of the envelopes, as for `envelope`.
+        method: Name of the method of the envelopes, auto unless given; it takes a tolerance.
         most: Largest scale that is tried.
         precision: Distance of both scales, relative to `most`, at which the search ends.
+        error: Error of the peaks that is aimed at, as a share of each.
         progress: Takes the share done.
 
     Raises:
@@ -96,7 +98,9 @@ def tolerances(
             duration=duration,
             step=step,
             alpha=[0.0],
-            method=method,
+            method=method or "auto",
+            relative=True,
+            tolerance=error,
             progress=False,
         )
         tried[scale] = _judged(peaks(bounds), limits)

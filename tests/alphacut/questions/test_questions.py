@@ -41,7 +41,7 @@ def test_margins_are_limits_less_peaks(summary):
     peak = summary["envelopes"]["all"]["peak"]["q2"]
     one = summary["decision"]["limits"]["q2"]
     margin = one["limit"] - np.array(peak["upper"])
-    assert one["margin"]["lower"] == pytest.approx(margin, abs=5e-3 * one["limit"])
+    assert one["margin"]["lower"] == pytest.approx(margin, abs=2e-2 * one["limit"])
 
 
 def test_tolerances_keep_what_the_decision_keeps(summary):
