@@ -141,7 +141,8 @@ def left_out(reach: float, e: Array, c: Array) -> float:
     p0, p1 = c[1] + c[0] * z0 * swell, c[1] + c[0] * z1
     p2 = c[2] + 2 * c[1] * z1 + c[0] * curved
     p3 = c[3] + 3 * c[2] * z1 + 3 * c[1] * curved + c[0] * (e[3] + 3 * e[2] * z1 + z1**3)
-    return (reach**3 * p0 + (3 * reach**2 * p1 + 3 * reach * p2 + p3) * swell) / 6
+    total: float = (reach**3 * p0 + (3 * reach**2 * p1 + 3 * reach * p2 + p3) * swell) / 6
+    return total
 
 
 @compiled

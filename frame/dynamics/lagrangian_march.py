@@ -130,8 +130,8 @@ def variational(
     inner2[:, :, :n] = np.ascontiguousarray(bent.T).reshape(d, d, n)
     f1 = flat[2 * n : 2 * n + 2 * n * a].reshape(2 * n, a)
     for c in range(n, 2 * n):
-        for x in range(n):
-            out2[:, :, c] += f1[c, x] * inner2[:, :, x]
+        for k in range(n):
+            out2[:, :, c] += f1[c, k] * inner2[:, :, k]
     x1[:, :n], x1[:, n:] = inner1[:, :n], out1[:, n:]
     x2[:, :, :n], x2[:, :, n:] = inner2[:, :, :n], out2[:, :, n:]
     return True
@@ -161,7 +161,9 @@ def runge_kutta(
         else:
             plain(given, flat)
         k[:] = flat[:m]
-        s, s1, s2 = s + weight * k, s1 + weight * k1, s2 + weight * k2
+        s += weight * k
+        s1 += weight * k1
+        s2 += weight * k2
     x += h / 6 * s
     x1 += h / 6 * s1
     x2 += h / 6 * s2

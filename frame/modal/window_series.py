@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Rows
+
+Complex = NDArray[np.complex128]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def window_series(
-    rate: Array,
+    rate: Complex,
     node: Rows,
-    middle: Array,
+    middle: Complex,
     scale: float,
-    moment: Array,
+    moment: Complex,
     ends: Rows,
     time: Array,
     fade: float,
-) -> Array:
+) -> Complex:
     """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N, n), complex.
 
     Args:

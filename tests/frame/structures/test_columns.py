@@ -28,15 +28,6 @@ def test_two_columns_are_meant_where_nothing_is_said() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("columns", "pattern"),
-    [((2, 2), "columns: 2 values for 3 floors"), ((2, 0, 2), "columns: 0 is not allowed")],
-)
-def test_columns_that_make_no_sense_are_refused(columns: tuple[float, ...], pattern: str) -> None:
-    with pytest.raises(ValueError, match=pattern):
-        StoreyFrame(MASSES, LENGTHS, 25e9, 1e-5, columns=columns)
-
-
 def test_the_shear_of_a_storey_is_its_stiffness_times_its_drift():
     frame = StoreyFrame(
         masses=[2e4, 1e4],

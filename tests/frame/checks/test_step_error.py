@@ -1,0 +1,87 @@
+"""Errors of time stepping are estimated as they are, and declared in every bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from alphacut.frame import (
+    Accelerogram,
+    Exact,
+    ImprovedFollower,
+    LagrangianFlow,
+    LagrangianSystem,
+    LinearFlow,
+    Midpoint,
+    Sampled,
+    StoreyFrame,
+    envelope,
+)
+from alphacut.frame.checks.step_error import MARGIN
+from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy.refused import FailedError, RefusedError
+
+DUFFING = LagrangianSystem(
+    1,
+    {"m": 1.0, "a": 0.5, "c": 0.1},
+    lambda q, v, p: p["m"] * v[0] ** 2 / 2 - q[0] ** 2 / 2 - p["a"] * q[0] ** 4 / 4,
+    lambda p: ([1.0], [0.0]),
+    {"x": lambda q, v, p: q[0]},
+    lambda q, v, p: [-p["c"] * v[0]],
+)
+MOTION = {"duration": 10.0, "step": 0.02, "alpha": (0,), "progress": False}
+
+
+def truth(a, c):
+    nodes = np.linspace(0, 10, 501)
+    right = lambda t, y: [y[1], -y[0] - a * y[0] ** 3 - c * y[1]]  # noqa: E731
+    return solve_ivp(right, (0, 10), [1, 0], t_eval=nodes, rtol=1e-9, atol=1e-11).y[:1].T
+
+
+def test_the_declared_error_covers_that_of_time_stepping():
+    inputs = {"a": Triangular(0.3, 0.5, 0.8), "c": Triangular(0.05, 0.1, 0.2)}
+    values = np.array([truth(a, c) for a in np.linspace(0.3, 0.8, 11) for c in (0.05, 0.1, 0.2)])
+    found = envelope(DUFFING, inputs, method=ImprovedFollower(1e-3), **MOTION)
+    missed = np.maximum(values.max(0) - found.upper[0], found.lower[0] - values.min(0))
+    assert (missed <= found.error[0] + 1e-9).all()
+    assert missed.max() > 3e-4
+
+
+@pytest.mark.parametrize(
+    ("scheme", "step"), [("midpoint", 0.02), ("composition4", 0.1), ("rk4", 0.1)]
+)
+def test_the_estimate_is_the_error_of_every_scheme(scheme, step):
+    """Attained bounds of a single motion are those of its steps, give or take their error."""
+    motion = {**MOTION, "step": step, "integrator": scheme, "method": Sampled(4)}
+    found = envelope(DUFFING, {"a": Interval(0.5, 0.5)}, **motion)
+    values = LagrangianFlow(DUFFING, (), 10.0, step, scheme).values(np.zeros((1, 0)))[0]
+    off = np.abs(values - truth(0.5, 0.1)[:: round(step / 0.02)]).max()
+    assert found.nature == "attained"
+    assert found.basis == (f"{scheme} steps of {step:g} s",)
+    assert found.error.max() == pytest.approx(MARGIN * off, rel=0.2)
+    assert found.facts["step_error"] == found.error.max()
+
+
+def test_steps_are_judged_where_bounds_are_reached_and_a_resonance_may_be():
+    """A storey that resonates with a sine between the corners of its support, at a coarse step."""
+    omega, h = np.random.default_rng().uniform(2.9, 3.3), 0.03
+    sine = Accelerogram(h, 0.7 * np.sin(omega * h * np.arange(1001)))
+    frame = StoreyFrame([1e4], stiffness=[1.5e5], damping_ratio=0.01, ground=sine)
+    motion = {**MOTION, "duration": 1000 * h, "step": h, "integrator": "midpoint"}
+    found = envelope(frame, {"k1": Interval(0.6e5, 2.4e5)}, method=Sampled(128), **motion)
+    flow = LinearFlow(frame, ("k1",), 1000 * h, h, Midpoint())
+    exact = LinearFlow(frame, ("k1",), 1000 * h, h, Exact())
+    at = np.unique(np.concatenate([found.lower_at, found.upper_at]))[:, None]
+    assert np.abs(flow.values(at) - exact.values(at)).max() <= found.facts["step_error"]
+
+
+def test_motions_that_do_not_exist_and_steps_that_fail_are_named():
+    frame = StoreyFrame((10.0, 20.0), (3.0, 3.0), 25e9, 1e-6, q0=(0.0, 0.1))
+    with pytest.raises(RefusedError, match=r"singular matrix at m1 = 0"):
+        LinearFlow(frame, ("m1",), 1, 0.1, Exact()).values(np.array([[1e4], [0.0], [2e4]]))
+    with pytest.raises(FailedError, match=r"did not converge.*it failed at a = 1e\+30"):
+        LagrangianFlow(DUFFING, ("a",), 4, 1.0).values(np.array([[0.5], [0.4], [1e30], [0.3]]))
+    motion = {**MOTION, "step": 0.1, "integrator": "rk4"}
+    with pytest.raises(RefusedError, match=r"step is 0.1 s; allowed: at most 0.0\d* s for rk4"):
+        envelope(frame, {"E": Interval(24e9, 26e9)}, method=Sampled(4), **motion)

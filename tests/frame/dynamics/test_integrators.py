@@ -1,0 +1,124 @@
+"""The one-step methods do what they declare: order, stability, energy, derivatives of the scheme."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from alphacut.frame import INTEGRATORS, Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
+from alphacut.frame.dynamics.integrators import Integrator
+from alphacut.frame.structures.linear import evaluate
+from benchmarks.frame.envelopes import FRAME
+
+SHAKEN = replace(
+    FRAME,
+    ground=Accelerogram(0.5, np.random.default_rng(3).standard_normal(41)),
+    dampers=(900.0, 700.0, 400.0),
+    damper_placement="storey",
+)
+NAMES = ("E", "m1", "l2", "d3", "q2_0", "v3_0")
+ALL = list(INTEGRATORS.values())
+
+
+def modal(names: tuple[str, ...], system: StoreyFrame = FRAME) -> np.ndarray:
+    return np.array([[system.parameters[name] for name in names]])
+
+
+@pytest.mark.parametrize("method", ALL, ids=str)
+@pytest.mark.parametrize("system", [FRAME, SHAKEN], ids=["free", "shaken"])
+def test_error_falls_with_the_declared_order(method: Integrator, system: StoreyFrame) -> None:
+    truth = LinearFlow(system, ("E",), 10, 0.1, Exact()).values(modal(("E",)))
+    errors = [
+        np.abs(
+            LinearFlow(system, ("E",), 10, h, method).values(modal(("E",)))[:, :: round(0.1 / h)]
+            - truth
+        ).max()
+        for h in (0.05, 0.025)
+    ]
+    if np.isinf(method.order):
+        assert max(errors) < 1e-11
+    else:
+        assert abs(np.log2(errors[0] / errors[1]) - method.order) < 0.15
+
+
+@pytest.mark.parametrize("method", ALL, ids=str)
+def test_stability_limit_is_sharp(method: Integrator) -> None:
+    spring = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0)  # ω = 1 rad/s
+    matrices, _ = evaluate(spring, (), np.zeros((1, 0)), derivatives=False)
+
+    def radius(step: float) -> float:
+        return float(
+            np.abs(np.linalg.eigvals(method.step_map(matrices, step).transfer.value[0])).max()
+        )
+
+    if np.isinf(method.stability_limit):
+        assert max(radius(h) for h in (0.1, 1.0, 3.0, 30.0)) < 1 + 1e-12
+    else:
+        assert radius(0.999 * method.stability_limit) < 1 + 1e-9
+        assert radius(1.001 * method.stability_limit) > 1 + 1e-4
+
+
+def test_exact_propagator_equals_the_matrix_exponential() -> None:
+    for step in (0.01, 0.3, 4.0):
+        matrices, _ = evaluate(FRAME, (), np.zeros((1, 0)), derivatives=False)
+        M, D, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
+        flow = np.block(
+            [[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]]
+        )
+        assert (
+            np.abs(Exact().step_map(matrices, step).transfer.value[0] - expm(flow * step)).max()
+            < 1e-12
+        )
+
+
+@pytest.mark.parametrize("method", ALL, ids=str)
+def test_derivatives_are_those_of_the_scheme(method: Integrator) -> None:
+    flow, p = LinearFlow(SHAKEN, NAMES, 8, 0.1, method), modal(NAMES)
+    # derivatives by relative changes of the parameters
+    jet, size = (
+        flow.taylor(p),
+        p[0][:, None, None, None],
+    )
+    for i, h in enumerate((3e-4, 1e-3, 3e-4, 3e-2, 0.3, 0.3)):  # weaker effects take longer steps
+        far_below, below, above, far_above = (
+            flow.taylor(p * (1 + k * h * np.eye(len(NAMES))[i])) for k in (-2, -1, 1, 2)
+        )
+        first = (far_below.value - 8 * below.value + 8 * above.value - far_above.value) / (12 * h)
+        second = (
+            (far_below.first - 8 * below.first + 8 * above.first - far_above.first)
+            / (12 * h)
+            * size
+        )
+        assert np.abs(jet.first[i] * p[0, i] - first).max() <= 1e-7 * np.abs(first).max()
+        assert np.abs(jet.second[i] * p[0, i] * size - second).max() <= 1e-7 * np.abs(second).max()
+
+
+def test_midpoint_is_the_two_step_recurrence() -> None:
+    h, q = 0.05, [np.array([0.01, 0.03, 0.08])]
+    matrices, _ = evaluate(FRAME, (), np.zeros((1, 0)), derivatives=False)
+    M, D, K = (x.value[0] for x in (matrices.mass, matrices.damping, matrices.stiffness))
+    left = M / h + D / 2 + h * K / 4
+    q.append(
+        np.linalg.solve(left, M @ np.array([0, -0.5, -0.5]) + (M / h + D / 2 - h * K / 4) @ q[0])
+    )
+    for _ in range(199):
+        q.append(
+            np.linalg.solve(
+                left, (2 * M / h - h * K / 2) @ q[-1] - (M / h - D / 2 + h * K / 4) @ q[-2]
+            )
+        )
+    assert np.abs(LinearFlow(FRAME, ("E",), 10, h).values(modal(("E",)))[0] - q).max() < 1e-11
+
+
+def test_undamped_energy_does_not_drift() -> None:
+    free = replace(FRAME, dampers=(0, 0, 0), outputs=("q1", "q2", "q3", "v1", "v2", "v3"))
+    state = LinearFlow(free, ("E",), 1000, 0.01, Midpoint()).values(modal(("E",)))[0]
+    matrices, _ = evaluate(free, (), np.zeros((1, 0)), derivatives=False)
+    energy = sum(
+        0.5 * np.einsum("ti,ij,tj->t", x, a.value[0], x)
+        for x, a in ((state[:, :3], matrices.stiffness), (state[:, 3:], matrices.mass))
+    )
+    assert np.abs(energy / energy[0] - 1).max() < 1e-10
