@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.optima import Response
 
 NEAR, DECADES = 8, 8.0
@@ -24,15 +21,6 @@ def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int
     pool[near] = nearest[near] + away * (pool[near] - nearest[near])
     pool[faces] = nearest[faces]
     return pool
-
-
-def spread_points(lower: Array, upper: Array, spread: int) -> Array:
-    """Middle, corners and a spread of points of a box."""
-    d = len(lower)
-    corners = np.array(list(product((-1.0, 1.0), repeat=d))) if d <= 8 else np.zeros((0, d))
-    unit = np.vstack([np.zeros((1, d)), corners, chebyshev_points(d, spread)])
-    points: Array = (lower + upper) / 2 + (upper - lower) / 2 * unit
-    return points
 
 
 def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
