@@ -44,8 +44,6 @@ USUAL = 10.0
 """Proved over sampled error of the model, seldom less."""
 ATTEMPTS = 5
 """Models of rising degree that are tried on a box."""
-SAMPLED = 3.0
-"""Factor on the model error sampled at held-out points, where nothing is proved."""
 MOST_BOXES = 2e7
 """Boxes for all bounds of a level together: seconds, or a minute under a record."""
 
@@ -142,12 +140,35 @@ class Proof:
     def _proved(
         self, linear: LinearFlow, boxes: Boxes, flow: UnitFlow, gap: float
     ) -> tuple[ModalModel, Array]:
-        model, error, reason = model_with_error(
-            linear, replace(flow, boxes=boxes), gap, self.budget, patient=self.patient
+        """Modal model over boxes with its proved error (T, m).
+
+        That exceeds the sampled error some thirty times, so the polynomials are refined until it
+        takes little of the gap.
+
+        Raises:
+            GapError: It takes too much.
+            UnprovedError: No degree can help, or a proof needs more than is affordable.
+        """
+        wanted, before, largest = gap / 30, 0, np.inf
+        for _ in range(ATTEMPTS):
+            how = {"budget": self.budget, "scale": flow.scale, "energy": True}
+            model = fit_modes(linear, boxes, tolerance=wanted, **how)  # type: ignore[arg-type]
+            if model.degree <= before:
+                break
+            sampled = float((model.error / flow.scale).max())
+            largest = USUAL * sampled  # a bound is seldom less, and takes time
+            if largest <= PORTION * gap:
+                error = proved_error(model, patient=self.patient)
+                largest = float((error / flow.scale).max())
+                if largest <= PORTION * gap:
+                    return model, error
+            # a degree more divides it by ten or so
+            wanted, before = sampled * min(0.99, 4 * PORTION * gap / largest), model.degree
+        raise GapError(
+            f"the proved error of the modes, some {flow.told(largest)}, takes too much of the gap"
+            f" {flow.told(gap)}",
+            "narrower or fewer fuzzy inputs, or a wider gap, can be proved",
         )
-        if reason:
-            raise GapError(reason)
-        return model, error
 
     def _certified(
         self, flow: UnitFlow, model: ModalModel, error: Array, gap: float, tick: Progress
@@ -183,51 +204,6 @@ def _linear(flow: UnitFlow) -> LinearFlow:
             f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {count}"
         )
     return linear
-
-
-def model_with_error(
-    linear: LinearFlow,
-    flow: UnitFlow,
-    gap: float,
-    budget: int = 280,
-    *,
-    patient: bool = True,
-    unproved: str = "",
-) -> tuple[ModalModel, Array, str]:
-    """Modal model for a proof, its error (T, m), and why that is only sampled.
-
-    The proved bound exceeds the sampled error some thirty times, so the polynomials are refined
-    until it takes little of the gap. Where it is known why nothing is proved, `unproved` says so,
-    and only a sampled error is computed.
-
-    Raises:
-        UnprovedError: No degree can help, or what is proved needs more than is affordable.
-    """
-
-    def fitted(tolerance: float) -> ModalModel:
-        return fit_modes(
-            linear, flow.boxes, tolerance=tolerance, budget=budget, scale=flow.scale, energy=True
-        )
-
-    model = first = fitted(gap / 30)
-    for _ in range(0 if unproved else ATTEMPTS):
-        sampled = float((model.error / flow.scale).max())
-        largest = USUAL * sampled  # a bound is seldom less, and takes time
-        if largest <= PORTION * gap:
-            error = proved_error(model, patient=patient)
-            largest = float((error / flow.scale).max())
-            if largest <= PORTION * gap:
-                return model, error, ""
-        unproved = (
-            f"the proved error of the modes, some {flow.told(largest)}, takes too much of the gap"
-            f" {flow.told(gap)}; narrower or fewer fuzzy inputs, or a wider gap, can be proved"
-        )
-        # a degree more divides it by ten or so
-        before = model.degree
-        model = fitted(sampled * min(0.99, 4 * PORTION * gap / largest))
-        if model.degree <= before:
-            break
-    return first, SAMPLED * first.error, unproved
 
 
 def _joined(flow: UnitFlow, parts: list[tuple[Boxes, Certificate]]) -> Envelope:

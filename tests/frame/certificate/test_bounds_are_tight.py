@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, Exact, LinearFlow, StoreyFrame
-from alphacut.frame.boxes import boxes
+from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame
+from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.branch_and_bound import BranchAndBound, Tree
 from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.frontier import Frontier
 from alphacut.frame.certificate.kernel import stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
-from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.certificate.wave_bounds import _convolved, _largest, parts
+from alphacut.frame.checks.step_error import MARGIN, deviations, step_error
 from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
@@ -172,3 +173,34 @@ def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
     for shown in (stays_below, stays_below.py_func):  # compiled, and as it is read
         assert shown(g, H, low, high, 8.01, work, L)
         assert not shown(g, H, low, high, 0.49, work, L)
+
+
+@pytest.mark.parametrize("power", [1, 2, 3])
+def test_the_summit_of_a_decaying_wave_is_in_its_bound(power: int) -> None:
+    """τ^r exp(−τ) has its summit at r, within an interval whose ends lie well below."""
+    bound = _largest(np.array([-1.0]), power * 0.9, 3, power)[:, 0]
+    fine = np.linspace(0, 0.9 * power, 2001) + 0.9 * power * np.arange(3)[:, None]
+    truth = (fine**power * np.exp(-fine)).max(1)
+    assert bound == pytest.approx(truth, rel=1e-6)
+    assert (bound >= truth * (1 - 1e-12)).all()
+
+
+def test_convolutions_are_bounded_in_spite_of_rounding() -> None:
+    rng = np.random.default_rng(5)
+    kernel, size = np.exp(-0.01 * np.arange(4000))[:, None], rng.random(4000) * 1e3
+    direct = np.convolve(kernel[:, 0], size)[:4000]
+    bound = _convolved(kernel, size)[1:, 0]
+    assert (bound >= direct).all()
+    assert (bound <= direct * (1 + 1e-8) + 1e-6).all()
+
+
+def test_an_error_of_time_stepping_does_not_fall_after_it_was_seen() -> None:
+    """Beats bring two motions together again; the estimate keeps what it was before."""
+    frame = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, q0=(1.0,))
+    flow = LinearFlow(frame, ("E",), 40.0, 0.5, Midpoint())
+    cuts = boxes({"E": Interval(0.999 / 24, 1.001 / 24)}, (0,))
+    raw = deviations(flow, cuts.modal[None])[1][0]
+    error = step_error(UnitFlow(flow, cuts))
+    assert (np.diff(raw, axis=0) < 0).any()
+    assert (np.diff(error, axis=0) >= 0).all()
+    assert (error >= MARGIN * np.maximum.accumulate(raw, axis=0) * (1 - 1e-9)).all()
