@@ -26,9 +26,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
-from alphacut.frame.dual.attained import attained
 from alphacut.frame.dual.expansion import Expansion
-from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, UncoveredError, classical
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -119,6 +117,9 @@ class DualProof:
         self, flow: LinearFlow, cuts: Boxes, a: int, peak: Array, within: _Bounded | None
     ) -> _Bounded:
         """Bounds of one level; what the level inside it attains is attained here too."""
+        from alphacut.frame.dual.attained import attained  # Numba takes time to import
+        from alphacut.frame.dual.level import Level
+
         low, high = cuts.lower[a], cuts.upper[a]
         active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
         margin = ROUNDING * peak[:, None]
