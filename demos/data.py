@@ -58,5 +58,5 @@ print(propagate(deflection, both, alpha=(0.05, 0.5, 1.0), progress=False))
 # ## Pitfalls
 #
 # - Below the level that the data decide nothing is claimed. `cut` refuses such levels.
-# - A mean is not a quantile. For the scatter of single pieces take `from_data(values, "quantile",
-#   …)`.
+# - A mean is not a quantile. For the scatter of single pieces take `from_data(values,
+#   "quantile 0.9")`.
