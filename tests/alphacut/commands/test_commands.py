@@ -1,0 +1,192 @@
+"""Commands: what they print, how they end, and that nothing is left where they refuse."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from alphacut.entry import COMMANDS, main, parsers
+from tests.alphacut.small import CELL, written
+
+RUN = [sys.executable, "-m", "alphacut"]
+
+
+def spoken(capfd, *words):
+    """Status, standard output and standard error of a command in this process."""
+    status = main([str(word) for word in words])
+    out, err = capfd.readouterr()
+    return status, out, err
+
+
+def test_commands_and_their_options_are_few():
+    assert len(COMMANDS) == 8
+    for parser in parsers("alphacut", COMMANDS)[1].values():
+        options = [a for a in parser._actions if a.option_strings and a.dest != "help"]
+        assert len(options) <= 12
+
+
+def test_a_run_prints_a_table_and_leaves_its_files(tmp_path, capfd):
+    case, folder = written(tmp_path), tmp_path / "out"
+    status, out, err = spoken(capfd, "run", case, "--out", folder, "--no-figures")
+    assert status == 0
+    assert len(out.splitlines()) <= 20
+    assert max(map(len, out.splitlines())) <= 80
+    assert out.startswith("largest magnitude")
+    assert "results are in" in err
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["envelopes"]["all"]["max"]["q1"] == pytest.approx(0.0099, abs=3e-4)
+    assert {"envelope_all.nc", "summary.json"} <= {path.name for path in folder.iterdir()}
+
+
+def test_the_same_run_takes_what_is_there_and_fresh_computes_anew(tmp_path, capfd):
+    case, folder = written(tmp_path, CELL), tmp_path / "out"
+    words = ("run", case, "--out", folder, "--no-figures")
+    spoken(capfd, *words)
+    first = (folder / "modulus.nc").stat().st_mtime_ns
+    assert "is up to date" in spoken(capfd, *words)[2]
+    assert (folder / "modulus.nc").stat().st_mtime_ns == first
+    spoken(capfd, *words, "--set", "cell.matrix_poisson=0.2")
+    changed = (folder / "modulus.nc").stat().st_mtime_ns
+    assert changed > first
+    spoken(capfd, *words, "--set", "cell.matrix_poisson=0.2", "--fresh")
+    assert (folder / "modulus.nc").stat().st_mtime_ns > changed
+
+
+def test_check_prints_what_was_read(tmp_path, capfd):
+    status, out, _ = spoken(capfd, "check", written(tmp_path))
+    assert status == 0
+    assert "first natural period" in out
+    assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
+    assert out.endswith("no problems\n")
+
+
+def test_check_gives_problems_as_json(tmp_path, capfd):
+    case = written(tmp_path, **{"10 mm": "10 q"})
+    status, out, _ = spoken(capfd, "check", case, "--json", "-")
+    (problem,) = json.loads(out)["problems"]
+    assert status == 2
+    assert (problem["key"], problem["line"]) == ("frame.displacements[0]", 11)
+
+
+def test_a_cell_is_solved_twice_and_compared(tmp_path, capfd):
+    case = written(tmp_path, CELL)
+    status, out, _ = spoken(capfd, "cell", case, "--json", "-", "--set", "modulus.tolerance=1e-3")
+    assert status == 0
+    assert json.loads(out)["E_GPa"] > 20
+    assert spoken(capfd, "cell", case, "--cross-check", "series")[0] == 2
+    assert spoken(capfd, "cell", case, "--cross-check", "magic")[0] == 2
+
+
+def test_e_is_the_isotropic_average_unless_the_axes_are_named(tmp_path, capfd):
+    case = written(tmp_path, CELL)
+    values = {}
+    for name in ("isotropic", "axes"):
+        _, out, _ = spoken(capfd, "cell", case, "--json", "-", "--set", f"average={name}")
+        values[name] = json.loads(out)
+    _, out, _ = spoken(capfd, "cell", case, "--json", "-")
+    assert json.loads(out)["E_GPa"] == values["isotropic"]["E_GPa"]
+    (c11, c12, _), _, (*_, g) = values["axes"]["stiffness_GPa"]
+    ratio = g / (c11 + c12)  # A/B of eq. 16
+    assert values["axes"]["E_GPa"] == pytest.approx(2 * g * (1 + (1 - 2 * ratio) / 2), rel=1e-9)
+    assert values["isotropic"]["E_GPa"] > values["axes"]["E_GPa"]
+
+
+def test_a_modulus_goes_from_one_command_to_the_next(tmp_path, capfd):
+    file = tmp_path / "modulus.nc"
+    assert spoken(capfd, "modulus", written(tmp_path, CELL), "--out", file)[0] == 0
+    status, out, _ = spoken(capfd, "envelope", written(tmp_path), "--modulus", file, "--json", "-")
+    assert status == 0
+    assert json.loads(out)["fuzzy"] == ["E", "m"]
+    for wrong in ("0 GPa", "3 kg", tmp_path / "none.nc", tmp_path / "case.toml"):
+        assert spoken(capfd, "envelope", written(tmp_path), "--modulus", wrong)[0] == 2
+
+
+REFUSED = [
+    ("rnu case.toml", "did you mean run?"),
+    ("run case.toml --quik", "has no option --quik"),
+    ("run case.toml more.toml", "has no option more.toml"),
+    ("run case.toml --workers 0", "a whole number 1 or more"),
+    ("run case.toml --workers two", "--workers"),
+    ("run none.toml", "no such file"),
+    ("run .", "is a directory"),
+    ("run case.toml --out case.toml", "the name of a folder"),
+    ("envelope case.toml --out a.txt", ".nc"),
+    ("envelope case.toml --out /proc/none/a.nc", "nothing can be written"),
+    ("modulus case.toml", "sections [radius] and [cell]"),
+    ("identify case.toml", "sections [identify]"),
+    ("microstructure case.toml", "[microstructure]"),
+    ("report none", "without summary.json"),
+    ("check case.toml --set frame.masses=[1_0] t", "is no number"),
+    ("check case.toml --set frame.lengths=" + "[" * 3000, "nested too deeply"),
+    ("check case.toml --set frame.lengths=1e308 mm", "magnitudes"),
+    ("check case.toml --set frame.lengths=" + "x" * 100_000, "frame.lengths"),
+    ("check case.toml --set frame.lengths=\u001b[31m3 m", "frame.lengths"),
+]
+
+
+@pytest.mark.parametrize(("line", "words"), REFUSED, ids=[line[:40] for line, _ in REFUSED])
+def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, words):
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path)
+    command, *options = line.split(" --", 1)
+    arguments = command.split(" ")
+    for option in options[0].split(" --") if options else ():
+        name, _, value = option.partition(" ")
+        arguments += [f"--{name}", *([value] if value else [])]
+    status, out, err = spoken(capfd, *arguments)
+    assert (status, out) == (2, "")
+    assert words in err
+    assert len(err.splitlines()) == 1
+    assert len(err) < 1100
+    assert err[:-1].isprintable()
+    assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
+
+
+def test_a_tolerance_that_is_missed_is_a_failure(tmp_path, capfd):
+    case = written(tmp_path, **{'"0.1 mm"': '"1e-9 mm"', '"exact"': '"midpoint"'})
+    status, _, err = spoken(capfd, "envelope", case)
+    assert status == 1
+    assert "the case allows" in err
+
+
+def test_a_full_disk_is_said_to_be_full(tmp_path, monkeypatch, capfd):
+    from alphacut.io import files
+
+    monkeypatch.setattr(files, "FULL", 1 << 60)
+    monkeypatch.setattr(files.os, "replace", lambda *_: (_ for _ in ()).throw(OSError("HDF error")))
+    status, _, err = spoken(capfd, "envelope", written(tmp_path), "--out", tmp_path / "a.nc")
+    assert status == 1
+    assert "is full" in err
+    assert not list(tmp_path.glob("*.nc"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_a_run_and_the_same_run_goes_on(tmp_path, number):
+    case = written(tmp_path, CELL + "[mesh]\nlayers = 3\n")
+    words = [*RUN, "run", str(case), "--out", str(tmp_path / "out"), "--no-figures"]
+    started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env={**os.environ})
+    time.sleep(3)
+    started.send_signal(number)
+    _, err = started.communicate(timeout=60)
+    assert started.returncode in (0, 128 + number)
+    if started.returncode:
+        assert "goes on from there" in err
+    again = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
+    assert "E, GPa" in again.stdout
+
+
+def test_no_library_is_needed_to_check(tmp_path):
+    program = (
+        "import sys; from alphacut.entry import main; main(['check', sys.argv[1]]);"
+        " print(*sys.modules, file=sys.stderr)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program, str(written(tmp_path, CELL))],
+        capture_output=True,
+        text=True,
+    )
+    assert not {"dolfinx", "petsc4py", "gmsh", "matplotlib.pyplot"} & set(run.stderr.split())

@@ -1,0 +1,133 @@
+"""One mechanism keeps every stage; the case reaches few files."""
+
+import sys
+from pathlib import Path
+
+import pytest
+import xarray
+
+import alphacut
+from alphacut.case.case import Case
+from alphacut.case.content import Content
+from alphacut.case.load import load
+from alphacut.entry import main
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.netcdf import own_files, read_dataset, read_summary
+from alphacut.stages import envelope, modulus
+from alphacut.stages.chain import Chain
+from alphacut.stages.results import Results
+from alphacut.stages.store import Stage, Store
+from tests.alphacut.small import CELL, FRAME, written
+
+ROOT = Path(alphacut.__file__).resolve().parents[1]
+
+
+def counted():
+    """A stage with the number of its computations."""
+    calls = []
+
+    def compute(work):
+        calls.append(work)
+        return xarray.Dataset({"x": ((), len(calls))})
+
+    return calls, lambda inputs: Stage("thing", inputs, ("fuzzy",), compute)
+
+
+def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
+    calls, of = counted()
+    store = Store(tmp_path, "the case", quiet=True)
+    assert [int(store.take(of(value)).x) for value in (1, 1, 2, 2)] == [1, 1, 2, 2]
+    assert len(calls) == 2
+    assert int(Store(tmp_path, "the case", fresh=True, quiet=True).take(of(2)).x) == 3
+    assert read_dataset(tmp_path / "thing.nc").attrs["case"] == "the case"
+
+
+@pytest.mark.parametrize("damage", [b"", b"no NetCDF", None])
+def test_a_damaged_file_is_computed_anew(tmp_path, damage):
+    calls, of = counted()
+    store = Store(tmp_path, "the case", quiet=True)
+    store.take(of(1))
+    path = tmp_path / "thing.nc"
+    path.write_bytes(path.read_bytes()[:200] if damage is None else damage)
+    assert int(store.take(of(1)).x) == len(calls) == 2
+
+
+def test_a_file_of_another_format_is_left_alone(tmp_path):
+    _, of = counted()
+    store = Store(tmp_path, "the case", quiet=True)
+    data = store.take(of(1)).assign_attrs(format_version=99)
+    data.to_netcdf(tmp_path / "thing.nc")
+    with pytest.raises(RefusedError, match="format 99"):
+        store.take(of(1))
+
+
+def test_a_stage_that_fails_leaves_no_file(tmp_path):
+    def compute(work):
+        raise RuntimeError("no convergence")
+
+    with pytest.raises(RuntimeError, match="no convergence"):
+        Store(tmp_path, "", quiet=True).take(Stage("thing", 1, ("fuzzy",), compute))
+    assert not list(tmp_path.iterdir())
+
+
+def test_fingerprints_see_every_input(tmp_path):
+    def key(*changes):
+        content = load(written(tmp_path), changes).content
+        (task,) = envelope.tasks(content.envelope, ())
+        return envelope.stage(content.frame.structure(), task).key
+
+    changes = ("lengths=3.1 m", "masses=[9, 10, 12] t", "alpha=0,1", "step=0.01 s", "gain=0.1")
+    assert len({key(), *map(key, changes)}) == 1 + len(changes)
+    assert key() == key("title=other")
+
+
+def test_a_modulus_is_handed_to_the_structure(tmp_path):
+    text = CELL.replace('["modulus"]', '["modulus", "envelope"]') + FRAME.partition("[frame]")[2]
+    text = text.replace('modulus = "[22, 24, 26] GPa"\n', "").replace(
+        'masses = ["[9, 10, 11] t"]', '[frame]\nmasses = ["[9, 10, 11] t"]'
+    )
+    content = load(written(tmp_path, text)).content
+    results = Chain(content, Store(tmp_path / "out", text, quiet=True)).run()
+    number = modulus.number_of(results.modulus)
+    assert results.structure.numbers["E"] == number
+    assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
+
+
+def test_the_case_reaches_few_files(tmp_path):
+    """Files whose functions hold the case, or the run that holds it, in `run` of a cell."""
+    case, files, before = written(tmp_path, CELL), [], []
+
+    def trace(frame, event, argument):
+        name = frame.f_code.co_filename
+        if event != "call" or not name.startswith(str(ROOT)):
+            return
+        if frame.f_code.co_qualname == "CellTask.__call__" and not before:
+            before.append(len(files))
+        holds = any(
+            isinstance(x, Case | Content | Chain | Results) for x in frame.f_locals.values()
+        )
+        if holds and name not in files:
+            files.append(name)
+
+    sys.setprofile(trace)
+    try:
+        assert main(["run", str(case), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    finally:
+        sys.setprofile(None)
+    assert before[0] <= 6, files
+    assert len(files) <= 18, files
+
+
+def test_a_borrowed_folder_is_not_believed(tmp_path):
+    folder = tmp_path / "out"
+    assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
+    summary = read_summary(folder)
+    assert {path.name for path in own_files(summary, folder)} == {"modulus.nc", "shares.nc"}
+    outside = {**summary, "fingerprints": {"../case": "", "/etc/passwd": ""}}
+    assert own_files(outside, folder) == []
+    with pytest.raises(RefusedError, match="of another run"):
+        own_files({**summary, "fingerprints": {"modulus": "other"}}, folder)
+    for text in ("", "[]", "{}", "[" * 100_000, '{"case": 1}', "null"):
+        (folder / "summary.json").write_text(text)
+        with pytest.raises(RefusedError, match=r"no JSON|damaged"):
+            read_summary(folder)
