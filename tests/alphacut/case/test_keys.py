@@ -1,4 +1,4 @@
-"""The schema and the page of the case format come from the models."""
+"""The schema of the case format comes from the models, and its page names all of them."""
 
 import json
 import tomllib
@@ -7,7 +7,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from alphacut.case.keys import every_key, json_schema, page, quantity_of
+from alphacut.case.content import CONTENT
+from alphacut.case.keys import allowed, every_key, json_schema, sections
 
 ROOT = Path(__file__).parents[3]
 CASES = sorted((ROOT / "cases").glob("*.toml"))
@@ -20,7 +21,7 @@ def test_keys_are_few_and_each_says_what_it_is():
 
 def test_the_schema_is_that_of_the_models():
     text = (ROOT / "cases/case.schema.json").read_text(encoding="utf-8")
-    assert text == json_schema(), "python -m alphacut.case.keys schema > cases/case.schema.json"
+    assert text == json_schema(), "python -m alphacut.case.keys > cases/case.schema.json"
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
@@ -34,9 +35,16 @@ def test_the_schema_refuses_an_unknown_key():
         jsonschema.validate(case, json.loads(json_schema()))
 
 
-def test_the_page_has_every_key():
-    text = page()
-    for name, info in every_key().items():
-        assert f"| `{name.rpartition('.')[2]}` |" in text
-        if quantity := quantity_of(info):
-            assert quantity.allowed in text
+def test_the_page_has_every_section_of_the_models():
+    page = (ROOT / "docs/case-format.md").read_text(encoding="utf-8")
+    for models in sections().values():
+        for model in models:
+            name = model.__name__
+            assert f".{name}\n" in page or model is CONTENT and ".Content\n" in page
+
+
+def test_allowed_values_of_a_key_are_told_in_words():
+    keys = every_key()
+    assert allowed(keys["mesh.layers"]).startswith("whole number from 1")
+    assert "midpoint" in allowed(keys["envelope.integrator"])
+    assert allowed(keys["title"]) == ""
