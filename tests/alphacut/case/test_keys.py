@@ -40,7 +40,7 @@ def test_the_page_has_every_section_of_the_models():
     for models in sections().values():
         for model in models:
             name = model.__name__
-            assert f".{name}\n" in page or model is CONTENT and ".Content\n" in page
+            assert f".{name}\n" in page or (model is CONTENT and ".Content\n" in page)
 
 
 def test_allowed_values_of_a_key_are_told_in_words():
