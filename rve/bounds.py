@@ -69,13 +69,13 @@ def hashin_shtrikman(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> 
     phases = (matrix.stiffness, inclusion.stiffness)
     first, second = (float(bulk_modulus(stiffness)) for stiffness in phases)
     bulks, shears = (first, second), (float(phases[0][2, 2]), float(phases[1][2, 2]))
-    found = []
+    ends = []
     for end in (min, max):
         bulk, shear = end(bulks), end(shears)
         around = (shear, shear * bulk / (bulk + 2 * shear))
         pairs = zip((bulks, shears), around, strict=True)
-        found.append([harmonic_about(share, pair, x) for pair, x in pairs])
-    return np.swapaxes(np.array(found), 0, 1)
+        ends.append([harmonic_about(share, pair, x) for pair, x in pairs])
+    return np.swapaxes(np.array(ends), 0, 1)
 
 
 def mori_tanaka(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:

@@ -133,7 +133,7 @@ class Homogenised:
         curve = self.curve
         if curve.stiffness is None:
             return None
-        return np.tensordot(curve.weights, curve.stiffness, axes=1)
+        return np.asarray(np.tensordot(curve.weights, curve.stiffness, axes=1))
 
     @property
     def moduli(self) -> Array:

@@ -28,6 +28,7 @@ _OF_NORMAL = 1.4826  # deviation of a normal law over the median of its magnitud
 _NEAR = 3.0  # deviations within which a pixel helps to fit levels and light
 _BORDER = 3  # pixels from a border that do not help, if
 _ENOUGH = 0.1  # of each class is farther from it
+_MOST = 0.9  # of the pixels, whose rest is noise: of rounded grey values half may have none
 _EXACT = 1e-9  # of the grey values: noise that is rounding
 _PATCH, _REACH = 5, 7  # pixels of a neighbourhood, and to those that it is compared with
 _STRENGTH = 0.8  # of the smoothing, over the noise
@@ -175,7 +176,8 @@ def _fitted(values: Array, labels: Rows, shapes: Array, classes: int) -> tuple[A
     for _ in range(3):
         fit = np.linalg.lstsq(whole[kept], flat[kept], rcond=None)[0]
         rest = np.abs(flat - whole @ fit)
-        kept = inner & (rest <= max(_NEAR * _OF_NORMAL * float(np.median(rest[inner])), rounding))
+        middle, most = np.quantile(rest[inner], (0.5, _MOST))
+        kept = inner & (rest <= max(_NEAR * _OF_NORMAL * float(middle), float(most), rounding))
     noise, light = float(np.sqrt(np.mean(rest[kept] ** 2))), shapes @ fit[classes:]
     light[np.abs(light) < rounding] = 0.0
     return fit[:classes], light.reshape(values.shape), noise if noise > rounding else 0.0

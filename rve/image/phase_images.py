@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.image.moduli import ModuliInterval
 
 
@@ -36,7 +36,7 @@ class ModuliImages:
         return all(np.array_equal(a, b) for a, b in pairs)
 
 
-def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Array, Array]:
+def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Rows, Rows]:
     """Least and greatest number of each pixel's phase.
 
     Args:
@@ -51,7 +51,7 @@ def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> 
     return first, last
 
 
-def moduli_images(first: Array, last: Array, phases: Sequence[ModuliInterval]) -> ModuliImages:
+def moduli_images(first: Rows, last: Rows, phases: Sequence[ModuliInterval]) -> ModuliImages:
     """Least and greatest moduli of pixels of the phases `first` … `last`."""
     pairs = np.unique(first * len(phases) + last)
     tables = np.zeros((4, len(phases), len(phases)))

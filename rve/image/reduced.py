@@ -187,7 +187,7 @@ def _extended(
     own = reduced.side, reduced.aspect, reduced.labels, reduced.phases
     coefficients = reduced.coefficients(bulk[None], shear[None])
     shares = reduced.combination(coefficients)[0, 3:]
-    start = np.tensordot(shares.T, reduced.fields, axes=1)
+    start = np.asarray(np.tensordot(shares.T, reduced.fields, axes=1))
     moduli = bulk[reduced.labels], shear[reduced.labels]
     solution = solve_side(reduced.side, *moduli, solver=solver, aspect=reduced.aspect, start=start)
     lacking = solution.fields - start

@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.special import gammaln, zeta
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 AREA = 4.0
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
@@ -58,7 +58,7 @@ def lattice_sums(highest: int) -> LatticeSums:
     return LatticeSums(plain, conjugate)
 
 
-def lattice_images(sums: LatticeSums, k: Array, n: Array) -> Array:
+def lattice_images(sums: LatticeSums, k: Rows, n: Rows) -> Array:
     """Taylor coefficient k of Σ' (z − P)^-n for odd n, shape (len(k), len(n))."""
     k, n = k[:, None], n[None, :]
     halved = np.exp(

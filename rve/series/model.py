@@ -32,7 +32,7 @@ class SeriesModel:
             rule in θ; in [1e-12, 0.1].
 
     Raises:
-        ValueError: A value lies outside its range.
+        RefusedError: A value lies outside its range.
     """
 
     points: int | None = None
@@ -58,8 +58,7 @@ class SeriesModel:
 
         def stiffness_at(radii: Array) -> Array:
             cells = square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-            for radius, error, harmonics in zip(radii, cells.errors, cells.harmonics, strict=True):
-                used[float(radius)] = error, harmonics
+            used.update(zip(radii, zip(cells.errors, cells.harmonics, strict=True), strict=True))
             return cells.matrix
 
         curves, gaps, finest = settle_rule(

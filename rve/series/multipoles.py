@@ -28,7 +28,7 @@ from functools import cache, cached_property
 import numpy as np
 from scipy.special import gammaln
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, LatticeSums, lattice_images, lattice_sums
 
@@ -60,12 +60,12 @@ class Contrast:
     @cached_property
     def ratio(self) -> Array:
         """λ = μ_m / μ_i."""
-        return self.mu / self.mu_i
+        return np.asarray(self.mu / self.mu_i)
 
     @cached_property
     def outer(self) -> Array:
         """The factor of a_n."""
-        return (1 - self.ratio) / (self.kappa + self.ratio)
+        return np.asarray((1 - self.ratio) / (self.kappa + self.ratio))
 
     @cached_property
     def inner(self) -> Array:
@@ -95,15 +95,15 @@ class Family:
         b_to_q: q at the orders `a` per b_n.
     """
 
-    a: Array
-    b: Array
+    a: Rows
+    b: Rows
     to_p: Array
     to_next: Array
     a_to_q: Array
     b_to_q: Array
 
 
-def _conjugate_images(sums: LatticeSums, k: Array, n: Array) -> Array:
+def _conjugate_images(sums: LatticeSums, k: Rows, n: Rows) -> Array:
     """Taylor coefficient k of n Σ' conj(P) (z − P)^(-n-1) for odd n."""
     k, n = k[:, None], n[None, :]
     halved = np.exp(gammaln(n + k + 1) - gammaln(n + 1) - gammaln(k + 1) - (n + k) * np.log(2))
@@ -141,7 +141,7 @@ def multipoles(load: str, radius: Array, contrast: Contrast, *, harmonics: int) 
     """
     kind = family(harmonics, hydrostatic=load == "hydrostatic")
     matrices, sources = _system(kind, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
-    return np.linalg.solve(matrices, sources[..., None])[..., 0]
+    return np.asarray(np.linalg.solve(matrices, sources[..., None])[..., 0])
 
 
 def _system(

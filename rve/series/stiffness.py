@@ -1,4 +1,4 @@
-"""Stiffness of the one-particle cell by multipole series, to a given error."""
+"""Stiffness of the one-particle cell by multipole series, to a declared error."""
 
 from __future__ import annotations
 
@@ -61,13 +61,13 @@ def square_stiffness(
         matrix: Material outside the particle.
         inclusions: Materials of the particle, m of them.
         tolerance: Relative truncation error allowed, at least 1e-13.
-        loads: Which moduli are wanted, of `LOADS`; the others are returned as nan.
+        loads: Those solved, of `LOADS`; the moduli of others are nan.
 
     Returns:
         Moduli of shape (n, m).
 
     Raises:
-        ValueError: A radius lies outside [0, 1).
+        RefusedError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (particles nearly in touch).
     """
     radius, count = require_radii(radius), len(inclusions)
@@ -111,12 +111,12 @@ def _solve_batch(
     deviator and shear do.
     """
     counts = count, count + max(2, count // 4), count + max(4, count // 2)
-    found = np.full((len(counts), radius.size, contrast.kappa_i.size, len(LOADS)), np.nan)
+    moduli = np.full((len(counts), radius.size, contrast.kappa_i.size, len(LOADS)), np.nan)
     for load in loads:
-        found[..., LOADS.index(load)] = [
+        moduli[..., LOADS.index(load)] = [
             modulus(load, multipoles(load, radius, contrast, harmonics=n), radius, contrast)
             for n in counts
         ]
-    gap = np.nan_to_num(error_by_more_terms(*with_ratio(found)))
+    gap = np.nan_to_num(error_by_more_terms(*with_ratio(moduli)))
     gap[..., 3] = np.maximum(gap[..., 3], _SHARED_BY_RATIO * gap[..., 1:3].max(axis=-1))
-    return found[0], _ROUND_OFF / 10 + _SAFETY * gap
+    return moduli[0], _ROUND_OFF / 10 + _SAFETY * gap

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError, RefusedError
 
 Solve = Callable[[Array, int], tuple[Array, Array]]
 
 
-class SeriesError(RuntimeError):
-    """The multipole series does not reach the wanted tolerance."""
+class SeriesError(FailedError):
+    """The multipole series does not reach its tolerance."""
 
 
 @dataclass(frozen=True)
@@ -61,22 +62,22 @@ class Truncation:
             SeriesError: `most` terms do not suffice.
         """
         shape = (radius.size, inclusions)
-        moduli, found = np.zeros((*shape, 3)), np.full((*shape, errors), np.inf)
+        moduli, error = np.zeros((*shape, 3)), np.full((*shape, errors), np.inf)
         used, todo = np.zeros(shape, int), np.arange(radius.size)
         terms = np.minimum(first, self.most)
         while todo.size:
             for count in np.unique(terms[todo]):
                 rows = todo[terms[todo] == count]
                 # what is settled stays, whatever its companions need
-                open_ = found[rows, :, :3].max(axis=2) > tolerance
+                open_ = error[rows, :, :3].max(axis=2) > tolerance
                 values, left = solve(rows, int(count))
                 moduli[rows] = np.where(open_[..., None], values, moduli[rows])
-                found[rows] = np.where(open_[..., None], left, found[rows])
+                error[rows] = np.where(open_[..., None], left, error[rows])
                 used[rows] = np.where(open_, count, used[rows])
-            todo = todo[found[todo, :, :3].max(axis=(1, 2)) > tolerance]
-            self._refuse(radius[todo], terms[todo], found[todo, :, :3], tolerance)
+            todo = todo[error[todo, :, :3].max(axis=(1, 2)) > tolerance]
+            self._refuse(radius[todo], terms[todo], error[todo, :, :3], tolerance)
             terms[todo] = np.minimum(self.following(terms[todo]), self.most)
-        return moduli, found, used
+        return moduli, error, used
 
     def _refuse(self, radius: Array, terms: Array, errors: Array, tolerance: float) -> None:
         """Raise where no more terms are to be had."""
@@ -84,8 +85,9 @@ class Truncation:
         if stuck.any():
             raise SeriesError(
                 f"the series at r = {radius[stuck].max():.6g} reaches a relative error of"
-                f" {errors[stuck].max():.1e} with {self.most} {self.terms} and {tolerance:.1e} is"
-                f" wanted: {self.particles} nearly touch; lower the radius or raise the tolerance"
+                f" {errors[stuck].max():.1e} with {self.most} {self.terms}, {tolerance:.1e} is"
+                f" allowed: {self.particles} nearly touch",
+                "lower the radius or raise the tolerance",
             )
 
 
@@ -101,10 +103,10 @@ def require_radii(radius: Array) -> Array:
     """The radii as an array, refused outside [0, 1).
 
     Raises:
-        ValueError: A radius lies outside.
+        RefusedError: A radius lies outside.
     """
     radius = np.atleast_1d(np.asarray(radius, float))
     if not (np.all(radius >= 0) and np.all(radius < 1)):
-        worst = radius[np.argmax(np.abs(radius - 0.5))]
-        raise ValueError(f"a radius is {worst:g} halves of the cell's side; it must lie in [0, 1)")
+        worst = float(radius[np.argmax(np.abs(radius - 0.5))])
+        raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
     return radius

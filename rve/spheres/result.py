@@ -75,8 +75,11 @@ def certified_spheres(
     limits = hashin_shtrikman(fraction, *phases)
     scale, bulk = float(abs(mean).max()), result.moduli[0]
     least, greatest = limits[0] @ weights
-    pairs = zip(cubic_moduli(np.asarray(result.curve.stiffness)), limits[1].T, strict=True)
-    sheared = [shear_against_trace_bounds(*moduli[1:], ends, phases) for moduli, ends in pairs]
+    nodes = cubic_moduli(np.asarray(result.curve.stiffness)).tolist()
+    sheared = [
+        shear_against_trace_bounds(deviator, shear, ends, phases)
+        for (_, deviator, shear), ends in zip(nodes, limits[1].T, strict=True)
+    ]
     checks = {
         "symmetry": float(abs(mean - mean.T).max()) / scale,
         "reuss": max(0.0, -float(np.linalg.eigvalsh(mean - low)[0])) / scale,

@@ -121,7 +121,8 @@ class ConjugateGradient:
 def inner(first: Array, second: Array) -> Array:
     """Inner products of fields, shape (loads,)."""
     count = len(first)
-    return np.einsum("bn,bn->b", first.reshape(count, -1), second.reshape(count, -1))
+    pairs = first.reshape(count, -1), second.reshape(count, -1)
+    return np.asarray(np.einsum("bn,bn->b", *pairs))
 
 
 def _radau(excess: Array, change: Array, least: float) -> Array:

@@ -95,7 +95,8 @@ def airy_element(aspect: float = 1.0) -> Element:
     value, slope, bend = _tables(basis)
     places = list(product(range(2), repeat=4))  # y, slope in y, x, slope in x
     first, second = np.kron(bend, value) / aspect**2, np.kron(value, bend)
-    modes, constants = _stacked(first + second, first - second, -2 * np.kron(slope, slope) / aspect)
+    mixed = np.asarray(-2 * np.kron(slope, slope) / aspect)
+    modes, constants = _stacked(first + second, first - second, mixed)
     origin, slope_y, slope_x = places.index((0, 0, 0, 0)), places.index((0, 1, 0, 0)), 1
 
     def anchors(y: int, dy: int, x: int, dx: int) -> tuple[int, ...]:

@@ -82,8 +82,8 @@ def energies(
             error[k] += np.einsum("rfyx,yx->f", rounding[rows] ** 2, weight[lines])
     value = np.empty((len(weights), count, count))
     for k, parts in enumerate(sums):
-        rows = np.concatenate(parts).reshape(-1, count**2).T
-        value[k] = np.reshape([math.fsum(row) for row in rows], (count, count)) / pixels
+        entries = np.concatenate(parts).reshape(-1, count**2).T
+        value[k] = np.reshape([math.fsum(one) for one in entries], (count, count)) / pixels
     summed = SAFETY * (piece + COEFFICIENT + 4) * UNIT
     return Energies(value, np.sqrt(SAFETY * error / pixels), summed)
 

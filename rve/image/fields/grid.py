@@ -44,7 +44,7 @@ class Operator:
         return result
 
     def load(self, mean_modes: Array) -> Array:
-        """Minus the operator on uniform fields of the given modes, shape (mode rows, loads)."""
+        """Minus the operator on uniform fields of some modes, shape (mode rows, loads)."""
         count = mean_modes.shape[1]
         result = np.zeros((count, self.element.unknowns, *self.trace.shape))
         forces = [-self.element.modes[p].T @ mean_modes[p] for p in self.element.parts]

@@ -99,4 +99,4 @@ def symbol(element: Element, constant: Reference, ky: Array, kx: Array) -> Compl
     rise, run = up - up[:, None] + 1, right - right[:, None] + 1
     np.add.at(table, (rise, run, kind[:, None], kind), matrix)
     waves_y, waves_x = (np.exp(1j * np.outer(k, (-1, 0, 1))) for k in (ky, kx))
-    return np.einsum("yr,xs,rsab->yxab", waves_y, waves_x, table, optimize=True)
+    return np.asarray(np.einsum("yr,xs,rsab->yxab", waves_y, waves_x, table, optimize=True))

@@ -37,7 +37,9 @@ class Side:
 
     def coefficients(self, bulk: Array, shear: Array) -> tuple[Array, Array]:
         """Coefficients of trace and deviator from plane bulk and shear moduli."""
-        return (bulk, shear) if self.stiff else (0.25 / bulk, 0.25 / shear)
+        if self.stiff:
+            return bulk, shear
+        return np.asarray(0.25 / bulk), np.asarray(0.25 / shear)
 
 
 DISPLACEMENT = Side("displacement", displacement_element, stiff=True)
@@ -82,7 +84,8 @@ def solve_side(
         start: Fields to start from, on the divided pixels.
     """
     element, whole = side.element(aspect), side.coefficients(bulk, shear)
-    trace, deviator = (np.kron(one, np.ones((division, division))) for one in whole)
+    parts = np.ones((division, division))
+    trace, deviator = (np.asarray(np.kron(one, parts)) for one in whole)
     begin = None if start is None else _of_solved_loads(start)
     fields, iterations = _fields(element, trace, deviator, solver, begin)
     fields = _of_unit_loads(fields)
@@ -127,7 +130,7 @@ def _of_unit_loads(fields: Array) -> Array:
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
-    """Total energy that no field with the given means is below, shape (loads,)."""
+    """Total energy that no field of these means is below, shape (loads,)."""
     return np.asarray(
         sum(
             c.size / np.mean(1 / c) * np.sum(modes[part] ** 2, axis=0)

@@ -37,15 +37,15 @@ def harmonics(points: Array, highest: int, order: int) -> Array:
     radius = np.linalg.norm(points, axis=1)
     cosine = points[:, 2] / radius
     flat = (points[:, 0] + 1j * points[:, 1]) / radius  # sin θ exp(iφ)
-    found = np.zeros((highest + 1, len(points)))
+    values = np.zeros((highest + 1, len(points)))
     if order > highest:
-        return found
+        return values
     factors = np.sqrt((2 * np.arange(1, order + 1) - 1) / (2 * np.arange(1, order + 1)))
-    found[order] = (-1) ** order * np.prod(factors) * (flat**order).real
+    values[order] = (-1) ** order * np.prod(factors) * (flat**order).real
     for n in range(order + 1, highest + 1):
-        before = np.sqrt((n - 1) ** 2 - order**2) * found[n - 2] if n > order + 1 else 0.0
-        found[n] = ((2 * n - 1) * cosine * found[n - 1] - before) / np.sqrt(n**2 - order**2)
-    return found
+        before = np.sqrt((n - 1) ** 2 - order**2) * values[n - 2] if n > order + 1 else 0.0
+        values[n] = ((2 * n - 1) * cosine * values[n - 1] - before) / np.sqrt(n**2 - order**2)
+    return values
 
 
 @cache

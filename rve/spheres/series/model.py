@@ -24,7 +24,7 @@ class SphereSeriesModel:
     """As `SeriesModel`, for spheres; `accuracy`, in [1e-11, 0.1], is that of the mean moduli.
 
     Raises:
-        ValueError: A value lies outside its range.
+        RefusedError: A value lies outside its range.
     """
 
     points: int | None = None

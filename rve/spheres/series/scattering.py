@@ -39,7 +39,7 @@ def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
     singular[centre, :, 1], singular[centre, 1, :] = 0.0, 0.0
     singular[centre, 1, 1], regular[centre, 1, :] = 1.0, 0.0
     torsion = (n - 1) * (soft - stiff) / ((n + 2) * soft + (n - 1) * stiff)
-    return np.linalg.solve(singular, regular), torsion
+    return np.asarray(np.linalg.solve(singular, regular)), np.asarray(torsion)
 
 
 def _surface_stiffness(n: Array, poisson: float) -> Array:

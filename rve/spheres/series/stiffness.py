@@ -1,4 +1,4 @@
-"""Stiffness of the simple cubic array of spheres by multipole series, to a given error."""
+"""Stiffness of the simple cubic array of spheres by multipole series, to a declared error."""
 
 from __future__ import annotations
 

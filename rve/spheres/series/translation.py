@@ -75,17 +75,17 @@ def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
     """
     poles = Multipoles.of(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
-    found = np.zeros((poles.n.size, poles.n.size))
+    coupling = np.zeros((poles.n.size, poles.n.size))
     for to, of in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
         rows, columns = np.flatnonzero(poles.kind == to), np.flatnonzero(poles.kind == of)
         k, j = poles.n[rows, None], poles.m[rows, None]
         n, m = poles.n[None, columns], poles.m[None, columns]
         mirror = (-1.0 if of == 2 else 1.0) * (-1.0 if shear else 1.0) * (m > 0)
-        found[np.ix_(rows, columns)] = _coupling(to, of, _Pair(n, m, k, j), poisson, sums)
-        found[np.ix_(rows, columns)] += mirror * _coupling(
+        coupling[np.ix_(rows, columns)] = _coupling(to, of, _Pair(n, m, k, j), poisson, sums)
+        coupling[np.ix_(rows, columns)] += mirror * _coupling(
             to, of, _Pair(n, -m, k, j), poisson, sums
         )
-    return _made_periodic(found, poles, poisson, shear=shear)
+    return _made_periodic(coupling, poles, poisson, shear=shear)
 
 
 @dataclass(frozen=True)
@@ -142,15 +142,15 @@ def _lifted(at: _Pair) -> Array:
     return np.asarray(1.0 * p * q * a * b - sides / 2)
 
 
-def _made_periodic(found: Array, poles: Multipoles, poisson: float, *, shear: bool) -> Array:
+def _made_periodic(coupling: Array, poles: Multipoles, poisson: float, *, shear: bool) -> Array:
     """Add the uniform strain that gives the sums of degree −2 no mean strain."""
     m = 2 if shear else 0
     # of solution 3, a polarised ball: less its strain by Eshelby
-    found[poles.place(1, 2, m), poles.place(3, 2, m)] -= (
+    coupling[poles.place(1, 2, m), poles.place(3, 2, m)] -= (
         16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)
     )
     if not shear:  # the periodic 1/r has the Laplacian 4π/V besides its poles: strain 4π/(3V)
-        found[poles.place(3, 0, 0), poles.place(1, 0, 0)] -= (
+        coupling[poles.place(3, 0, 0), poles.place(1, 0, 0)] -= (
             4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
         )
-    return found
+    return coupling
