@@ -39,7 +39,7 @@ class Case:
 
     @property
     def is_paper(self) -> bool:
-        """Whether studies name figures of the paper."""
+        """True if studies name figures of the paper."""
         return any(study.figures for study in self.content.study)
 
     def traces(self) -> dict[str, str]:

@@ -44,7 +44,7 @@ class Structure:
 
     @property
     def takes_modulus(self) -> bool:
-        """Whether Young's modulus is a parameter of it."""
+        """True if Young's modulus is a parameter of it."""
         return "E" in self.numbers
 
     def with_modulus(self, number: FuzzyNumber | None) -> Structure:

@@ -95,12 +95,12 @@ class Frame(Section):
 
     @property
     def damped(self) -> bool:
-        """Whether any damper is there."""
+        """True if any damper is there."""
         return any(number.support.upper > 0 for number in self.dampers)
 
     @property
     def is_whole(self) -> bool:
-        """Whether it needs no modulus of a stage."""
+        """True if it needs no modulus of a stage."""
         return self.modulus is not None or self.stiffness is not None
 
     @property

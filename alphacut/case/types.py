@@ -26,7 +26,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
     def names(self, key: str) -> bool:
-        """Whether the file gives the key, so that no default stands in."""
+        """True if the file gives the key, so that no default stands in."""
         return key in self.model_fields_set
 
 
@@ -82,7 +82,7 @@ class Quantity:
         return number
 
     def holds(self, value: float) -> bool:
-        """Whether a value is in the range."""
+        """True if a value is in the range."""
         return self.above < value < self.below and self.least <= value <= self.most
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:

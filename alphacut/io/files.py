@@ -68,7 +68,7 @@ def leave(status: int) -> NoReturn:
 
 
 def is_special(path: Path) -> bool:
-    """Whether this is a device, a pipe or a socket, that nothing may replace."""
+    """True if this is a device, a pipe or a socket, that nothing may replace."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 

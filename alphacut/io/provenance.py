@@ -56,9 +56,9 @@ def version_of(distribution: str) -> str:
 @cache
 def versions() -> dict[str, str]:
     """Versions of alphacut, Python and of the packages that are installed."""
-    found = {"alphacut": own_version(), "python": platform.python_version()}
-    told = {name: version_of(distribution) for name, distribution in PACKAGES.items()}
-    return found | {name: known for name, known in told.items() if known}
+    own = {"alphacut": own_version(), "python": platform.python_version()}
+    others = {name: version_of(distribution) for name, distribution in PACKAGES.items()}
+    return own | {name: known for name, known in others.items() if known}
 
 
 def sources(package: str) -> list[tuple[str, Path]]:

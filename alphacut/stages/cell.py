@@ -89,12 +89,12 @@ class CellChoice:
 
     @property
     def averages(self) -> bool:
-        """Whether E and ν are those of the isotropic average of a plane stiffness."""
+        """True if E and ν are those of the isotropic average of a plane stiffness."""
         return self.average == "isotropic" and self.particles == "cylinders"
 
     @property
     def meaning(self) -> str:
-        """What E and ν are of: cylinders (eq. 16), isotropic or spheres."""
+        """Average that E and ν are of: cylinders (eq. 16), isotropic or spheres."""
         return "isotropic" if self.averages else self.particles
 
     def model(self) -> CellModel:

@@ -55,7 +55,7 @@ class ImageStudy:
 
     @property
     def fuzzy_phases(self) -> bool:
-        """Whether the moduli depend on the level."""
+        """True if the moduli depend on the level."""
         return any(number.support.width > 0 for pair in self.cell.pairs for number in pair)
 
     def phases(self, level: Level) -> list[ModuliInterval]:

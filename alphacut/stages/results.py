@@ -60,7 +60,7 @@ class Results:
 
     @property
     def is_paper(self) -> bool:
-        """Whether figures bear the paper's numbers."""
+        """True if figures bear the paper's numbers."""
         return any(task.figures for task in self.tasks)
 
     @property

@@ -103,7 +103,7 @@ class Store:
         write_dataset(dataset, self.file(f"{stage.name}.nc"), facts)
 
     def current(self, stage: Stage) -> bool:
-        """Whether the file of a stage may be taken, which is then said."""
+        """True if the file of a stage may be taken, which is then said."""
         path = self.file(f"{stage.name}.nc")
         if self.fresh or not path.is_file() or fingerprint_of(path) != stage.key:
             return False
