@@ -35,6 +35,24 @@ def summary_of(case, folder, changes=()):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
+STRENGTH = {"inner": 0, "attained": 0, "searched": 0, "estimated": 1, "guaranteed": 2}
+
+
+def as_sure(new, old):
+    """Whether a result's nature is no weaker than it was."""
+    first, second = (STRENGTH[one["nature"].replace(",", " ").split()[0]] for one in (new, old))
+    assert first >= second, (new["nature"], old["nature"])
+
+
+def same_decision(new, old):
+    """Whether the degrees to which limits are passed are bounded as closely and as surely."""
+    for name, one in old["limits"].items():
+        as_sure(new["limits"][name], one)
+        for degree in ("possibility", "necessity"):
+            (least, most), (low, high) = new["limits"][name][degree], one[degree]
+            assert low - 1e-9 <= least <= most <= high + 1e-9, (name, degree)
+
+
 def relative_error(modulus):
     """The declared relative error of E, all its sources together."""
     error = modulus["error"]
@@ -44,6 +62,7 @@ def relative_error(modulus):
 def same_modulus(new, old):
     """Whether the cuts of E agree to within both errors."""
     assert new["alpha"] == pytest.approx(old["alpha"], rel=1e-12)
+    as_sure(new, old)
     modal = relative_error(new) + relative_error(old)  # at α = 1
     share = 2 * modal + 1e-9  # small particles, of which α = 0 has more, are coarser
     for side in ("lower", "upper"):
@@ -53,6 +72,7 @@ def same_modulus(new, old):
 def same_envelope(new, old):
     """Whether least and greatest values of each output agree to within both errors."""
     assert set(old["min"]) <= set(new["min"])
+    as_sure(new, old)
     for output, low in old["min"].items():
         peak = max(abs(low), abs(old["max"][output]))
         errors = [study.get("error", {}).get(output) for study in (new, old)]
@@ -73,7 +93,7 @@ def overlapping_cuts(new, old):
 
 def compare(new, old):
     """Compare what both summaries have; at least one thing."""
-    parts = {"modulus": same_modulus}
+    parts = {"modulus": same_modulus, "decision": same_decision}
     shared = [name for name in parts if name in new and name in old]
     for name in shared:
         parts[name](new[name], old[name])
