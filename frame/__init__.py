@@ -1,5 +1,6 @@
 """Vibration of structures with fuzzy parameters."""
 
+from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint, RungeKutta4
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -20,8 +21,8 @@ from alphacut.frame.structures.quantities import Output, Parameter
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "Envelope", "Exact", "FollowerRecord",
-    "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem", "LinearFlow",
-    "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4", "Sampled",
-    "Search", "StoreyFrame", "beside", "envelope", "pendulum", "record",
+    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact",
+    "FollowerRecord", "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
+    "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
+    "Sampled", "Search", "StoreyFrame", "beside", "envelope", "pendulum", "record",
 ]  # fmt: skip

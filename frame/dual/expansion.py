@@ -17,6 +17,7 @@ import numpy as np
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
+Key = int | slice | Rows | tuple[int | slice | Rows | None, ...]
 ROUND_OFF = 1e-11
 """Share of a function's size that covers the round-off of its coefficients."""
 
@@ -91,12 +92,15 @@ class Expansion:
 
     def on(self, inputs: Rows) -> Expansion:
         """The same as functions of some inputs alone; they depend on no others."""
-        parts = (part[(..., *np.ix_(*[inputs] * m))] for m, part in enumerate(self.parts))
+        parts = list(self.parts)
+        for m in range(1, 4):
+            for axis in range(1, m + 1):
+                parts[m] = np.take(parts[m], inputs, -axis)
         return Expansion(tuple(parts), self.rest)
 
-    def __getitem__(self, key: object) -> Expansion:
+    def __getitem__(self, key: Key) -> Expansion:
         """Some of the functions; `key` acts on V."""
-        return Expansion(tuple(part[key] for part in self.parts), self.rest[key])  # type: ignore[index]
+        return Expansion(tuple(part[key] for part in self.parts), self.rest[key])
 
     def __add__(self, other: Expansion | Array | float) -> Expansion:
         """Their sum."""

@@ -77,8 +77,7 @@ def tables(
             error = [w.error + ROUND_OFF * x for w, x in zip(waves, largest, strict=True)]
             of_mode[order][1].append(np.stack(error))
             of_mode[order][2].append(np.stack([w.stray for w in waves]))
-    columns = [{o: np.stack(of_mode[o][i]) for o in orders} for i in range(3)]
-    value, error, stray = columns
+    made = [{o: np.stack(of_mode[o][i]) for o in orders} for i in range(3)]
     middle, half, group_stray = dict[int, Array](), dict[int, Array](), dict[int, Array]()
     if group is not None:
         grid = _grid(group.omega_range, group.quotient_range, OF_GROUP)
@@ -89,7 +88,7 @@ def tables(
             middle[order] = (ends[0] + ends[1]) / 2
             half[order] = (ends[1] - ends[0]) / 2 + np.stack([w.error for w in waves])
             group_stray[order] = np.stack([w.stray for w in waves])
-    return Tables(value, error, stray, grids, middle, half, group_stray, time)
+    return Tables(made[0], made[1], made[2], grids, middle, half, group_stray, time)
 
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:

@@ -26,7 +26,9 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
+from alphacut.frame.dual.attained import attained
 from alphacut.frame.dual.expansion import Expansion
+from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, UncoveredError, classical
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -117,9 +119,6 @@ class DualProof:
         self, flow: LinearFlow, cuts: Boxes, a: int, peak: Array, within: _Bounded | None
     ) -> _Bounded:
         """Bounds of one level; what the level inside it attains is attained here too."""
-        from alphacut.frame.dual.attained import attained  # Numba takes time to import
-        from alphacut.frame.dual.level import Level
-
         low, high = cuts.lower[a], cuts.upper[a]
         active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
         margin = ROUNDING * peak[:, None]
@@ -185,14 +184,15 @@ def over_box(
 ) -> Classical:
     """The structure over a box of its inputs, of which those `active` have a width."""
     inputs, d = Expansion.inputs(centre[active], radius[active]), len(active)
-    values = {**system.parameters, **dict(zip(names, centre.tolist(), strict=True))}
-    p = {name: Expansion.constant(float(x), d) for name, x in values.items()}
+    own = {name: float(x) for name, x in zip(names, centre, strict=True)}
+    values = {**system.parameters, **own}
+    p = {name: Expansion.constant(x, d) for name, x in values.items()}
     p |= {names[i]: inputs[place] for place, i in enumerate(active)}
     return classical(system, p)
 
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
     """What moves the structure: load, velocity, start."""
-    moved = structure.start.size().any(-1)
+    moved = np.asarray(structure.start.size().any(-1))
     present = {"load": system.ground is not None, "velocity": moved[1], "start": moved[0]}
     return tuple(name for name, is_there in present.items() if is_there)
