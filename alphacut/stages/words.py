@@ -19,7 +19,7 @@ def run_tables(summary: Document) -> str:
     text = text_table(MODULUS, rows) if (rows := [*modulus_rows(summary)]) else ""
     studies = summary.get("envelopes", {})
     if studies:
-        text += "\n" * bool(text) + peaks_table(studies)
+        text += peaks_table(studies)
     return text + "".join(f"{line}\n" for line in answers(summary))
 
 
@@ -33,7 +33,7 @@ def modulus_rows(summary: Document) -> Iterator[Sequence[str]]:
         yield ("E, GPa", *both(cell["E_GPa"]), nature(cell["nature"]), f"{error:.1e}")
         yield ("ν", *both(cell["nu_cuts"]), nature(cell["nature"]), "")
         low, high = cell["references"]["hashin_shtrikman_E_GPa"]
-        yield ("Hashin–Shtrikman bounds of E, GPa", between(low, high), "", "", "")
+        yield ("Hashin–Shtrikman, GPa", between(low, high), "", "", "")
     if image := summary.get("image"):
         cuts = image["cuts"]
         yield ("E, GPa", *both(cuts["E_GPa"]), nature(cuts["nature"][0]), "")
@@ -68,7 +68,7 @@ def peaks_table(studies: Document) -> str:
     first = next(iter(studies.values()))
     alpha = [float(x) for x in first["alpha"]]
     levels = list(dict.fromkeys((len(alpha) - 1, middle(alpha), 0)))
-    head = ["largest magnitude", *(f"α = {alpha[k]:g}" for k in levels), "nature", "± error"]
+    head = ["peak of", *(f"α = {alpha[k]:g}" for k in levels), "nature", "± error"]
     rows = []
     for name, study in studies.items():
         for output, peak in study["peak"].items():
@@ -105,12 +105,17 @@ def answers(summary: Document) -> Iterator[str]:
         yield from learned(summary["update"])
     for question in QUESTIONS:
         for row in question.rows(summary[question.key]) if question.key in summary else ():
-            yield ": ".join([row[0], ", ".join(filter(None, row[1:]))])
+            yield f"{row[0]}: {row[1]} ({row[2]})"
     shares = summary.get("shares", {})
-    for of in dict.fromkeys([*[name for name in ("E",) if name in shares], *list(shares)[-1:]]):
-        ranked = sorted(shares[of].items(), key=lambda pair: -pair[1])[:3]
-        words = ", ".join(f"{name} {share:.0%}" for name, share in ranked)
-        yield f"the width of {of} comes from {words}"
+    names = dict.fromkeys([*(name for name in ("E",) if name in shares), *list(shares)[-1:]])
+    if names:
+        yield "width comes from " + "; ".join(f"{name}: {_ranked(shares[name])}" for name in names)
+
+
+def _ranked(shares: Document) -> str:
+    """The three largest shares, the largest first."""
+    first = sorted(shares.items(), key=lambda pair: -pair[1])[:3]
+    return ", ".join(f"{name} {share:.0%}" for name, share in first)
 
 
 def learned(document: Document) -> Iterator[str]:
