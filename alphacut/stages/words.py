@@ -107,7 +107,8 @@ def answers(summary: Document) -> Iterator[str]:
         for row in question.rows(summary[question.key]) if question.key in summary else ():
             yield f"{row[0]}: {row[1]} ({row[2]})"
     shares = summary.get("shares", {})
-    names = dict.fromkeys([*(name for name in ("E",) if name in shares), *list(shares)[-1:]])
+    outputs = [name for name in shares if name not in ("E", "ν")]
+    names = [*(name for name in shares if name == "E"), *outputs[-1:]]
     if names:
         yield "width comes from " + "; ".join(f"{name}: {_ranked(shares[name])}" for name in names)
 
