@@ -1,48 +1,27 @@
-"""An image and the proved bounds of its E."""
+"""An image as it was segmented, and the proved bounds of E."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from alphacut.figures.style import BLUE, INK, figure
+from alphacut.figures.style import WIDTH, membership_axes, shaded_cuts, title
 from alphacut.stages.cell import GPA
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def image(found: xarray.Dataset) -> Figure:
-    """Phases and α-cuts of E."""
-    drawn, first = figure(height=3.0)
-    first.remove()
-    grid = drawn.add_gridspec(1, 2)
-    phases(drawn.add_subplot(grid[0]), found)
-    cuts(drawn.add_subplot(grid[1]), found)
+def image(dataset: xarray.Dataset) -> Figure:
+    """Phases as greys to the left, α-cuts of E to the right."""
+    import matplotlib.pyplot as plt
+
+    drawn, (picture, cuts) = plt.subplots(1, 2, figsize=(WIDTH, 3.4), width_ratios=(1, 1.4))
+    picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
+    picture.set_xticks([])
+    picture.set_yticks([])
+    title(picture, "phases as segmented")
+    lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
+    shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
+    membership_axes(cuts, "Young's modulus E, plane strain (GPa)")
     return drawn
-
-
-def phases(axes: Axes, found: xarray.Dataset) -> None:
-    """The number of each pixel's phase as grey."""
-    plane(axes, "phases").imshow(found["phase"].values, origin="lower", cmap="Greys_r")
-
-
-def plane(axes: Axes, title: str) -> Axes:
-    """Axes of a picture, without ticks."""
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.set_title(title, fontsize=9)
-    return axes
-
-
-def cuts(axes: Axes, found: xarray.Dataset) -> None:
-    """The α-cuts of E."""
-    alpha, ends = found["alpha"].values, found["E"].values / GPA
-    for level, pair in zip(alpha, ends, strict=True):
-        axes.plot(pair, [level, level], color=BLUE, lw=2)
-    axes.plot(ends.ravel(order="F"), np.tile(alpha, 2), ".", color=INK, ms=3)
-    axes.set_xlabel("E, GPa")
-    axes.set_ylabel("α")

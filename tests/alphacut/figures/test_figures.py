@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, modulus, shares, style
+from alphacut.figures import envelope, image, modulus, shares, style
 from alphacut.figures.captions import caption
 from tests.alphacut.one_case import run
 
@@ -97,3 +97,18 @@ def test_samples_have_the_membership_of_their_least_input():
 )
 def test_captions(stem, paper, words):
     assert caption(stem, paper=paper) == words
+
+
+def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
+    data = xarray.Dataset(
+        {
+            "E": (("alpha", "bound"), [[20e9, 30e9], [24e9, 25e9]]),
+            "phase": (("y", "x"), np.eye(4)),
+        },
+        {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]},
+    )
+    with style.style():
+        picture, cuts = image.image(data).axes
+    assert picture.images[0].get_array().shape == (4, 4)
+    ends = np.concatenate([line.get_xdata() for line in cuts.lines])
+    assert (ends.min(), ends.max()) == pytest.approx((20, 30))
