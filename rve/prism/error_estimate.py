@@ -41,7 +41,7 @@ def judged(result: Homogenised) -> Homogenised:
         mean, nodes = _by_series(curve, cell) if cell.square else _by_slices(curve, cell)
     except (SeriesError, RuleError):
         mean, nodes = _by_bounds(curve, cell)
-    return replace(result, curve=replace(curve, error=nodes), errors={"elements": mean})
+    return replace(result, curve=replace(curve, error=nodes), errors={"space": mean})
 
 
 def _by_series(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
