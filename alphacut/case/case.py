@@ -37,11 +37,6 @@ class Case:
         """The stages that a run computes."""
         return self.content.stages
 
-    @property
-    def is_paper(self) -> bool:
-        """True if studies name figures of the paper."""
-        return any(study.figures for study in self.content.study)
-
     def traces(self) -> dict[str, str]:
         """Digest of each section; "" of those that the file does not have."""
         names = (name for name in CONTENT.model_fields if name not in ("title", "about"))

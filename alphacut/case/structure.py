@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from alphacut.frame import INTEGRATORS, LinearFlow, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
@@ -46,12 +46,6 @@ class Structure:
     def takes_modulus(self) -> bool:
         """True if Young's modulus is a parameter of it."""
         return "E" in self.numbers
-
-    def with_modulus(self, number: FuzzyNumber | None) -> Structure:
-        """The structure with another Young's modulus in Pa, where it takes one."""
-        if number is None or self.frame is None or not self.takes_modulus:
-            return self
-        return Structure(replace(self.frame, modulus=number.modal), {**self.numbers, "E": number})
 
     def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
         """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.

@@ -55,11 +55,6 @@ def nature(text: str) -> str:
     return SHORT.get(text.partition(",")[0].partition(":")[0].split()[0], text.split(",")[0])
 
 
-def motion_table(name: str, study: Document) -> str:
-    """Peaks of one envelope."""
-    return peaks_table({name: study})
-
-
 def peaks_table(studies: Document) -> str:
     """Peaks of the magnitude of every output of every study.
 
