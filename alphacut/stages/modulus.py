@@ -110,7 +110,7 @@ class CellTask:
     @property
     def theta(self) -> Array:
         """The θ at which stress curves are stored, shape (SHOWN,)."""
-        return np.linspace(self.family.law.lower, self.family.law.upper, SHOWN)
+        return np.asarray(np.linspace(self.family.law.lower, self.family.law.upper, SHOWN))
 
     @property
     def identity(self) -> Document:

@@ -75,10 +75,10 @@ def certified_spheres(
     limits = hashin_shtrikman(fraction, *phases)
     scale, bulk = float(abs(mean).max()), result.moduli[0]
     least, greatest = limits[0] @ weights
-    nodes = cubic_moduli(np.asarray(result.curve.stiffness)).tolist()
+    nodes = cubic_moduli(np.asarray(result.curve.stiffness))
     sheared = [
-        shear_against_trace_bounds(deviator, shear, ends, phases)
-        for (_, deviator, shear), ends in zip(nodes, limits[1].T, strict=True)
+        shear_against_trace_bounds(float(nodes[k, 1]), float(nodes[k, 2]), ends, phases)
+        for k, ends in enumerate(limits[1].T)
     ]
     checks = {
         "symmetry": float(abs(mean - mean.T).max()) / scale,
