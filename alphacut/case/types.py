@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
@@ -202,13 +202,8 @@ def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
     return values
 
 
-def after(check: Callable[[Any], Any]) -> Any:
-    """A check of a value that has its type."""
-    from pydantic import AfterValidator
-
-    return AfterValidator(check)
-
-
+after = AfterValidator
+"""A check of a value that has its type."""
 CaseFile = Annotated[Path, Text(case_file)]
 Names = Annotated[tuple[str, ...], Some, after(unlike)]
 

@@ -7,14 +7,14 @@ import time
 from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from alphacut.case.case import Case
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.files import as_json, rank, say, write_text
+from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.output_paths import alone, require_writable
 from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.stages import shares
@@ -49,9 +49,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     return 0
 
 
-def computed(
-    case: Case, store: Store, petsc: Mapping[str, str], *, figures: bool
-) -> dict[str, Any]:
+def computed(case: Case, store: Store, petsc: Mapping[str, str], *, figures: bool) -> Document:
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
@@ -59,7 +57,7 @@ def computed(
         look = {"fresh": store.fresh, "quiet": store.quiet}
         names = drawn(results, executor, **look) if figures else []
     assert results.shares is not None
-    document: dict[str, Any] = {
+    document: Document = {
         "format_version": FORMAT,
         "case": case.name,
         "title": case.content.title,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -248,7 +248,7 @@ def fibres(result: Homogenised) -> Document:
     }
 
 
-def declared_errors(result: Homogenised) -> dict[str, Any] | None:
+def declared_errors(result: Homogenised) -> Document | None:
     """Declared absolute errors of E, ν and the mean stresses; None where there are none."""
     if not result.errors:
         return None
