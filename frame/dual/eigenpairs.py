@@ -27,7 +27,6 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from scipy.linalg import eigh
 
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, symmetric
 from alphacut.frame.dual.homogeneous import Series, packed, product, tensor
@@ -100,7 +99,9 @@ def modes(structure: Classical) -> Modes:
     Raises:
         UncoveredError: The box is so wide that the structure may lose its mass or stiffness.
     """
-    middle, basis = eigh(structure.stiffness.parts[0], structure.mass.parts[0])
+    below = np.linalg.inv(np.linalg.cholesky(structure.mass.parts[0]))
+    middle, turned = np.linalg.eigh(below @ structure.stiffness.parts[0] @ below.T)
+    basis = below.T @ turned
     mass, stiffness = (_seen(x, basis) for x in (structure.mass, structure.stiffness))
     heavy, stiff = _form(mass, np.ones(len(middle))), _form(stiffness, middle**-0.5)
     if not (heavy < 1 and stiff < 1):
