@@ -122,8 +122,9 @@ class Frame(Section):
         number = None if self.stiffness else modulus or self.modulus or STAND_IN
         try:
             model = self._model(number)
-        except RefusedError:
-            raise
+        except RefusedError as error:
+            key = f"frame.{error.key}"
+            raise RefusedError(key, error.value, error.allowed, error.cure) from None
         except ValueError as error:
             raise RefusedError("frame", "of these values", "a frame", str(error)) from None
         every = self._numbers(number)
