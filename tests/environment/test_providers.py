@@ -9,15 +9,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("stochastic", "rve", "fuzzy", "frame", "alphacut", "tests", "benchmarks", "docs")
+FOLDERS = ("stochastic", "rve", "fuzzy", "frame", "alphacut", "tests", "benchmarks", "docs", "demos")
 DIRECT = {
-    "IPython": "python3-ipykernel",  # which depends on it
     "PIL": "python3-matplotlib",  # which depends on Pillow, by pip too
     "basix": "python3-dolfinx",
-    "cvxopt": "python3-cvxopt",
     "distributed": "python3-distributed",
     "dolfinx": "python3-dolfinx",
-    "dolfinx_mpc": "python3-dolfinx-mpc",
     "gmsh": "python3-gmsh",
     "hypothesis": "python3-hypothesis",
     "jinja2": "python3-jinja2",
@@ -26,19 +23,17 @@ DIRECT = {
     "matplotlib": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
-    "netCDF4": "python3-netcdf4",
-    "nbclient": "python3-nbclient",
-    "nbformat": "python3-nbclient",  # which depends on it
+    "numba": "python3-numba",
     "numpy": "python3-numpy",
-    "pandas": "python3-xarray",  # which depends on it
     "petsc4py": "python3-petsc4py-real",
     "pint": "python3-pint",
     "pytest": "python3-pytest",
+    "pydantic": "python3-pydantic",
+    "pydantic_core": "python3-pydantic",  # which depends on it
     "pyvista": "python3-pyvista",
     "rich": "python3-rich",
     "scipy": "python3-scipy",
     "skimage": "python3-skimage",
-    "mpmath": "python3-sympy",  # which needs it
     "sympy": "python3-sympy",
     "ufl": "python3-dolfinx",
     "xarray": "python3-xarray",
@@ -49,6 +44,10 @@ INDIRECT = {  # imported by others on this project's behalf
     "ipykernel": "python3-ipykernel",  # the notebook
     "joblib": "python3-joblib",
     "myst_parser": "python3-myst-parser",  # Sphinx, for the pages of docs
+    "jupytext": "python3-jupytext",  # Sphinx, to read demos
+    "myst_nb": "python3-myst-nb",  # Sphinx, to run demos
+    "nbclient": "python3-nbclient",
+    "netCDF4": "python3-netcdf4",  # xarray, to write results
     "notebook": "python3-notebook",
     "pip": "python3-pip",  # enter, to install ruff
     "pytest_cov": "python3-pytest-cov",  # pytest, for make coverage
