@@ -1,4 +1,4 @@
-"""Imports point one way, and every package imports quickly and without DOLFINx."""
+"""Imports point one way, and no package imports DOLFINx or its like."""
 
 import ast
 import subprocess
@@ -31,7 +31,6 @@ HEAVY = {
     "rich",
     "scipy.stats",
 }
-SECONDS = 0.8  # of processor time in a fresh interpreter; most of it is that of NumPy and SciPy
 
 
 def package_of(module: str) -> str:
@@ -173,16 +172,7 @@ def test_a_wrong_direction_would_be_seen():
 @pytest.mark.parametrize(
     "package", [f"alphacut.{name}" for name in (*MAY_IMPORT, "entry") if name != "alphacut"]
 )
-def test_a_package_imports_fast_and_without_dolfinx(package):
-    program = (
-        f"import sys, time; t = time.process_time(); import {package}; s = time.process_time() - t;"
-        " print(s, *sys.modules)"
-    )
-    runs = [
-        subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True
-        ).stdout.split()
-        for _ in range(2)
-    ]
-    assert not HEAVY & set(runs[0])
-    assert min(float(run[0]) for run in runs) < SECONDS
+def test_a_package_imports_nothing_heavy(package):
+    program = f"import sys, {package}; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not HEAVY & set(run.stdout.split())
