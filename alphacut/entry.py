@@ -126,7 +126,7 @@ def _stopped(signals: Sequence[int]) -> int:
     """Status of a command that was interrupted; other ranks, which may wait, are stopped."""
     number = (*signals, signal.SIGINT)[0]
     how = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
-    say(f"{how}; what was finished is kept, and the same command goes on from there")
+    say(f"{how}; a run continues from the stages and samples that it has finished")
     if signals and ranks() > 1 and "mpi4py.MPI" in sys.modules:
         sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(128 + number)
     return 128 + number

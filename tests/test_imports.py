@@ -174,5 +174,7 @@ def test_a_wrong_direction_would_be_seen():
 )
 def test_a_package_imports_nothing_heavy(package):
     program = f"import sys, {package}; print(*sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
     assert not HEAVY & set(run.stdout.split())

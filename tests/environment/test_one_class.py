@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-DOORS = {"rve": "solve", "fuzzy": "modulus", "frame": "envelope", "stochastic": "microstructure"}
+DOORS = {"rve": "solve", "frame": "envelope", "stochastic": "microstructure"}
 DOUBLED = """
 import inspect, json, os, sys
 seen = {{}}

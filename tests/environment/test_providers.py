@@ -9,7 +9,17 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("stochastic", "rve", "fuzzy", "frame", "alphacut", "tests", "benchmarks", "docs", "demos")
+FOLDERS = (
+    "stochastic",
+    "rve",
+    "fuzzy",
+    "frame",
+    "alphacut",
+    "tests",
+    "benchmarks",
+    "docs",
+    "demos",
+)
 DIRECT = {
     "PIL": "python3-matplotlib",  # which depends on Pillow, by pip too
     "basix": "python3-dolfinx",

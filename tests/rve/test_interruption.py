@@ -50,7 +50,10 @@ def test_it_ends_with_the_usual_status_once_the_import_is_done(
         [sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False
     )
     assert (done.returncode, done.stdout) == (0, f"{status} True\n")
-    assert done.stderr == f"alphacut: {how}; nothing is kept\n"
+    assert (
+        done.stderr
+        == f"alphacut: {how}; a run continues from the stages and samples that it has finished\n"
+    )
 
 
 @pytest.mark.parametrize(("number", "ends"), [("SIGINT", "True"), ("SIGTERM", "False")])
