@@ -61,6 +61,7 @@ def test_the_estimate_is_the_error_of_every_scheme(scheme, step):
     assert found.basis == (f"{scheme} steps of {step:g} s",)
     assert found.error.max() == pytest.approx(MARGIN * off, rel=0.2)
     assert found.facts["step_error"] == found.error.max()
+    assert (np.diff(found.error, axis=1) >= 0).all()  # an error at one node is one at all later
 
 
 def test_steps_are_judged_where_bounds_are_reached_and_a_resonance_may_be():
@@ -72,6 +73,7 @@ def test_steps_are_judged_where_bounds_are_reached_and_a_resonance_may_be():
     found = envelope(frame, {"k1": Interval(0.6e5, 2.4e5)}, method=Sampled(128), **motion)
     flow = LinearFlow(frame, ("k1",), 1000 * h, h, Midpoint())
     exact = LinearFlow(frame, ("k1",), 1000 * h, h, Exact())
+    assert (np.diff(found.error, axis=1) >= 0).all()
     at = np.unique(np.concatenate([found.lower_at, found.upper_at]))[:, None]
     assert np.abs(flow.values(at) - exact.values(at)).max() <= found.facts["step_error"]
 
