@@ -1,0 +1,131 @@
+"""Declared errors beside true ones: collected by quantity, printed with quantiles, and judged.
+
+    SEED=1234 ./enter python -m pytest -m slow tests/calibration -s
+
+Without SEED each test draws one and prints it. A row has one of two kinds. Estimated: the declared
+error of each value over its true one, which may not exceed it. Guaranteed: the proved width over
+the width of what was attained by another method, which may not leave the bounds.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import numpy as np
+
+SHARE = 0.995
+"""Least share of estimated values that their errors cover."""
+MOST = 30.0
+"""Most that the median of declared over true may be."""
+ROUNDING = 1e-9
+"""Share of a value's size by which judges themselves are rounded."""
+
+
+def free_seed(name: str) -> int:
+    """A seed drawn anew, or that of the environment variable SEED; prints it."""
+    seed = int(os.environ.get("SEED") or np.random.default_rng().integers(10**9))
+    print(f"\n{name}: SEED={seed}")
+    return seed
+
+
+@dataclass
+class Row:
+    """Values of one quantity: shapes (N,) in parts that are joined at the end."""
+
+    guaranteed: bool
+    ratios: list[np.ndarray] = field(default_factory=list)
+    covered: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def share(self) -> float:
+        """Share of the values that are covered."""
+        return float(np.concatenate(self.covered).mean())
+
+    @property
+    def quantiles(self) -> np.ndarray:
+        """Of declared over true: 25, 50 and 95 %."""
+        return np.quantile(np.concatenate(self.ratios), (0.25, 0.5, 0.95))
+
+    @property
+    def right(self) -> bool:
+        """Whether enough is covered and not too much declared."""
+        least = 1.0 if self.guaranteed else SHARE
+        return self.share >= least and bool(self.quantiles[1] <= MOST)
+
+
+@dataclass
+class Calibration:
+    """A table of quantities.
+
+    Args:
+        name: What is judged.
+        seed: That all of it was drawn from.
+    """
+
+    name: str
+    seed: int
+    rows: dict[str, Row] = field(default_factory=dict)
+    violations: list[str] = field(default_factory=list)
+
+    def estimated(
+        self, quantity: str, declared, true, *, size=1.0, least=0.0, case: object = ""
+    ) -> None:
+        """Adds values with errors, all of shape (N,) or one number.
+
+        Args:
+            quantity: Name of the row.
+            declared: Errors as stated.
+            true: Distances from the truth, 0 or more.
+            size: Magnitude of the values, which are rounded.
+            least: True errors count as at least this in the ratio, as a share of the accuracy asked
+                for: who asks for 1e-4 and is right to 1e-12 has not been misled.
+            case: What tells this case from others, for the message.
+        """
+        declared, true, size = np.broadcast_arrays(*np.atleast_1d(declared, true, size))
+        covered = true <= declared + ROUNDING * size
+        floor = np.maximum(np.maximum(true, least), ROUNDING * size)
+        self._add(quantity, False, declared / floor, covered, case)
+
+    def guaranteed(self, quantity: str, proved, attained, *, size=1.0, case: object = "") -> None:
+        """Adds pairs of ends, proved ones and ones attained by another method, shape (N,) each.
+
+        Args:
+            quantity: Name of the row.
+            proved: Lower and upper ends.
+            attained: The same, which must lie inside.
+            size: Magnitude of the values, which are rounded.
+            case: What tells this case from others.
+        """
+        (low, high), (least, most) = map(np.atleast_1d, proved), map(np.atleast_1d, attained)
+        slack = ROUNDING * np.asarray(size)
+        inside = (least >= low - slack) & (most <= high + slack)
+        width = np.maximum(most - least, 1e-3 * np.asarray(size))
+        self._add(quantity, True, (high - low) / width, inside, case)
+
+    def _add(self, quantity, guaranteed, ratios, covered, case) -> None:
+        row = self.rows.setdefault(quantity, Row(guaranteed))
+        row.ratios.append(ratios.ravel())
+        row.covered.append(covered.ravel())
+        if not covered.all():
+            worst = 1 / ratios[~covered].min() if not guaranteed else np.nan
+            count = f"{(~covered).sum()} of {covered.size}"
+            self.violations.append(f"{quantity}: {count}, true over declared {worst:.3g}; {case}")
+
+    def __str__(self) -> str:
+        """The table and what was violated."""
+        head = f"{'quantity':24} {'nature':10} {'values':>8} {'covered':>9}"
+        lines = [self.name, head + "".join(f"{q:>9} %" for q in (25, 50, 95))]
+        for name, row in self.rows.items():
+            nature = "guaranteed" if row.guaranteed else "estimated"
+            count = sum(len(part) for part in row.covered)
+            numbers = "".join(f"{q:11.3g}" for q in row.quantiles)
+            lines.append(f"{name:24} {nature:10} {count:8} {100 * row.share:8.3f}%{numbers}")
+        return "\n".join([*lines, *self.violations])
+
+    def judge(self) -> None:
+        """Prints the table; fails where a row is wrong or there is none."""
+        print(f"\n{self}")
+        wrong = [name for name, row in self.rows.items() if not row.right]
+        assert self.rows, f"{self.name}: nothing was judged (SEED={self.seed})"
+        assert not wrong, f"{', '.join(wrong)} (SEED={self.seed})\n{self}"
