@@ -61,7 +61,7 @@ def envelope(
             linear structures, and `ImprovedFollower()` for others.
         integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto,
             proof and search unless given), midpoint (of all others), rk4. Of general Lagrangian
-            systems midpoint (unless given), composition4 or rk4.
+            systems midpoint (unless given) or composition4.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters, instead of a length in SI units. It is where no output is a displacement
             and neither method nor tolerance is named.

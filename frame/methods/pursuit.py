@@ -96,13 +96,18 @@ class Pursuit:
         self._ask(points, jet)
 
     def _ask(self, points: Array, jet: Jet) -> None:
+        """Takes in what is better, and asks the models that hold a bound now about more."""
         holder = np.full(self.value.shape, -1)
         for s, point in enumerate(points):
             signed = np.stack([-jet.value[s], jet.value[s]], -1)
             better = signed > self.value
             self.value[better], self.at[better], holder[better] = signed[better], point, s
-            self._propose(point, jet, s, signed >= self.value)
         self.held.keep(jet, holder)
+        places = np.nonzero(holder >= 0)
+        if len(places[0]) and (self.upper > self.lower).any():
+            models = models_at(jet, (holder[places], *places[:2]))
+            optima = self._optima(self.at[places], models, places[2])
+            self.promise[places], self.target[places] = optima
 
     def contest(self) -> None:
         """Ask the models that hold a bound at one node about the next node."""
@@ -115,15 +120,6 @@ class Pursuit:
             more = found[0] > self.promise[places]
             places = tuple(x[more] for x in places)
             self.promise[places], self.target[places] = (x[more] for x in found)
-
-    def _propose(self, point: Array, jet: Jet, s: int, close: Array) -> None:
-        """Optima of the model of one graph where it is best."""
-        places = np.nonzero(close)
-        if not len(places[0]) or not (self.upper > self.lower).any():
-            return
-        points = np.broadcast_to(point, (len(places[0]), len(point)))
-        models = models_at(jet, (np.full(len(points), s), *places[:2]))
-        self.promise[places], self.target[places] = self._optima(points, models, places[2])
 
     def _optima(
         self, points: Array, models: tuple[Array, Array, Array], side: Array

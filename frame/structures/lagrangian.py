@@ -144,10 +144,6 @@ class Equations:
         """Velocities from momenta."""
         return self.mass.LUsolve(momentum - self.momentum.subs({x: 0 for x in self.v}))
 
-    def acceleration(self) -> Matrix:
-        """q̈ from the Euler–Lagrange equations."""
-        return self.mass.LUsolve(self.push - self.momentum.jacobian(self.q) * self.v)
-
 
 def pendulum(
     *,

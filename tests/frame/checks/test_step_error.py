@@ -49,7 +49,7 @@ def test_the_declared_error_covers_that_of_time_stepping():
 
 
 @pytest.mark.parametrize(
-    ("scheme", "step"), [("midpoint", 0.02), ("composition4", 0.1), ("rk4", 0.1)]
+    ("scheme", "step"), [("midpoint", 0.02), ("composition4", 0.1)]
 )
 def test_the_estimate_is_the_error_of_every_scheme(scheme, step):
     """Attained bounds of a single motion are those of its steps, give or take their error."""

@@ -1,0 +1,116 @@
+"""Expressions and their derivatives as tapes: lists of operations that one compiled loop runs.
+
+Nothing is compiled for an expression, so that a new system costs no compilation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import RefusedError
+
+if TYPE_CHECKING:
+    from sympy import Expr, Symbol
+
+Tape = tuple[Rows, Rows, Array]
+"""Operations (L, 3), places of the results (m,), and the places themselves.
+
+An operation has a number and the places of two operands. Places hold arguments, numbers, and the
+result of each operation, in this order.
+"""
+BINARY = ("add", "multiply", "power")
+UNARY = (
+    *("reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log", "sinh", "cosh", "tanh"),
+    *("asin", "acos", "atan", "erf"),
+)
+OPERATIONS = (*BINARY, *UNARY)
+
+
+def tape(components: Sequence[Expr], active: Sequence[Symbol], constants: Sequence[Symbol]) -> Tape:
+    """The tape of expressions (m,) of arguments: the active ones, then constants.
+
+    Raises:
+        RefusedError: An expression has a function that is not among `OPERATIONS`.
+    """
+    return _Writer([*active, *constants]).tape(components)
+
+
+def with_derivatives(
+    components: Sequence[Expr], active: Sequence[Symbol], constants: Sequence[Symbol]
+) -> Tape:
+    """The same, with first derivatives (m, a) by the active ones and second ones (m, a, a)."""
+    first = [e.diff(x) for e in components for x in active]
+    second = [e.diff(x) for e in first for x in active]
+    return tape([*components, *first, *second], active, constants)
+
+
+class _Writer:
+    """A tape in the making: the place of every expression, one for those that are equal."""
+
+    def __init__(self, arguments: Sequence[Symbol]) -> None:
+        self.places: dict[object, int] = {x: k for k, x in enumerate(arguments)}
+        self.numbers: dict[float, int] = {}
+        self.code: list[tuple[int, int, int]] = []
+        self.made: dict[tuple[int, int, int], int] = {}
+        self.arguments = len(arguments)
+
+    def tape(self, expressions: Sequence[Expr]) -> Tape:
+        """The tape; places below 0 are those of numbers until all are known."""
+        results = [self.place(e) for e in expressions]
+        count = len(self.numbers)
+        begin = self.arguments + count
+
+        def final(place: int) -> int:
+            if place < 0:
+                return self.arguments - 1 - place
+            return place + count if place >= self.arguments else place
+
+        rows = [(number, final(x), final(y)) for number, x, y in self.code]
+        places = np.zeros(begin + len(rows))
+        places[self.arguments : begin] = list(self.numbers)
+        code = np.array(rows, np.int64).reshape(-1, 3)
+        return code, np.array([final(x) for x in results], np.int64), places
+
+    def place(self, e: Expr) -> int:
+        """Place of an expression."""
+        if e not in self.places:
+            self.places[e] = self._number(float(e)) if e.is_number else self._write(e)
+        return self.places[e]
+
+    def _write(self, e: Expr) -> int:
+        name = type(e).__name__
+        if name in ("Add", "Mul"):
+            parts = map(self.place, e.args)
+            return reduce(lambda x, y: self._apply(name, x, y), parts)
+        if name == "Pow":
+            return self._power(*e.args)
+        if name not in UNARY:
+            raise RefusedError("function of the lagrangian", name, ", ".join(UNARY))
+        return self._apply(name, self.place(e.args[0]))
+
+    def _power(self, base: Expr, exponent: Expr) -> int:
+        if exponent.is_Integer and abs(int(exponent)) <= 4:
+            x = self.place(base)
+            power = reduce(lambda a, b: self._apply("Mul", a, b), [x] * abs(int(exponent)))
+            return power if exponent > 0 else self._apply("reciprocal", power)
+        if exponent.is_number and abs(float(exponent)) == 0.5:
+            root = self._apply("sqrt", self.place(base))
+            return root if exponent > 0 else self._apply("reciprocal", root)
+        return self._apply("power", self.place(base), self.place(exponent))
+
+    def _apply(self, name: str, x: int, y: int | None = None) -> int:
+        """Place of an operation's result, which is one that was made before where there is one."""
+        known = {"Add": "add", "Mul": "multiply"}.get(name, name)
+        row = (OPERATIONS.index(known), x, x if y is None else y)
+        if row not in self.made:
+            self.code.append(row)
+            self.made[row] = self.arguments + len(self.code) - 1
+        return self.made[row]
+
+    def _number(self, value: float) -> int:
+        return -1 - self.numbers.setdefault(value, len(self.numbers))
