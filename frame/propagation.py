@@ -23,17 +23,24 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Integrator, 
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.auto import Auto
+from alphacut.frame.methods.graph_follower import GraphFollower
+from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.named import Method, named
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, relative_to_ground
+from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import RefusedError
+
+JUDGED = 4
+"""Most inputs of a follower's envelope that a proof is made beside."""
 
 
 def envelope(
@@ -90,18 +97,42 @@ def envelope(
     with showing(progress) as tick:
         found = way.run(over, tick)
     steps = step_error_at_bounds(found, over, steps)
-    found = with_stray(with_step_error(found, over, steps), over)
+    found = _judged(with_step_error(found, over, steps), over, way)
+    found = with_stray(found, over)
     found = _shifted(found, model) if isinstance(model, StoreyFrame) else found
     return _on_levels(found, boxes(inputs, alpha).alpha, which)
 
 
 def beside(found: Envelope, proof: Envelope) -> Envelope:
-    """An envelope with the proved bounds of the same outputs, levels and nodes beside its own.
+    """An envelope with the proved bounds of the exact motion, and its largest distance from them.
+
+    The true bound lies between the proved one and the one that the proof attains.
 
     Raises:
-        FailedError: What it states to be attained lies outside these.
+        FailedError: What it attains lies outside the proved bounds by more than its error.
     """
-    return replace(found, outer=Ends(proof.lower, proof.upper))
+    outer, inner = proof.proved, proof.attained
+    apart = [np.abs(found.upper - x) for x in (outer.upper, inner.upper)]
+    apart += [np.abs(found.lower - x) for x in (outer.lower, inner.lower)]
+    checked = replace(found, outer=outer, between=proof.between)
+    facts = {**found.facts, "gap": proof.facts["gap"], "estimated_error": float(np.max(apart))}
+    return replace(checked, error=np.max(apart, axis=0), facts=facts)
+
+
+def _judged(found: Envelope, over: UnitFlow, way: Method) -> Envelope:
+    """The envelope of a follower with the proof beside it, where one is affordable."""
+    linear = over.flow
+    few = len(over.boxes.names) <= JUDGED
+    if not (few and isinstance(way, GraphFollower | ImprovedFollower)):
+        return found
+    if not isinstance(linear, LinearFlow):
+        return found
+    exact = replace(over, flow=replace(linear, integrator=Exact()))
+    try:
+        proof = Proof(gap=way.tolerance / 4, patient=False).run(exact)
+    except (UnprovedError, ModalError):
+        return found
+    return beside(found, proof)
 
 
 def _method(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from functools import singledispatch
 
 import numpy as np
 
@@ -11,31 +10,12 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.checks.step_error import probes
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
-from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.quantities import RATIO, Parameter, of_storey_frame
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
 OTHER_UNITS = 500
 """From so many times the structure's own value on, or that part of it, units differ."""
-
-
-@singledispatch
-def parameter(system: LinearSystem | LagrangianSystem, name: str) -> Parameter:
-    """A parameter of `system`, with the unit and the range that are known of it."""
-    return Parameter(name)
-
-
-@parameter.register
-def _(system: StoreyFrame, name: str) -> Parameter:
-    return of_storey_frame(name)
-
-
-@parameter.register
-def _(system: MatrixStructure, name: str) -> Parameter:
-    ratio = name in [ratio for ratio in system.ratios if isinstance(ratio, str)]
-    return Parameter(name, range=RATIO if ratio else "")
 
 
 def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
@@ -48,7 +28,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             nothing moves it, or the weight may buckle a storey.
     """
     for name, low, high in zip(cuts.names, cuts.lower.min(0), cuts.upper.max(0), strict=True):
-        own = parameter(system, name)
+        own = system.parameter(name)
         if not own.admits(low, high):
             raise RefusedError(f"support of {name}", f"[{low:g}, {high:g}]", own.range or "finite")
         if name in system.parameters:
@@ -80,14 +60,14 @@ def require_motion(system: LinearSystem, names: tuple[str, ...], points: Array) 
     for point in points:
         at = ", ".join(f"{name} = {x:g}" for name, x in zip(names, point, strict=True))
         try:
-            found = evaluate(system, names, point[None], derivatives=False)[0]
-            positive = bool(np.linalg.eigvalsh(found.mass.value).min() > 0)
+            at_point = evaluate(system, names, point[None], derivatives=False)[0]
+            positive = bool(np.linalg.eigvalsh(at_point.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by ratios, which divides by the mass
             positive = False
         if not positive:
             raise RefusedError("mass", f"not positive definite at {at}", "a mass for every unknown")
-        moved = moved or found.q0.value.any() or found.v0.value.any()
-        for kind, jet in (("stiffness", found.stiffness), ("damping", found.damping)):
+        moved = moved or at_point.q0.value.any() or at_point.v0.value.any()
+        for kind, jet in (("stiffness", at_point.stiffness), ("damping", at_point.damping)):
             rates = np.linalg.eigvalsh((jet.value[0] + jet.value[0].T) / 2)
             if rates[0] < -1e-9 * np.abs(rates).max():
                 growing[kind] = f"{rates[0]:.3g} beside {rates[-1]:.3g} at {at}"

@@ -76,7 +76,7 @@ def _(system: StoreyFrame, p: Inputs) -> Classical:
     below = np.eye(n) - np.eye(n, k=-1)  # drifts from displacements
     rows, factor, order = [], [], []
     for name in system.outputs:
-        kind, z = system._output(name)
+        kind, z = system.quantity(name)
         row = (below if kind in ("drift", "shear") else np.eye(n))[z]
         rows.append(row)
         factor.append(links[z] if kind == "shear" else p["rayleigh_mass"] * 0.0 + 1.0)

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.frame.structures.storey_springs import springs
+from alphacut.frame.structures.storey import StoreyFrame, chain
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
@@ -67,7 +66,7 @@ class Chain:
                 allowed = f"E, I, c1 … c{n} (columns), l1 …, m1 …, or k1 … k{n} (stiffnesses)"
                 raise RefusedError("identify.parameters", name, allowed)
         modal = {name: Jet.constant([value], 0) for name, value in values.items()}
-        k = np.array([at.value for at in springs(frame, modal)])[:, 0]
+        k = frame.springs(modal).value[0]
         nominal = np.array([values[name] for name in names])
         mass = np.asarray(frame.masses, float)
         return cls(tuple(names), nominal, k, mass, powers[0], powers[1])
@@ -97,21 +96,15 @@ class Chain:
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
     """Squared angular frequencies (S, n) and shapes (S, floor, mode) of chains (S, n)."""
     root = np.sqrt(mass)
-    n = mass.shape[-1]
-    K = np.zeros((*mass.shape, n))
-    at = np.arange(n)
-    K[..., at, at] = stiffness
-    K[..., at[:-1], at[:-1]] += stiffness[..., 1:]
-    K[..., at[:-1], at[1:]] = K[..., at[1:], at[:-1]] = -stiffness[..., 1:]
-    values, vectors = np.linalg.eigh(K / root[..., :, None] / root[..., None, :])
+    values, vectors = np.linalg.eigh(chain(stiffness) / root[..., :, None] / root[..., None, :])
     return values, vectors / root[..., None]
 
 
-def eigenvalue_ranges(chain: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
+def eigenvalue_ranges(model: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
     """Least and greatest squared frequencies over a box of log parameters, each (n,), proved."""
-    low, high = chain.ranges(lower, upper)
-    stiffness = chain.stiffness * np.exp(np.stack([low[0], high[0]]))
-    mass = chain.mass * np.exp(np.stack([high[1], low[1]]))
+    low, high = model.ranges(lower, upper)
+    stiffness = model.stiffness * np.exp(np.stack([low[0], high[0]]))
+    mass = model.mass * np.exp(np.stack([high[1], low[1]]))
     values, _ = chain_modes(stiffness, mass)
     slack = ROUND_OFF * values[:, -1:] * values.shape[1]
     return (values - slack)[0], (values + slack)[1]

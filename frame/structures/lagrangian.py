@@ -8,13 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from alphacut.frame.calculus.jet import cos
-from alphacut.frame.structures.lagrangian_check import (
-    called,
-    expression,
-    listed,
-    require_dimensions,
-)
-from alphacut.frame.structures.quantities import Output
+from alphacut.frame.calculus.numbers import require_number
+from alphacut.frame.structures.quantities import Output, Parameter
 from alphacut.fuzzy.refused import RefusedError
 
 if TYPE_CHECKING:
@@ -23,6 +18,10 @@ if TYPE_CHECKING:
 Symbols = Sequence[Any]
 Named = Mapping[str, Any]
 Function = Callable[[Symbols, Symbols, Named], Any]
+SMOOTH = "arithmetic and the smooth sin, cos and exp of alphacut.frame.calculus.jet"
+ROUGH = {"Abs", "sign", "Max", "Min", "Heaviside", "DiracDelta", "Piecewise", "floor", "ceiling"}
+ROUGH |= {"Mod", "arg", "re", "im"}
+"""Functions of SymPy that have no second derivative everywhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +54,16 @@ class LagrangianSystem:
     force: Function | None = None
 
     def __post_init__(self) -> None:
-        require_dimensions(self.coordinates, self.parameters, self.observed)
-        for row in self.symbols.mass.tolist():
-            for entry in row:
-                if entry.free_symbols & set(self.symbols.v):
-                    raise RefusedError("lagrangian", entry, "functions quadratic in v")
+        if not isinstance(self.coordinates, int) or self.coordinates < 1:
+            raise RefusedError("coordinates", self.coordinates, "whole numbers from 1 on")
+        for name in ("parameters", "observed"):
+            if not isinstance(getattr(self, name), Mapping) or not getattr(self, name):
+                raise RefusedError(name, getattr(self, name), "values by name, one at least")
+        for name, value in self.parameters.items():
+            require_number(f"parameter {name}", value, "SI units")
         eq = self.symbols
+        if eq.mass.free_symbols & set(eq.v):
+            raise RefusedError("lagrangian", eq.mass.tolist(), "functions quadratic in v")
         for name in self.observed:
             self.output(name, eq.v)
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
@@ -69,34 +72,27 @@ class LagrangianSystem:
             raise RefusedError("mass of the lagrangian", "singular", "inertia of each coordinate")
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
-        """The initial state (q0, v0) in symbols.
-
-        Raises:
-            RefusedError: It does not consist of one number for each coordinate.
-        """
-        given = called("initial", self.initial, self.symbols.p)
-        if not isinstance(given, Sequence) or len(given) != 2:
-            raise RefusedError("initial", given, "two lists, displacements and velocities")
-        q0, v0 = (
-            listed(f"initial: {part}", x, self.coordinates)
-            for part, x in zip(("q0", "v0"), given, strict=True)
-        )
-        return [expression("initial: q0", x) for x in q0], [
-            expression("initial: v0", x) for x in v0
-        ]
+        """The initial state (q0, v0) in symbols."""
+        state = _called("initial", self.initial, self.symbols.p)
+        if not isinstance(state, Sequence) or len(state) != 2:
+            raise RefusedError("initial", state, "two lists, displacements and velocities")
+        q0, v0 = (_listed("initial", part, self.coordinates) for part in state)
+        return q0, v0
 
     def output(self, name: str, velocity: Symbols) -> Expr:
         """An observed quantity in symbols, for velocities in any symbols."""
-        eq = self.symbols
-        return expression(
-            f"observed: {name}",
-            called(f"observed: {name}", self.observed[name], list(eq.q), list(velocity), eq.p),
-        )
+        eq, key = self.symbols, f"observed: {name}"
+        value = _called(key, self.observed[name], list(eq.q), list(velocity), eq.p)
+        return _expression(key, value)
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """Names of the observed quantities, with their units."""
         return tuple(map(Output, self.observed))
+
+    def parameter(self, name: str) -> Parameter:
+        """A parameter, whose unit and range are not known."""
+        return Parameter(name)
 
     @cached_property
     def symbols(self) -> Equations:
@@ -117,12 +113,12 @@ class Equations:
         mass: ∂²L/∂v².
     """
 
-    q: Any
-    v: Any
-    p: dict[str, Any]
-    momentum: Any
-    push: Any
-    mass: Any
+    q: Matrix
+    v: Matrix
+    p: dict[str, Expr]
+    momentum: Matrix
+    push: Matrix
+    mass: Matrix
 
     @classmethod
     def derive(cls, system: LagrangianSystem) -> Equations:
@@ -132,17 +128,48 @@ class Equations:
         n = system.coordinates
         q, v = (sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("q", "v"))
         p = {name: sympy.Symbol(f"p_{name}", real=True) for name in system.parameters}
-        L = expression("lagrangian", called("lagrangian", system.lagrangian, list(q), list(v), p))
-        momentum = sympy.Matrix([sympy.diff(L, x) for x in v])
-        push = sympy.Matrix([sympy.diff(L, x) for x in q])
+        state = (list(q), list(v), p)
+        L = _expression("lagrangian", _called("lagrangian", system.lagrangian, *state))
+        momentum = sympy.Matrix([L.diff(x) for x in v])
+        push = sympy.Matrix([L.diff(x) for x in q])
         if system.force is not None:
-            force = listed("force", called("force", system.force, list(q), list(v), p), n)
-            push += sympy.Matrix([expression("force", x) for x in force])
+            push += sympy.Matrix(_listed("force", _called("force", system.force, *state), n))
         return cls(q, v, p, momentum, push, momentum.jacobian(v))
 
     def velocity(self, momentum: Matrix) -> Matrix:
         """Velocities from momenta."""
         return self.mass.LUsolve(momentum - self.momentum.subs({x: 0 for x in self.v}))
+
+
+def _called(name: str, function: Callable[..., Any], *arguments: Symbols | Named) -> Any:
+    """Value of a function for symbols: of (q, v, p), or of p, the parameters by name."""
+    try:
+        return function(*arguments)
+    except (KeyError, IndexError, TypeError, AttributeError) as failure:
+        allowed = f"functions of {', '.join(arguments[-1])} and the coordinates by {SMOOTH}"
+        raise RefusedError(name, repr(failure), allowed) from None
+
+
+def _listed(name: str, values: Any, count: int) -> list[Expr]:
+    """The expressions of a sequence, one for each coordinate."""
+    entries = list(values) if isinstance(values, Sequence) or hasattr(values, "tolist") else []
+    if len(entries) != count:
+        raise RefusedError(name, values, f"a list of {count}, one for each coordinate")
+    return [_expression(name, x) for x in entries]
+
+
+def _expression(name: str, value: object) -> Expr:
+    """An expression of SymPy with two derivatives."""
+    import sympy
+
+    try:
+        made = sympy.sympify(value)
+    except sympy.SympifyError:
+        raise RefusedError(name, repr(value), SMOOTH) from None
+    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(made)} & ROUGH)
+    if rough or not isinstance(made, sympy.Expr):
+        raise RefusedError(name, rough[0] if rough else value, SMOOTH)
+    return made
 
 
 def pendulum(

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, variables
+from alphacut.frame.structures.quantities import Parameter
 from alphacut.fuzzy.refused import RefusedError
 
 
@@ -105,6 +106,9 @@ class LinearSystem(Protocol):
     @property
     def ground(self) -> Accelerogram | None:
         """Base excitation, if any; the displacements are then relative to the ground."""
+
+    def parameter(self, name: str) -> Parameter:
+        """A parameter with the unit and the range that are known of it."""
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""

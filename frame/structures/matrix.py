@@ -12,7 +12,7 @@ from alphacut.frame.calculus.jet import Jet, variables
 from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
@@ -70,8 +70,8 @@ class MatrixStructure:
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
-        self._check_vectors()
-        self._check_ratios()
+        self._require_shapes()
+        self._require_ratios()
         modal = sum(float(value_of(f, self.parameters)) * A for f, A in self.mass)
         if not np.linalg.eigvalsh(modal).min() > 0:
             raise RefusedError("mass", "not positive definite", "a mass for every unknown")
@@ -79,78 +79,58 @@ class MatrixStructure:
     @property
     def size(self) -> int:
         """Number of unknowns n."""
-        return int(np.shape(self.mass[0][1])[0])
+        return len(self.mass[0][1])
 
     @property
     def outputs(self) -> tuple[Output, ...]:
         """Names of the observed quantities, with their units."""
         return tuple(map(Output, self.observed))
 
-    def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
+    def parameter(self, name: str) -> Parameter:
+        """A parameter, whose range is known where it is a damping ratio."""
+        ratios = [ratio for ratio in self.ratios if isinstance(ratio, str)]
+        return Parameter(name, range=RATIO if name in ratios else "")
+
+    def _term(self, kind: str, term: object) -> tuple[Factor | str | float, Array]:
         """A factor that exists and has derivatives, and its array without round-off."""
         if isinstance(term, str) or not isinstance(term, Sequence) or len(term) != 2:
             raise RefusedError(f"term of {kind}", type(term).__name__, "pairs (factor, array)")
         factor, array = term
-        if isinstance(factor, str) and factor not in self.parameters:
-            raise RefusedError(f"factor of {kind}", factor, ", ".join(self.parameters))
-        if callable(factor):
-            self._require_smooth(kind, factor)
-        elif not isinstance(factor, str):
-            require_number(f"factor of {kind}", factor, "SI units")
-        return factor, self._symmetric(kind, array)
-
-    def _require_smooth(self, kind: str, factor: Factor) -> None:
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
-        allowed = "arithmetic, sin, cos, exp of alphacut.frame.calculus.jet, of parameters"
         try:
-            value = factor(variables(values, names, names[:1]))
+            value = value_of(factor, variables(values, names, names[:1]))
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
+            allowed = (
+                f"arithmetic, sin, cos, exp of alphacut.frame.calculus.jet, of {', '.join(names)}"
+            )
             raise RefusedError(f"factor of {kind}", repr(failure), allowed) from None
         if not isinstance(value, Jet | float | int | np.number):
             raise RefusedError(f"factor of {kind}", type(value).__name__, "functions to one number")
+        return factor, _symmetric(kind, array)
 
-    def _symmetric(self, kind: str, value: Any) -> Array:
-        """The array, also a sparse one, without the round-off that parts its triangles."""
-        array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
-        if array.ndim != 2 or array.shape[0] != array.shape[1]:
-            raise RefusedError(f"array of {kind}", f"of shape {array.shape}", "square arrays")
-        require_numbers(kind, array, "SI units")
-        array = array.astype(float)
-        off = np.abs(array - array.T)
-        i, j = np.unravel_index(off.argmax(), off.shape)
-        if off[i, j] > 1e-9 * np.abs(array).max():
-            what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
-            raise RefusedError(f"array of {kind}", what, "symmetric arrays", "mirror one triangle")
-        even: Array = (array + array.T) / 2
-        return even
-
-    def _check_vectors(self) -> None:
-        n = self.size
-        for kind in KINDS:
-            for _, array in getattr(self, kind):
-                if array.shape != (n, n):
-                    raise RefusedError(f"array of {kind}", f"of shape {array.shape}", f"({n}, {n})")
-        vectors = {name: getattr(self, name) for name in ("q0", "v0", "pattern")}
-        vectors |= {f"observed: {name}": row for name, row in self.observed.items()}
-        for name, value in vectors.items():
-            lengths = (n, 2 * n) if name.startswith("observed") else (n,)
+    def _require_shapes(self) -> None:
+        n, pairs = self.size, [(kind, A) for kind in KINDS for _, A in getattr(self, kind)]
+        for kind, array in pairs:
+            if array.shape != (n, n):
+                raise RefusedError(f"array of {kind}", f"of shape {array.shape}", f"({n}, {n})")
+        vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
+        vectors += [(f"observed: {k}", row, (n, 2 * n)) for k, row in self.observed.items()]
+        for name, value, lengths in vectors:
             if value is None:
                 continue
             require_numbers(name, value, "SI units")
             if np.ndim(value) != 1 or len(value) not in lengths:
                 raise RefusedError(name, f"of shape {np.shape(value)}", f"{lengths} numbers")
 
-    def _check_ratios(self) -> None:
+    def _require_ratios(self) -> None:
         if isinstance(self.ratios, str) or len(self.ratios) not in (0, 1, self.size):
             raise RefusedError("ratios", self.ratios, f"lists of one, or {self.size} by frequency")
         for ratio in self.ratios:
             if isinstance(ratio, str) and ratio not in self.parameters:
                 raise RefusedError("ratios", ratio, ", ".join(self.parameters))
             value = float(value_of(ratio, self.parameters))
-            if not 0 <= value < 1:
-                raise RefusedError(
-                    "ratios", f"{value:g}", "0 or greater, below 1, the critical one"
-                )
+            if not Parameter("", range=RATIO).admits(value, value):
+                raise RefusedError("ratios", f"{value:g}", RATIO)
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""
@@ -183,6 +163,20 @@ class MatrixStructure:
         for k, row in enumerate(self.observed.values()):
             rows[k, : len(row)] = row
         return like.like(np.tile(rows, (like.value.size, 1, 1)))
+
+
+def _symmetric(kind: str, value: Any) -> Array:
+    """The array, also a sparse one, without the round-off that parts its triangles."""
+    array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
+    if array.ndim != 2 or array.shape[0] != array.shape[1]:
+        raise RefusedError(f"array of {kind}", f"of shape {array.shape}", "square arrays")
+    require_numbers(kind, array, "SI units")
+    off = np.abs(array - array.T)
+    i, j = np.unravel_index(off.argmax(), off.shape)
+    if off[i, j] > 1e-9 * np.abs(array).max():
+        what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
+        raise RefusedError(f"array of {kind}", what, "symmetric arrays", "mirror one triangle")
+    return np.asarray((array + array.T) / 2, float)
 
 
 def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:

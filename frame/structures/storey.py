@@ -1,31 +1,37 @@
-"""Plane storey frame: rigid floors on bending columns (section 6, Figs. 26, 27)."""
+"""Plane storey frame: rigid floors on bending columns (section 6, Figs. 26, 27).
+
+A weight P on a storey of height l that is displaced by Δ presses with P Δ / l against what holds
+it: the linear geometric stiffness −P/l (P-Delta). The columns' own bending between their ends is
+left out: a clamped column buckles there at 12 E I / l² and in truth at π² E I / l².
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, stack
+from alphacut.frame.calculus.jet import Jet, concatenate
+from alphacut.frame.calculus.numbers import require_number, require_numbers
 from alphacut.frame.structures.damping import modal_damping
-from alphacut.frame.structures.linear import Matrices
-from alphacut.frame.structures.quantities import Output
-from alphacut.frame.structures.storey_checks import StoreyValues, check_values
-from alphacut.frame.structures.storey_springs import (
-    Ends,
-    Entry,
-    chain,
-    require_standing,
-    softening,
-    springs,
-)
+from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.quantities import NOT_NEGATIVE, Output, Parameter, of_storey_frame
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
+
+SYMBOLS = {
+    **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
+    **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}", "damping_ratio": "zeta{}"},
+}
+"""Names of the parameters that each list holds, by floor, storey or mode."""
+MADE = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
 @dataclass(frozen=True)
-class StoreyFrame(StoreyValues):
+class StoreyFrame:
     """Chain of n floors with k_z = 12 c_z E I / l_z³ for c_z clamped columns (2 by default).
 
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
@@ -67,10 +73,27 @@ class StoreyFrame(StoreyValues):
             [0, 1), the weight buckles a storey, or a stiffness stands beside what makes one.
     """
 
+    masses: Sequence[float]
+    lengths: Sequence[float] = ()
+    modulus: float | None = None
+    second_moment: float | Sequence[float] | None = None
+    dampers: Sequence[float] = ()
+    damper_placement: Literal["ground", "storey"] = "ground"
+    q0: Sequence[float] = ()
+    v0: Sequence[float] = ()
+    outputs: tuple[str, ...] = ()
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+    ground: Accelerogram | None = None
+    damping_ratio: float | Sequence[float] = ()
+    columns: Sequence[float] = ()
+    stiffness: Sequence[float] = ()
+    gravity: float = 0.0
+
     def __post_init__(self) -> None:
-        check_values(self)
-        n, names = len(self.masses), self.outputs or [f"q{z + 1}" for z in range(len(self.masses))]
-        filled = {
+        self._require_values()
+        self._require_springs()
+        n = len(self.masses)
+        filled: dict[str, Sequence[float]] = {
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
         }
         filled["damping_ratio"] = tuple(np.atleast_1d(self.damping_ratio).tolist())
@@ -79,32 +102,48 @@ class StoreyFrame(StoreyValues):
             filled["columns"] = tuple(self.columns) or (2.0,) * n
         for name, values in filled.items():
             object.__setattr__(self, name, values)
+        names = self.outputs or [f"q{z + 1}" for z in range(n)]
         object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))
         for output in self.outputs:
-            self._output(output)
+            self.quantity(output)
         self.require_standing({})
 
-    def require_standing(self, ends: Ends) -> None:
-        """Refuse weights that buckle a storey somewhere in a box.
+    def _require_values(self) -> None:
+        """Refuse what is no number or out of range, and lists that do not fit the floors."""
+        ranges = {name: of_storey_frame(of.format("")).range for name, of in SYMBOLS.items()}
+        ranges |= {"modulus": of_storey_frame("E").range}
+        ranges |= {"rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}
+        n = len(self.masses)
+        for name, rule in ranges.items():
+            values = getattr(self, name)
+            if values is None:
+                continue
+            single = name in ("modulus", "gravity") or np.ndim(values) == 0
+            (require_number if single else require_numbers)(name, values, "SI units")
+            for value in np.atleast_1d(values):
+                if not Parameter(name, range=rule).admits(value, value):
+                    raise RefusedError(name, f"{value:g}", rule or "finite numbers")
+            size = np.size(values)
+            one = size == 1 and name in ("second_moment", "damping_ratio")
+            if name in SYMBOLS and not one and (size not in (0, n) or not n):
+                raise RefusedError(name, f"a list of {size}", f"one value a floor, {n} from below")
+        if self.damper_placement not in ("ground", "storey"):
+            raise RefusedError("damper_placement", self.damper_placement, "ground, storey")
 
-        Args:
-            ends: Lower and upper end of parameters, in SI units; others keep their modal values.
-
-        Raises:
-            RefusedError: One does.
-        """
-        if self.gravity:
-            at = {name: self._worst(name, *both) for name, both in self.ranges(ends).items()}
-            require_standing(springs(self, at), softening(self, at))
-
-    def _worst(self, name: str, low: float, high: float) -> Jet:
-        """The end at which k_z l_z / P_z is least; with k_z of columns it falls with heights."""
-        falling = "m" if self.stiffness else "ml"
-        return Jet.constant(np.array([high if name[0] in falling else low]), 0)
-
-    def ranges(self, ends: Ends) -> dict[str, tuple[float, float]]:
-        """Lower and upper end of the values of floors and storeys over a box of parameters."""
-        return {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
+    def _require_springs(self) -> None:
+        """Either stiffnesses, or all that makes them; heights where weights press."""
+        made: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
+        if len(self.stiffness):
+            columns = self.columns if len(self.columns) else None
+            beside = [k for k, x in {**made, "columns": columns}.items() if x is not None]
+            if beside:
+                raise RefusedError(", ".join(beside), "there", "either stiffness or what makes it")
+            made = {}
+        if not len(self.stiffness) or self.gravity:
+            made["lengths"] = self.lengths if len(self.lengths) else None
+        for name, value in made.items():
+            if value is None:
+                raise RefusedError(name, None, MADE)
 
     @property
     def floors(self) -> int:
@@ -112,30 +151,29 @@ class StoreyFrame(StoreyValues):
         return len(self.masses)
 
     @property
+    def moments(self) -> tuple[float, ...]:
+        """Second moments of area: one for all storeys, one for each, or none beside stiffness."""
+        return () if self.second_moment is None else tuple(np.atleast_1d(self.second_moment))
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """Damping ratios by the names of their parameters; empty where there are none."""
+        return _named("zeta{}", np.atleast_1d(self.damping_ratio))
+
+    @property
     def parameters(self) -> dict[str, float]:
         """All parameters with their modal values, in SI units; of lists, one for each floor."""
-        first: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
-        if len(self.moments) == 1:
-            first["I"] = self.moments[0]
-        several = self.moments if len(self.moments) > 1 else ()
-        pressed = not self.stiffness or self.gravity
-        lists = {
-            "I{}": several,
-            "k{}": self.stiffness,
-            "m{}": self.masses,
-            "l{}": self.lengths if pressed else (),
-            "c{}": self.columns,
-            "d{}": self.dampers,
-            "q{}_0": self.q0,
-            "v{}_0": self.v0,
-        }
-        named = {
-            pattern.format(z + 1): float(x)
-            for pattern, values in lists.items()
-            for z, x in enumerate(values)
-        }
+        named: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
+        named |= _named("I{}", self.moments)
+        for name in ("stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"):
+            if name != "lengths" or not self.stiffness or self.gravity:
+                named |= _named(SYMBOLS[name], getattr(self, name), single=False)
         damping = {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
-        return {**first, **named, **damping, **self.ratios}
+        return {**named, **damping, **self.ratios}
+
+    def parameter(self, name: str) -> Parameter:
+        """A parameter with its unit and range."""
+        return of_storey_frame(name)
 
     def group(self, name: str) -> tuple[str, ...]:
         """Parameters of a short name: "m" is m1 … mn; any other name is itself.
@@ -153,68 +191,139 @@ class StoreyFrame(StoreyValues):
             raise RefusedError("parameter", name, ", ".join([*patterns, *self.parameters]))
         return (name,)
 
+    def springs(self, p: Mapping[str, Jet]) -> Jet:
+        """k_z of every storey, V = (S, n), in N/m: as given, or 12 c E I / l³ of its columns."""
+        if self.stiffness:
+            return self._of_floors("k{}", p)
+        inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][:, None]
+        rigidity = 12 * p["E"][:, None] * inertia  # 24 E I / l³ of two columns in section 6.1
+        return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
+
+    def softening(self, p: Mapping[str, Jet]) -> Jet:
+        """P_z / l_z of storeys, V = (S, n), in N/m, P_z the weight of all floors above."""
+        weights = self._of_floors("m{}", p) * self.gravity
+        above = weights.map(lambda x: np.cumsum(x[..., ::-1], -1)[..., ::-1])
+        return above * self._of_floors("l{}", p) ** -1
+
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state, at S parameter sets."""
-        n = self.floors
-        mass = stack([[p[f"m{i + 1}"] if i == j else 0.0 for j in range(n)] for i in range(n)], p)
-        dampers: list[Entry] = [p[f"d{z + 1}"] for z in range(n)]
-        links = springs(self, p)
-        elastic = stack(chain(links), p)
-        if self.damper_placement == "storey":
-            damping = stack(chain(dampers), p)
-        else:
-            damping = stack(
-                [[dampers[i] if i == j else 0.0 for j in range(n)] for i in range(n)], p
-            )
-        if any(
-            p[name].value.any() or p[name].first.any()
-            for name in ("rayleigh_mass", "rayleigh_stiffness")
-        ):
-            damping = (
-                damping
-                + p["rayleigh_mass"][:, None, None] * mass
-                + p["rayleigh_stiffness"][:, None, None] * elastic
-            )
+        mass, links = self._of_floors("m{}", p).map(diagonal), self.springs(p)
+        elastic = links.map(chain)
+        placed = chain if self.damper_placement == "storey" else diagonal
+        damping = self._of_floors("d{}", p).map(placed)
+        for name, part in (("rayleigh_mass", mass), ("rayleigh_stiffness", elastic)):
+            if p[name].value.any() or p[name].first.any():
+                damping = damping + p[name][:, None, None] * part
         stiffness = elastic
         if self.gravity:
-            taken = softening(self, p)
-            require_standing(links, taken)
-            stiffness = elastic - stack(chain(taken), p)
+            soft = self.softening(p)
+            _require_standing(links.value, soft.value)
+            stiffness = elastic - soft.map(chain)
         if self.ratios:
             damping = damping + modal_damping(mass, stiffness, [p[name] for name in self.ratios])
-        q0, v0 = (stack([[p[f"{x}{z + 1}_0"]] for z in range(n)], p) for x in "qv")
+        q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
         return Matrices(mass, damping, stiffness, q0, v0)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
-        kinds = [self._output(output) for output in self.outputs]
-        links = springs(self, p) if any(kind == "shear" for kind, _ in kinds) else []
-        at = self.matrices(p) if any(kind in ("a", "ar") for kind, _ in kinds) else None
-        rows: list[list[Entry]] = []
+        kinds = [self.quantity(output) for output in self.outputs]
+        names = {kind for kind, _ in kinds}
+        links = self.springs(p) if "shear" in names else None
+        forces = self._accelerations(p) if names & {"a", "ar"} else None
+        like, places = next(iter(p.values())), np.eye(self.floors)
+        drifts = places - np.eye(self.floors, k=-1)
+        rows = []
         for kind, z in kinds:
-            if kind in ("a", "ar"):
-                assert at is not None
-                rows.append(self._acceleration(at, p, z))
+            if kind in ("a", "ar") and forces is not None:
+                rows.append(forces[:, z : z + 1])
                 continue
-            row: list[Entry] = [0.0] * (2 * self.floors)
-            factor: Entry = links[z] if kind == "shear" else 1.0
-            row[z + self.floors * (kind == "v")] = factor
-            if kind in ("drift", "shear") and z > 0:
-                row[z - 1] = -factor
-            rows.append(row)
-        return stack(rows, p)
+            part = (drifts if kind in ("drift", "shear") else places)[z]
+            row = np.roll(np.append(part, 0 * part), self.floors * (kind == "v"))
+            size = links[:, z] if kind == "shear" and links else like.like(np.ones_like(like.value))
+            rows.append(size[:, None, None] * row[None])
+        return concatenate(rows, -2)
 
-    def _acceleration(self, at: Matrices, p: Mapping[str, Jet], z: int) -> list[Entry]:
-        """Row of a floor's absolute acceleration: forces on it over its mass."""
-        inertia = -1.0 * p[f"m{z + 1}"] ** -1
-        forces = (at.stiffness, at.damping)
-        return [inertia * force[:, z, j] for force in forces for j in range(self.floors)]
+    def quantity(self, name: str) -> tuple[str, int]:
+        """Kind and floor, from 0, of an output.
 
-    def _output(self, name: str) -> tuple[str, int]:
-        found = re.fullmatch(
-            r"(q|v|ar|a|drift|shear)([1-9]\d*)", "shear1" if name == "base_shear" else name
-        )
-        if not found or int(found[2]) > self.floors:
+        Raises:
+            RefusedError: There is no such output.
+        """
+        pattern = r"(q|v|ar|a|drift|shear)([1-9]\d*)"
+        match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
+        if not match or int(match[2]) > self.floors:
             kinds = "q, v, a, ar, drift or shear with a floor"
             raise RefusedError("output", name, f"{kinds} from 1 to {self.floors}, base_shear")
-        return found[1], int(found[2]) - 1
+        return match[1], int(match[2]) - 1
+
+    def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
+        """Refuse weights that buckle a storey somewhere in a box.
+
+        k_z l_z / P_z is least where stiffness is low and mass high; with k_z of columns it falls
+        with heights.
+
+        Args:
+            ends: Lower and upper end of parameters, in SI units; others keep their modal values.
+
+        Raises:
+            RefusedError: One does.
+        """
+        if not self.gravity:
+            return
+        falling = "m" if self.stiffness else "ml"
+        worst = {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
+        p = {
+            name: Jet.constant(np.array([high if name[0] in falling else low]), 0)
+            for name, (low, high) in worst.items()
+        }
+        _require_standing(self.springs(p).value, self.softening(p).value)
+
+    def _of_floors(self, pattern: str, p: Mapping[str, Jet]) -> Jet:
+        """Parameters of all floors, V = (S, n)."""
+        columns = [p[pattern.format(z + 1)][:, None] for z in range(self.floors)]
+        return concatenate(columns, -1)
+
+    def _accelerations(self, p: Mapping[str, Jet]) -> Jet:
+        """Rows of the floors' absolute accelerations, V = (S, n, 2n): forces over masses."""
+        at = self.matrices(p)
+        inertia = -1.0 * self._of_floors("m{}", p) ** -1
+        return inertia[..., None] * concatenate([at.stiffness, at.damping], -1)
+
+
+def chain(links: Array) -> Array:
+    """Matrices (…, n, n) of chains fixed at their lower end, from their links' coefficients."""
+    at, matrix = np.arange(links.shape[-1]), diagonal(links)
+    matrix[..., at[:-1], at[:-1]] += links[..., 1:]
+    matrix[..., at[:-1], at[1:]] = matrix[..., at[1:], at[:-1]] = -links[..., 1:]
+    return matrix
+
+
+def diagonal(values: Array) -> Array:
+    """Diagonal matrices (…, n, n)."""
+    at = np.arange(values.shape[-1])
+    matrix = np.zeros((*values.shape, len(at)))
+    matrix[..., at, at] = values
+    return matrix
+
+
+def _named(
+    pattern: str, values: Sequence[float] | Array, *, single: bool = True
+) -> dict[str, float]:
+    """Values by names with numbers from 1 on; without one where a single value is for all."""
+    if single and len(values) == 1:
+        return {pattern.format(""): float(values[0])}
+    return {pattern.format(z): float(x) for z, x in enumerate(values, start=1)}
+
+
+def _require_standing(stiff: Array, soft: Array) -> None:
+    """Refuse parameter sets (S,) at which the weight buckles a storey, from k and P/l, (S, n).
+
+    A chain's stiffness is positive definite where that of each storey is positive.
+    """
+    for at, z in np.argwhere(~(stiff > soft)):
+        raise RefusedError(
+            f"stiffness of storey {z + 1} under P-Delta",
+            f"{stiff[at, z]:.5g} N/m",
+            f"more than weight over height, {soft[at, z]:.5g} N/m",
+            "else it buckles: take stiffer storeys, lighter floors or narrower supports",
+        )
