@@ -13,7 +13,7 @@ from alphacut.frame.methods.named import METHODS
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
-from alphacut.frame.propagation import beside, envelope
+from alphacut.frame.propagation import envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -24,5 +24,5 @@ __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact",
     "FollowerRecord", "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
-    "Sampled", "Search", "StoreyFrame", "beside", "envelope", "pendulum", "record",
+    "Sampled", "Search", "StoreyFrame", "envelope", "pendulum", "record",
 ]  # fmt: skip

@@ -95,44 +95,45 @@ def envelope(
     over = replace(over, boxes=cuts)
     steps = step_error(over)
     with showing(progress) as tick:
-        found = way.run(over, tick)
-    steps = step_error_at_bounds(found, over, steps)
-    found = _judged(with_step_error(found, over, steps), over, way)
-    found = with_stray(found, over)
-    found = _shifted(found, model) if isinstance(model, StoreyFrame) else found
-    return _on_levels(found, boxes(inputs, alpha).alpha, which)
+        bounds = way.run(over, tick)
+    steps = step_error_at_bounds(bounds, over, steps)
+    bounds = _judged(with_step_error(bounds, over, steps), over, way)
+    bounds = with_stray(bounds, over)
+    bounds = _shifted(bounds, model) if isinstance(model, StoreyFrame) else bounds
+    return _on_levels(bounds, boxes(inputs, alpha).alpha, which)
 
 
-def beside(found: Envelope, proof: Envelope) -> Envelope:
+def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
+    """The envelope of a follower with the proof beside it, where one is affordable."""
+    follows = isinstance(way, GraphFollower | ImprovedFollower)
+    if not (follows and isinstance(over.flow, LinearFlow) and len(over.boxes.names) <= JUDGED):
+        return of
+    exact = replace(over, flow=replace(over.flow, integrator=Exact()))
+    try:
+        proof = Proof(gap=way.tolerance / 4, patient=False).run(exact)
+    except (UnprovedError, ModalError):
+        return of
+    return beside(of, proof, over.scale)
+
+
+def beside(of: Envelope, proof: Envelope, scale: Array) -> Envelope:
     """An envelope with the proved bounds of the exact motion, and its largest distance from them.
 
     The true bound lies between the proved one and the one that the proof attains.
 
-    Raises:
-        FailedError: What it attains lies outside the proved bounds by more than its error.
+    Args:
+        of: The envelope.
+        proof: Bounds of the same motion.
+        scale: Factor on a tolerance for each output, shape (m,).
+
+    Returns:
+        The envelope, whose bounds less this error lie inside the proved ones.
     """
-    outer, inner = proof.proved, proof.attained
-    apart = [np.abs(found.upper - x) for x in (outer.upper, inner.upper)]
-    apart += [np.abs(found.lower - x) for x in (outer.lower, inner.lower)]
-    checked = replace(found, outer=outer, between=proof.between)
-    facts = {**found.facts, "gap": proof.facts["gap"], "estimated_error": float(np.max(apart))}
-    return replace(checked, error=np.max(apart, axis=0), facts=facts)
-
-
-def _judged(found: Envelope, over: UnitFlow, way: Method) -> Envelope:
-    """The envelope of a follower with the proof beside it, where one is affordable."""
-    linear = over.flow
-    few = len(over.boxes.names) <= JUDGED
-    if not (few and isinstance(way, GraphFollower | ImprovedFollower)):
-        return found
-    if not isinstance(linear, LinearFlow):
-        return found
-    exact = replace(over, flow=replace(linear, integrator=Exact()))
-    try:
-        proof = Proof(gap=way.tolerance / 4, patient=False).run(exact)
-    except (UnprovedError, ModalError):
-        return found
-    return beside(found, proof)
+    apart = [np.abs(of.upper - ends.upper) for ends in (proof.proved, proof.attained)]
+    apart += [np.abs(of.lower - ends.lower) for ends in (proof.proved, proof.attained)]
+    error = np.max(apart, axis=0)
+    facts = {**of.facts, "gap": proof.facts["gap"], "estimated_error": float((error / scale).max())}
+    return replace(of, outer=proof.proved, between=proof.between, error=error, facts=facts)
 
 
 def _method(
@@ -159,7 +160,7 @@ def _flow(
     integrator: str | Integrator | None,
     relative: bool,
 ) -> UnitFlow:
-    """The trajectories; accelerations relative to the ground are found as absolute ones."""
+    """The trajectories; accelerations relative to the ground are computed as absolute ones."""
     cuts, called = boxes(inputs, alpha), model.outputs
     flow: LagrangianFlow | LinearFlow
     if isinstance(model, LagrangianSystem):
@@ -189,26 +190,26 @@ def absolute(model: StoreyFrame) -> StoreyFrame:
     return replace(model, outputs=names)
 
 
-def _shifted(found: Envelope, model: LinearSystem) -> Envelope:
+def _shifted(bounds: Envelope, model: LinearSystem) -> Envelope:
     """An envelope whose accelerations are relative to the ground where those of `model` are.
 
     The ground's acceleration is known, so that all bounds move alike and stay as proved.
     """
     if model.ground is None or not (moved := relative_to_ground(model)):
-        return found
-    taken = np.zeros((len(found.time), len(found.outputs)))
-    taken[:, moved] = model.ground.at(found.time)[:, None]
-    pairs = [x and Ends(x.lower - taken, x.upper - taken) for x in (found.inner, found.outer)]
-    between = None if found.between is None else found.between.copy()
+        return bounds
+    taken = np.zeros((len(bounds.time), len(bounds.outputs)))
+    taken[:, moved] = model.ground.at(bounds.time)[:, None]
+    pairs = [x and Ends(x.lower - taken, x.upper - taken) for x in (bounds.inner, bounds.outer)]
+    between = None if bounds.between is None else bounds.between.copy()
     if between is not None:
-        between[:, moved] += ground_stray(model.ground, found.time)[:, None]
-    ends = {"lower": found.lower - taken, "upper": found.upper - taken}
-    return replace(found, **ends, inner=pairs[0], outer=pairs[1], between=between)
+        between[:, moved] += ground_stray(model.ground, bounds.time)[:, None]
+    ends = {"lower": bounds.lower - taken, "upper": bounds.upper - taken}
+    return replace(bounds, **ends, inner=pairs[0], outer=pairs[1], between=between)
 
 
-def _on_levels(found: Envelope, alpha: Array, which: Rows) -> Envelope:
+def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:
     """The envelope on levels `alpha` (A,), each with the bounds of one of its own, `which`."""
     names = ("lower", "upper", "lower_at", "upper_at", "error")
-    own = {name: getattr(found, name)[which] for name in names}
-    pairs = [x and Ends(x.lower[which], x.upper[which]) for x in (found.inner, found.outer)]
-    return replace(found, alpha=alpha, inner=pairs[0], outer=pairs[1], **own)
+    own = {name: getattr(bounds, name)[which] for name in names}
+    pairs = [x and Ends(x.lower[which], x.upper[which]) for x in (bounds.inner, bounds.outer)]
+    return replace(bounds, alpha=alpha, inner=pairs[0], outer=pairs[1], **own)

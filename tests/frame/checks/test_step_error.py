@@ -48,9 +48,7 @@ def test_the_declared_error_covers_that_of_time_stepping():
     assert missed.max() > 3e-4
 
 
-@pytest.mark.parametrize(
-    ("scheme", "step"), [("midpoint", 0.02), ("composition4", 0.1)]
-)
+@pytest.mark.parametrize(("scheme", "step"), [("midpoint", 0.02), ("composition4", 0.1)])
 def test_the_estimate_is_the_error_of_every_scheme(scheme, step):
     """Attained bounds of a single motion are those of its steps, give or take their error."""
     motion = {**MOTION, "step": step, "integrator": scheme, "method": Sampled(4)}

@@ -118,12 +118,11 @@ def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(kind, met
     found = envelope(system, inputs, method=method, **MOTION)
     assert found.nature is Nature.ESTIMATED
     off = np.maximum(np.abs(found.upper - proof.upper), np.abs(found.lower - proof.lower))
-    assert (off <= found.error + proof.error).mean() > 0.995
-    both = frame.beside(found, proof)
-    assert (both.attained.upper <= both.proved.upper + 1e-9).all()
-    wrong = replace(proof, lower=proof.lower / 2, upper=proof.upper / 2, inner=None)
-    with pytest.raises(FailedError, match="outside the proved ones"):
-        frame.beside(found, wrong)
+    assert (off <= found.error + proof.error + 1e-12).all()
+    assert (found.attained.upper <= found.proved.upper + 1e-9).all()
+    assert np.isfinite(found.proved.upper).all()
+    true = proof.attained
+    assert (np.abs(found.upper - true.upper) <= found.error + 1e-12).all()
 
 
 def test_a_wide_box_is_proved_in_parts_where_the_degree_is_limited():

@@ -92,12 +92,18 @@ SYSTEM = {
     [
         ({"coordinates": 0}, "coordinates is 0"),
         ({"parameters": {}}, "parameters is"),
-        ({"lagrangian": lambda q, v, p: p["x"] * v[0] ** 2}, r"KeyError\('x'\); allowed: functions of m"),
+        (
+            {"lagrangian": lambda q, v, p: p["x"] * v[0] ** 2},
+            r"KeyError\('x'\); allowed: functions of m",
+        ),
         ({"lagrangian": lambda q, v, p: v[1] ** 2}, "IndexError"),
         ({"lagrangian": lambda q, v, p: v[0] ** 3}, "quadratic in v"),
         ({"lagrangian": lambda q, v, p: q[0] ** 2}, "singular; allowed: inertia"),
         ({"lagrangian": lambda q, v, p: v[0] ** 2 - sympy.Abs(q[0])}, "lagrangian is Abs"),
-        ({"lagrangian": lambda q, v, p: np.sin(q[0])}, "lagrangian is TypeError.*allowed: functions of m and the coordinates by"),
+        (
+            {"lagrangian": lambda q, v, p: np.sin(q[0])},
+            "lagrangian is TypeError.*allowed: functions of m and the coordinates by",
+        ),
         ({"initial": lambda p: [1.0]}, "initial is"),
         ({"initial": lambda p: ([1.0, 2.0], [0.0])}, "a list of 1"),
         ({"force": lambda q, v, p: 3.0}, "force is 3.0; allowed: a list of 1"),
