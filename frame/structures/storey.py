@@ -114,6 +114,8 @@ class StoreyFrame:
         ranges |= {"modulus": of_storey_frame("E").range}
         ranges |= {"rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}
         n = len(self.masses)
+        if not n:
+            raise RefusedError("masses", None, "one value a floor, from below")
         for name, rule in ranges.items():
             values = getattr(self, name)
             if values is None:
@@ -125,7 +127,7 @@ class StoreyFrame:
                     raise RefusedError(name, f"{value:g}", rule or "finite numbers")
             size = np.size(values)
             one = size == 1 and name in ("second_moment", "damping_ratio")
-            if name in SYMBOLS and not one and (size not in (0, n) or not n):
+            if name in SYMBOLS and not one and size not in (0, n):
                 raise RefusedError(name, f"a list of {size}", f"one value a floor, {n} from below")
         if self.damper_placement not in ("ground", "storey"):
             raise RefusedError("damper_placement", self.damper_placement, "ground, storey")

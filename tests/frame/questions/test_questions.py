@@ -185,5 +185,6 @@ def test_a_share_of_relative_tolerances_would_be_seen():
     of = peaks(motion)
     assert (of.error > 0).all()
     assert (of.reached <= of.upper).all()
-    shaken = replace(motion, error=np.zeros_like(motion.lower), between=None)
+    plain = {"between": None, "outer": None}
+    shaken = replace(motion, error=np.zeros_like(motion.lower), **plain)
     assert (peaks(shaken).error == 0).all()
