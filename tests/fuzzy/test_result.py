@@ -65,6 +65,18 @@ def test_attained_bounds_lie_inside_proved_ones_but_for_the_error_of_the_scheme(
     assert (both.attained.upper < found.upper).all()
 
 
+@pytest.mark.parametrize(("far", "refused"), [(0.5, False), (2.0, True)])
+def test_bounds_may_miss_each_other_by_rounding_and_no_more(far, refused):
+    """By a billionth of 16, the output's size, which rounding explains; not by two."""
+    found = replace(bounds(), nature=Nature.GUARANTEED)
+    beyond = Ends(found.lower, found.upper + far * 16e-9)
+    if not refused:
+        replace(found, inner=beyond)
+        return
+    with pytest.raises(FailedError, match="lie outside"):
+        replace(found, inner=beyond)
+
+
 def test_an_output_and_its_extremes_over_time_are_read_by_name():
     found = bounds(time=np.array([0.0, 1.0]))
     assert found.minimum.tolist() == [[1], [4]]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = json.loads((Path(__file__).parent / "golden.json").read_text(encoding="utf-8"))
@@ -91,6 +92,21 @@ def overlapping_cuts(new, old):
     assert (new_high - new_low <= 1.5 * (old_high - old_low)).all()
 
 
+def attained_within_proved(folder):
+    """Whether in each kept envelope the true bounds, error and all, lie within what is proved."""
+    for path in folder.glob("envelope*.nc"):
+        data = xarray.load_dataset(path)
+        proved = data.attrs["nature"] == "guaranteed"
+        inner = (data.inner_lower, data.inner_upper) if proved else (data.lower, data.upper)
+        spare = 0 * data.error if proved else data.error
+        outer = ("lower", "upper") if proved else ("proved_lower", "proved_upper")
+        for side, value, name in zip((-1, 1), inner, outer, strict=True):
+            if name in data:
+                beyond = side * (value - data[name]) - spare
+                assert float(beyond.max()) <= 1e-9 * float(abs(data.upper).max()), (path.name, name)
+        assert (data.lower <= data.upper).all(), path.name
+
+
 def compare(new, old):
     """Compare what both summaries have; at least one thing."""
     parts = {"modulus": same_modulus, "decision": same_decision}
@@ -112,6 +128,7 @@ def compare(new, old):
 @pytest.mark.parametrize("case", QUICK)
 def test_a_case_has_its_golden_numbers(case, tmp_path):
     compare(summary_of(case, tmp_path / "out", QUICK[case]), GOLDEN[case])
+    attained_within_proved(tmp_path / "out")
 
 
 @pytest.mark.slow
@@ -119,6 +136,7 @@ def test_a_case_has_its_golden_numbers(case, tmp_path):
 def test_a_whole_case_has_its_golden_numbers(case, tmp_path):
     new = summary_of(case, tmp_path / "out")
     compare(new, GOLDEN[case])
+    attained_within_proved(tmp_path / "out")
     assert set(GOLDEN[case].get("envelopes", {})) <= set(new.get("envelopes", {}))
 
 

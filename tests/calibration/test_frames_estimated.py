@@ -1,0 +1,60 @@
+"""Estimated bounds of random frames, the hard kinds among them: their errors cover."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from alphacut.frame import GraphFollower, ImprovedFollower, Search, envelope
+from alphacut.frame.structures.linear import frequencies
+from alphacut.fuzzy import Interval
+from tests.calibration.declared import Calibration, free_seed
+from tests.calibration.motions import exact_flow, judged, random_frame, reached
+
+TOLERANCE = 1e-3
+METHODS = [Search(TOLERANCE), GraphFollower(tolerance=TOLERANCE), ImprovedFollower(TOLERANCE)]
+
+
+def usual(rng):
+    """Up to nine inputs."""
+    return random_frame(rng, inputs=int(rng.integers(1, 10)))
+
+
+def undamped(rng):
+    """Nothing forgets its phase."""
+    return random_frame(rng, inputs=int(rng.integers(1, 6)), damped=False)
+
+
+def large_steps(rng):
+    """Undamped, with nodes half of the longest period apart."""
+    drawn = undamped(rng)
+    step = np.pi / float(frequencies(drawn.system)[0])
+    return replace(drawn, step=step, duration=20 * step)
+
+
+def wide(rng):
+    """One stiffness from a thirtieth of its value to thirty times it."""
+    drawn = random_frame(rng, inputs=1)
+    value = drawn.system.parameters["k1"]
+    return replace(drawn, inputs={"k1": Interval(0.03 * value, 30 * value)})
+
+
+KINDS = {"usual": usual, "undamped": undamped, "large steps": large_steps, "wide": wide}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_errors_of_searches_and_followers_cover(kind):
+    seed = free_seed(kind)
+    table = Calibration(f"frames under estimate, {kind}: declared over true", seed)
+    for number in range(6):
+        rng = np.random.default_rng([seed, number])
+        drawn = KINDS[kind](rng)
+        ends = reached(exact_flow(drawn), drawn.inputs, rng)
+        for method in METHODS:
+            found = envelope(
+                drawn.system, drawn.inputs, method=method, integrator="exact", **drawn.motion
+            )
+            case = number, method.name, *drawn.inputs
+            judged(table, found, ends, method.name, case, tolerance=TOLERANCE)
+    table.judge()
