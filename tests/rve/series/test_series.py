@@ -4,6 +4,7 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.cell import square_moduli, with_ratio
+from alphacut.rve.series import stiffness
 from alphacut.rve.series.lattice_sums import lattice_sums
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
@@ -241,3 +242,19 @@ def test_errors_of_the_rules_that_judge_are_declared_too():
     )
     own, right = (with_ratio(square_moduli(one.stiffness)) for one in (found, exact))
     assert (abs(own / right - 1) <= sum(found.errors.values())).all()
+
+
+def test_a_second_series_that_meets_the_first_by_chance_hides_no_error(monkeypatch):
+    """Of three lengths the second is off by as much as the first; the third, longer, tells."""
+    lengths = []
+
+    def by_length(load, length, radius, contrast):
+        lengths.append(length)
+        return np.full((1, 1), 1.001 if length in lengths[:2] else 1.0)
+
+    monkeypatch.setattr(stiffness, "multipoles", lambda *of, harmonics: harmonics)
+    monkeypatch.setattr(stiffness, "modulus", by_length)
+    contrast = stiffness.Contrast.of(MATRIX, [Phase(80e9)])
+    _, errors = stiffness._solve_batch(np.array([0.5]), contrast, 8, ["hydrostatic"])
+    assert len(set(lengths)) == 3
+    assert 1e-3 <= errors[0, 0, 0] <= 1.8e-3

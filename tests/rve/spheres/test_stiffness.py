@@ -154,3 +154,17 @@ def test_nearly_touching_spheres_are_refused(monkeypatch, most):
 def test_a_radius_outside_is_refused(radius):
     with pytest.raises(RefusedError):
         cubic_stiffness([radius], MATRIX, [MATRIX])
+
+
+def test_a_second_series_that_meets_the_first_by_chance_hides_no_error(monkeypatch):
+    """Of three lengths the second is off by as much as the first; the third, longer, tells."""
+    lengths = []
+
+    def by_length(radius, matrix, inclusions, degree):
+        lengths.append(degree)
+        return np.full((1, 1, 3), 1.001 if degree in lengths[:2] else 1.0)
+
+    monkeypatch.setattr(series, "_moduli", by_length)
+    cell = cubic_stiffness([0.5], MATRIX, [Phase(80e9)], tolerance=1e-2)
+    assert len(set(lengths)) == 3
+    assert 1e-3 <= cell.errors.max() <= 2.2e-3
