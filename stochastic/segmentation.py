@@ -6,8 +6,13 @@ its classes are assigned anew until nothing changes. A pixel may belong to eithe
 threshold where its grey value is nearer to it than `CONFIDENT` deviations of the noise and the
 light there. Texture of the phases counts as noise.
 
-Smoothing is that of non-local means (Buades, Coll, Morel 2005), which keeps edges. What a second
-pass would change once more, the first may have moved: that is in doubt besides.
+Grey values that are clipped hide noise and light, so that no judgement holds: an image is refused
+where the values of a class pile up at an end, or one class is flat beside another one that is not.
+Clipped until both are flat, an image looks like a clean one and is taken for it.
+
+Smoothing is that of non-local means (Buades, Coll, Morel 2005), which keeps edges. In doubt besides
+is what a second pass would change once more, or one deviation of the noise that smoothing leaves
+(measured by adding half as much noise again), whichever is more.
 """
 
 from __future__ import annotations
@@ -16,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import maximum_filter, median_filter, minimum_filter, uniform_filter
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError
@@ -30,7 +35,11 @@ _BORDER = 3  # pixels from a border that do not help, if
 _ENOUGH = 0.1  # of each class is farther from it
 _MOST = 0.9  # of the pixels, whose rest is noise: of rounded grey values half may have none
 _EXACT = 1e-9  # of the grey values: noise that is rounding
+_LEAST_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
+_FLAT = 0.95  # of a class at one value; where particles meet, a blurred image has others
+_FEWEST = 50  # pixels of a class that tell
 _PATCH, _REACH = 5, 7  # pixels of a neighbourhood, and to those that it is compared with
+_AGAIN = 4  # times that noise is added to see what smoothing leaves
 _STRENGTH = 0.8  # of the smoothing, over the noise
 
 
@@ -45,7 +54,7 @@ class Segmentation:
         levels: Grey value of each class under mean light.
         light: What the light adds to each pixel, of mean zero, shape (rows, columns).
         noise: Standard deviation of the rest, in grey values.
-        moved: What smoothing may have moved each grey value by.
+        moved: What smoothing may have moved each grey value by, or left of its noise.
     """
 
     grey: Array
@@ -122,18 +131,43 @@ def segmented(
             image, then give way to the `middles` of the even one.
 
     Raises:
-        RefusedError: A class has no pixel.
+        RefusedError: A class has no pixel, or grey values are clipped.
     """
     values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
+    _refuse_clipped(values, borders)
     moved: Array | float = 0.0
     if level:
         values = values - _judged(values, borders).light
         borders = _judged(values, borders).middles
     if smooth and (noise := _judged(values, borders).noise):
-        values = _smoothed(values, noise)
-        moved = np.abs(values - _smoothed(values, noise))
+        rough, values = values, _smoothed(values, noise)
+        again = np.abs(values - _smoothed(values, noise))
+        moved = np.maximum(again, _left(rough, values, noise))
     judged = _judged(values, borders)
     return Segmentation(values, borders, judged.levels, judged.light, judged.noise, moved)
+
+
+def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
+    """Refuses grey values that were cut off at an end.
+
+    Raises:
+        RefusedError: They were.
+    """
+    labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
+    far = _far(labels, _BORDER)
+    classes = [values[far & (labels == k)] for k in range(len(borders) + 1)]
+    classes = [own for own in classes if own.size >= _FEWEST]
+    flat = [float(np.mean(own == np.median(own))) >= _FLAT for own in classes]
+    for end in (float(values.min()), float(values.max())):
+        for own, even in zip(classes, flat, strict=True):
+            place, counts = np.unique(np.abs(own - end), return_counts=True)
+            pile = counts[0] / own.size if place[0] == 0 else 0.0
+            following = counts[1] / own.size if len(counts) > 1 else 0.0
+            steep = pile >= _LEAST_PILE and pile > _STEEPEST * following
+            if steep and not (even and all(flat)):
+                what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
+                cure = "take the image before its contrast was raised, or give cell.labels"
+                raise RefusedError("image", what, "grey values that are not clipped", cure)
 
 
 def _judged(values: Array, borders: tuple[float, ...]) -> Segmentation:
@@ -158,6 +192,19 @@ def _smoothed(grey: Array, noise: float) -> Array:
         around, patch_size=_PATCH, patch_distance=_REACH, h=_STRENGTH * noise, sigma=noise
     )
     return np.asarray(whole[edge:-edge, edge:-edge])
+
+
+def _left(rough: Array, smooth: Array, noise: float) -> Array:
+    """Noise that smoothing leaves in each pixel: from what it makes of half as much again nearby.
+
+    Near borders few patches are alike, so that more is left than inside the classes.
+    """
+    rng = np.random.default_rng(0)
+    squares = [
+        (_smoothed(rough + noise / 2 * rng.normal(size=rough.shape), noise) - smooth) ** 2
+        for _ in range(_AGAIN)
+    ]
+    return np.asarray(2 * np.sqrt(uniform_filter(np.mean(squares, axis=0), 3, mode="wrap")))
 
 
 def _polynomials(shape: tuple[int, ...]) -> Array:
@@ -194,10 +241,13 @@ def _inner(labels: Rows, classes: int) -> Mask:
         allowed = "values that leave each class some pixels"
         raise RefusedError("threshold", "beyond the grey values of a class", allowed)
     for reach in range(_BORDER, 0, -1):
-        low, high = (
-            f(labels, 2 * reach + 1, mode="wrap") for f in (minimum_filter, maximum_filter)
-        )
-        inner = low == high
+        inner = _far(labels, reach)
         if (np.bincount(labels[inner], minlength=classes) >= _ENOUGH * counts).all():
-            return np.asarray(inner)
+            return inner
     return np.ones(labels.shape, bool)
+
+
+def _far(labels: Rows, reach: int) -> Mask:
+    """Pixels with none of another class up to so many pixels away."""
+    low, high = (f(labels, 2 * reach + 1, mode="wrap") for f in (minimum_filter, maximum_filter))
+    return np.asarray(low == high)

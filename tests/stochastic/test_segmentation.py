@@ -57,7 +57,7 @@ def test_a_border_is_open_by_the_deviations_of_the_noise():
 
 @pytest.mark.parametrize(
     ("noise", "drift", "options"),
-    [(0.2, 0.0, {}), (0.02, 0.9, {}), (0.6, 0.0, {"smooth": True})],
+    [(0.15, 0.0, {}), (0.02, 0.9, {}), (0.6, 0.0, {"smooth": True})],
 )
 def test_what_noise_and_light_leave_too_open_is_refused(noise, drift, options):
     grey, _ = picture(np.random.default_rng(2), noise=noise, drift=drift)
@@ -68,7 +68,7 @@ def test_what_noise_and_light_leave_too_open_is_refused(noise, drift, options):
 
 @pytest.mark.parametrize(
     ("noise", "drift", "options"),
-    [(0.2, 0.0, {"smooth": True}), (0.02, 0.9, {"level": True})],
+    [(0.15, 0.0, {"smooth": True}), (0.02, 0.9, {"level": True})],
 )
 def test_smoothing_and_levelling_cure_what_was_refused(noise, drift, options):
     grey, cover = picture(np.random.default_rng(2), noise=noise, drift=drift)
@@ -80,3 +80,25 @@ def test_smoothing_and_levelling_cure_what_was_refused(noise, drift, options):
 def test_a_threshold_beyond_the_grey_values_is_refused():
     with pytest.raises(RefusedError, match="leave each class some pixels"):
         segmented(np.random.default_rng(0).normal(size=(9, 9)), [30])
+
+
+@pytest.mark.parametrize("ends", [(60, 255), (0, 160), (75, 255), (55, 150), (62, 158)])
+def test_clipped_grey_values_are_refused(ends):
+    grey, _ = picture(np.random.default_rng(6), noise=0.05)
+    with pytest.raises(RefusedError, match="not clipped"):
+        segmented(np.clip(grey, *ends), [110])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01, 0.1])
+@pytest.mark.parametrize("drift", [0.0, 0.05, 0.3])
+def test_grey_values_that_are_rounded_are_not_clipped(noise, drift):
+    for seed in range(6):
+        rng = np.random.default_rng([seed, 7])
+        segmented(picture(rng, noise=noise, drift=drift, blur=seed % 3)[0], [110])
+
+
+def test_an_image_of_two_values_is_taken_as_it_is():
+    _, cover = picture(np.random.default_rng(8))
+    judged = segmented(255 * (cover >= 0.5), [128])
+    assert judged.open == 0
+    assert judged.fractions[1] == np.mean(cover >= 0.5)
