@@ -45,8 +45,6 @@ class Study:
         seed: Seed of everything that is left to chance.
         confidence: Level of the simultaneous bootstrap band, in (0, 1).
         bootstrap: Number of resamples, at least 100.
-        band: Half width, in probability, by which the distribution may leave the p-box; None for
-            that bootstrap band.
         sampling: Whether the supports of a2 and a4 also hold the slopes' own bootstrap band, so
             that fewer data make a fuzzier map. None: of measured particles, not of simulated ones,
             whose number is a matter of choice.
@@ -62,7 +60,6 @@ class Study:
     seed: int = 0
     confidence: float = 0.99
     bootstrap: int = 500
-    band: float | None = None
     sampling: bool | None = None
     distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
 
@@ -73,7 +70,6 @@ class Study:
             ("share", 0 < self.share < 1, "values in (0, 1)"),
             ("confidence", 0 < self.confidence < 1, "values in (0, 1)"),
             ("bootstrap", self.bootstrap >= 100, "numbers from 100 on"),
-            ("band", 0 <= (self.band or 0) < 1, "values in [0, 1)"),
         ):
             if not meaningful:
                 raise RefusedError(f"microstructure.{name}", getattr(self, name), allowed)
@@ -138,11 +134,6 @@ class Microstructure:
     slopes: SlopeBand
     band: float
     seconds: dict[str, float]
-
-    @property
-    def allowed(self) -> float:
-        """Half width by which the distribution may leave the p-box."""
-        return self.band if self.study.band is None else self.study.band
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -242,8 +233,7 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
         resamples=case.bootstrap,
         generator=np.random.default_rng(streams[1]),
     )
-    width = band if case.band is None else case.band
-    pbox = least_pbox(fit, kept, width, hold=slopes if case.holds_slopes else None)
+    pbox = least_pbox(fit, kept, band, hold=slopes if case.holds_slopes else None)
     return kept, pbox, slopes, band
 
 
@@ -264,14 +254,3 @@ def mean_correlation(result: Microstructure) -> float:
     """Mean correlation of r_n between cells of discs that share a wall."""
     diagrams = [section.diagram for section in result.sections if section.diagram]
     return float(np.mean([cell_correlation(one, one.reduced_radii) for one in diagrams]))
-
-
-def hexagonal_order(result: Microstructure) -> float:
-    """Root mean square over the sections of the order of bonds between neighbours, 0 … 1.
-
-    |⟨e^{6iφ}⟩| is 1 in one crystal, about 1/√m of m bonds at random directions (Nelson and Halperin
-    1979).
-    """
-    angles = [np.arctan2(one.apart[:, 1], one.apart[:, 0]) for one in result.direct]
-    order = [abs(np.exp(6j * angle).mean()) if len(angle) else 0.0 for angle in angles]
-    return float(np.sqrt(np.mean(np.square(order))))

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.stochastic.microstructure import Microstructure, hexagonal_order, mean_correlation
+from alphacut.stochastic.microstructure import Microstructure, mean_correlation
 
 if TYPE_CHECKING:
     import xarray
 
 CRISP = 1e-6  # of a3 − a1: nearer to the fitted slope, an end is round-off of the fit
-ORDERED = 0.1  # order of bonds above which particles lie in rows
 
 
 def summary(result: Microstructure) -> dict[str, object]:
@@ -40,10 +39,8 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
     diagrams = [section.diagram for section in result.sections if section.diagram]
     if not diagrams:
         return {}
-    order = hexagonal_order(result)
     number = np.concatenate([one.number for one in result.direct])
     distance = np.concatenate([one.distances for one in result.direct])
-    bonds = max(len(distance) / 2 / len(diagrams), 1.0)
     return {
         "cell_areas_sum_error": max(
             abs(one.areas.sum() / one.discs.measure - 1) for one in diagrams
@@ -53,8 +50,6 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
             "mean": float(number.mean()) if len(number) else None,
             "mean_distance": float(distance.mean()) if len(distance) else None,
         },
-        "hexagonal_order": order,
-        "crystalline": bool(order > max(ORDERED, 3 / np.sqrt(bonds))),
         "correlation": mean_correlation(result),
     }
 
@@ -76,7 +71,6 @@ def _of_map(result: Microstructure) -> dict[str, object]:
         "a4_band": list(result.slopes.a4),
         "confidence": result.study.confidence,
         "band": result.band,
-        "band_allowed": result.allowed,
         "pbox_area": box.area,
         "pbox_breach": box.excess(result.kept),
         "misfit": box.fit.misfit(result.kept, (box.a2[1], box.a4[1])),
@@ -123,7 +117,7 @@ def to_dataset(result: Microstructure) -> xarray.Dataset:
         "fitted": np.interp(radius, fit.map((box.a2[1], box.a4[1]))(theta), share),
     }
     attributes = {"a1": fit.a1, "a2": list(box.a2), "a3": fit.a3, "a4": list(box.a4)}
-    attributes |= {"band": result.band, "band_allowed": result.allowed, "seed": result.study.seed}
+    attributes |= {"band": result.band, "seed": result.study.seed}
     dataset = xarray.Dataset(
         {name: ("r_n", values, {"units": "1"}) for name, values in columns.items()},
         {"r_n": radius},

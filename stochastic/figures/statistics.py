@@ -132,13 +132,13 @@ def draw_pbox(result: Microstructure) -> Figure:
     radius, share = table["r_n"].values, table["cdf"].values
     for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
         scale = 1 if panel is axes else 100
-        low, high = np.maximum(share - result.allowed, 0), np.minimum(share + result.allowed, 1)
+        low, high = np.maximum(share - result.band, 0), np.minimum(share + result.band, 1)
         panel.fill_between(
             radius,
             scale * (low - base),
             scale * (high - base),
             color=PALE,
-            label=f"band of ± {result.allowed:.2g}",
+            label=f"band of ± {result.band:.2g}",
         )
         panel.plot(
             radius, scale * (share - base), color=BLUE, label=f"{len(result.kept.values)} cells"

@@ -13,6 +13,8 @@ from alphacut.stochastic.particles.neighbour_search import close_pairs, surface_
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import require_radii
 
+ROUNDING = 1e-9  # overlap over the smaller radius that is no overlap
+
 
 @dataclass(frozen=True)
 class CircleFile:
@@ -20,23 +22,11 @@ class CircleFile:
 
     Args:
         path: The file. A column "d" (diameter) may stand in for r.
-        size: Width and height of the box or window, in m.
-        origin: Its lower left corner in the file's coordinates, in m.
-        periodic: Whether the section repeats itself; otherwise the rectangle is a window, and only
-            cells that no disc beyond its edge can change are counted (see `whole_cells`).
-        overlap: Overlap of two circles that is taken for an error of measurement, as a share of the
-            smaller radius, below 1.
+        size: Width and height of the section, a window with a corner at the origin, in m.
     """
 
     path: Path
     size: tuple[float, float]
-    origin: tuple[float, float] = (0.0, 0.0)
-    periodic: bool = False
-    overlap: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.overlap < 1:
-            raise RefusedError("microstructure.circles.overlap", self.overlap, "values in [0, 1)")
 
     def read(self) -> Particles:
         """The circles, origin at the corner of the section.
@@ -45,7 +35,7 @@ class CircleFile:
             RefusedError: The file cannot be read, or a circle lies outside or overlaps another one.
         """
         table = length_columns(self.path, ("x", "y", "r"))
-        centres, radii = table.values[:, :2] - self.origin, table.values[:, 2]
+        centres, radii = table.values[:, :2], table.values[:, 2]
         for row, centre, radius in zip(table.rows, centres, radii, strict=True):
             require_radii(f"{self.path.name}, row {row}", radius)
             if not ((centre >= 0) & (centre <= self.size)).all():
@@ -53,21 +43,21 @@ class CircleFile:
                 width, height = (f"{1e3 * side:g}" for side in self.size)
                 allowed = f"places in the section of {width} × {height} mm"
                 raise RefusedError(f"{self.path.name}, row {row}", value, allowed)
-        discs = Particles(centres, radii, np.array(self.size), self.periodic)
+        discs = Particles(centres, radii, np.array(self.size), periodic=False)
         self._refuse_overlap(discs, table)
         return discs
 
     def _refuse_overlap(self, discs: Particles, table: LengthColumns) -> None:
-        """Refuses the file where two circles overlap by more than `overlap`."""
+        """Refuses the file where two circles overlap."""
         first, second = close_pairs(discs, 0.0)
         smaller = np.minimum(discs.radii[first], discs.radii[second])
         share = -surface_distance(discs, first, second) / smaller
-        if share.max(initial=0.0) > max(self.overlap, 1e-9):
+        if share.max(initial=0.0) > ROUNDING:
             worst = int(np.argmax(share))
             one, other = sorted(int(table.rows[k]) for k in (first[worst], second[worst]))
             raise RefusedError(
                 f"{self.path.name}, row {other}",
                 f"a circle that overlaps that of row {one} by {share[worst]:.2g} of its radius",
-                f"overlaps up to {self.overlap:g}",
-                "mend the row, or raise microstructure.circles.overlap",
+                "circles that do not overlap",
+                "mend the row",
             )

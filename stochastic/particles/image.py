@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic.particles.particles import Particles
 
-Brightness = Literal["auto", "bright", "dark"]
 SMOOTHING = 1.5  # standard deviation, in pixels
 SMALLEST = 4.0  # least radius of a particle, in pixels
 ROUND = 0.9  # share of its convex hull that a round piece fills
@@ -35,13 +33,11 @@ TILES = 8  # along each side of the image
 class SectionImage:
     """An image of a section with round particles of one brightness in a matrix of another.
 
+    The particles are the phase whose pieces fill more of their convex hulls.
+
     Args:
         path: Image file.
         pixel: Side of a pixel, in m.
-        particles: "bright" or "dark" against the matrix; "auto" takes the phase whose pieces fill
-            more of their convex hulls.
-        crop: The part of the image that is material: left, top, right, bottom, in pixels from the
-            upper left corner; None for all of it.
 
     Raises:
         RefusedError: A value lies outside its range.
@@ -49,8 +45,6 @@ class SectionImage:
 
     path: Path
     pixel: float
-    particles: Brightness = "auto"
-    crop: tuple[int, int, int, int] | None = None
 
     def __post_init__(self) -> None:
         if not 1e-12 <= self.pixel <= 1:
@@ -76,9 +70,6 @@ class SectionImage:
             ) from None
         if picture.ndim == 3:
             picture = color.rgb2gray(picture[..., :3]) if picture.shape[2] > 2 else picture[..., 0]
-        if self.crop:
-            left, top, right, bottom = self.crop
-            picture = picture[max(top, 0) : bottom, max(left, 0) : right]
         if picture.ndim != 2 or min(picture.shape) < 16:
             size = " × ".join(map(str, picture.shape))
             raise RefusedError("image", f"{size} pixels", "plane images of 16 × 16 pixels or more")
@@ -131,10 +122,7 @@ class SectionImage:
             )
             allowed = f"images of two greys, {NOISE:g} standard deviations apart"
             raise RefusedError(self.path.name, value, allowed, "average the image before")
-        dark = self.particles == "dark"
-        if self.particles == "auto":
-            dark = _convexity(~bright) > _convexity(bright)
-        phase: Mask = ~bright if dark else bright
+        phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
         if (apart := _unevenness(smooth, ~phase) / contrast) > UNEVEN:
             value = f"light that differs by {apart:.2g} of the contrast"
             cure = "subtract the background, for example by skimage.restoration.rolling_ball"

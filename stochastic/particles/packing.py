@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -15,8 +15,6 @@ from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
 from alphacut.stochastic.particles.relaxation import relaxed
 
-Method = Literal["auto", "sequential", "relaxed"]
-METHODS = get_args(Method)
 ROUNDS = 1000  # proposals for one particle before the packing is given up
 MOST = 100_000  # particles to which their number is raised where the largest needs more room
 
@@ -29,9 +27,6 @@ class Packing:
         number: Number of particles, at least 1; more are drawn until the box holds the largest.
         fraction: Share of the square or cube that they take, above 0 and below `Shape.densest`.
         radii: Law of the radii, by number.
-        gap: Least distance between surfaces, in m, not negative.
-        method: "sequential" (random sequential addition), "relaxed" (for dense packings), or "auto"
-            (the first where it can).
         shape: Discs or spheres.
 
     Raises:
@@ -41,8 +36,6 @@ class Packing:
     number: int
     fraction: float
     radii: RadiusLaw
-    gap: float = 0.0
-    method: Method = "auto"
     shape: Shape = DISCS
 
     def __post_init__(self) -> None:
@@ -55,8 +48,6 @@ class Packing:
                 0 < self.fraction <= self.shape.densest,
                 f"values in (0, {self.shape.densest:g}]",
             ),
-            ("gap", self.gap, 0 <= self.gap < np.inf, "finite lengths from 0 m on"),
-            ("method", self.method, self.method in METHODS, ", ".join(METHODS)),
         ):
             if not meaningful:
                 raise RefusedError(f"packing.{key}", value, allowed)
@@ -80,7 +71,7 @@ class Packing:
         radii: Array = np.empty(0)
         side = -np.inf
         room = 2.0 * (self.shape.dimensions - 1)  # a sphere's cell has room for its own images
-        while not len(radii) or room * radii.max() + self.gap > side:
+        while not len(radii) or room * radii.max() > side:
             if len(radii) >= max(MOST, self.number):
                 least = f"more than {MOST}, where the largest radius is {radii.max():.3g} m"
                 cure = "leave out the smallest sizes, or lower the fraction"
@@ -91,25 +82,14 @@ class Packing:
         return radii, side
 
     def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:
-        """Centres by the method of choice, shape (n, d), in m."""
-        grown = float(self.shape.measure(radii + self.gap / 2).sum() / box.prod())
-        if grown > self.shape.densest:
-            allowed = f"gaps that leave particles and half gaps {self.shape.densest:g} of the box"
-            raise RefusedError("packing.gap", f"{self.gap:g} m", allowed)
-        dense = self.method == "auto" and grown > self.shape.sequential
-        if self.method == "relaxed" or dense:
-            return relaxed(radii, box, gap=self.gap, generator=generator)
-        try:
-            return random_sequential(radii, box, gap=self.gap, generator=generator)
-        except FailedError:
-            if self.method == "sequential":
-                raise
-            return relaxed(radii, box, gap=self.gap, generator=generator)
+        """Centres one by one where the packing is loose, else pushed apart; (n, d), in m."""
+        if self.fraction <= self.shape.sequential:
+            with suppress(FailedError):
+                return random_sequential(radii, box, generator)
+        return relaxed(radii, box, generator)
 
 
-def random_sequential(
-    radii: Array, box: Array, *, gap: float, generator: np.random.Generator
-) -> Array:
+def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array:
     """Centres of particles without overlap in a periodic box, shape (n, d), in m.
 
     Particles are added from the largest down, in blocks; each one that fails is proposed again at a
@@ -118,19 +98,18 @@ def random_sequential(
     Args:
         radii: shape (n,), in m.
         box: Sides of the box, shape (d,), in m.
-        gap: Least distance between surfaces, in m.
         generator: Source of chance.
 
     Raises:
         FailedError: A particle finds no place in `ROUNDS` proposals.
     """
     order = np.argsort(-radii, kind="stable")
-    grown = radii[order] + gap / 2
+    falling = radii[order]
     centres: Array = np.zeros((0, len(box)))
     while len(centres) < len(order):
         block = slice(len(centres), min(len(order), max(64, int(1.5 * len(centres)))))
-        standing = _Standing(centres, grown[: len(centres)], box)
-        centres = np.concatenate([centres, _added(standing, grown[block], generator)])
+        standing = _Standing(centres, falling[: len(centres)], box)
+        centres = np.concatenate([centres, _added(standing, falling[block], generator)])
     placed = np.empty_like(centres)
     placed[order] = centres
     return placed
@@ -178,7 +157,7 @@ def _added(standing: _Standing, radii: Array, generator: np.random.Generator) ->
     raise FailedError(
         f"random sequential addition has no place for {int(np.isnan(new[:, 0]).sum())} of"
         f" {len(radii)} particles after {ROUNDS} proposals each",
-        'lower the fraction or take method = "relaxed"',
+        "lower the fraction",
     )
 
 

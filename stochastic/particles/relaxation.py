@@ -20,20 +20,19 @@ STEPS = 4000  # of the relaxation before it is given up
 SWEEPS, EACH = 60, 5  # random moves per particle after it, and between two searches of neighbours
 
 
-def relaxed(radii: Array, box: Array, *, gap: float, generator: np.random.Generator) -> Array:
+def relaxed(radii: Array, box: Array, generator: np.random.Generator) -> Array:
     """Centres of particles without overlap in a periodic box, shape (n, d), in m.
 
     Args:
         radii: shape (n,), in m.
         box: Sides of the box, shape (d,), in m.
-        gap: Least distance between surfaces, in m.
         generator: Source of chance.
 
     Raises:
         FailedError: The particles still overlap after all steps.
     """
     start = box * generator.random((len(radii), len(box)))
-    own = Particles(start, radii + gap / 2, box)
+    own = Particles(start, radii, box)
     grown = own.fraction + HEADROOM * (own.shape.densest - own.fraction)
     growth = max(1 + 1e-4, float((grown / own.fraction) ** (1 / len(box))))
     return _shake(_push(own, growth), generator)
@@ -64,9 +63,9 @@ def _push(own: Particles, growth: float) -> Particles:
         velocity = velocity + step * force
         centres = centres + step * velocity
     raise FailedError(
-        f"{own.shape.particles} on a share {own.fraction:.3f} of the box (half the gap counted to"
-        f" each radius) still overlap by {overlap:.3g} m after {STEPS} steps",
-        "lower the fraction or the gap",
+        f"{own.shape.particles} on a share {own.fraction:.3f} of the box still overlap by"
+        f" {overlap:.3g} m after {STEPS} steps",
+        "lower the fraction",
     )
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.distance import pdist
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.stochastic.particles import relaxation
 from alphacut.stochastic.particles.neighbour_search import close_pairs, smallest_gap
-from alphacut.stochastic.particles.packing import Packing
+from alphacut.stochastic.particles.packing import Packing, random_sequential
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.particles.wicksell import unfolded
@@ -33,36 +33,26 @@ def brute_gap(particles: Particles) -> float:
     return best
 
 
-@pytest.mark.parametrize("method", ["auto", "sequential", "relaxed"])
 @pytest.mark.parametrize(
-    ("law", "fraction", "gap", "shape"),
+    ("law", "fraction", "shape"),
     [
-        (EQUAL, 0.4, 1e-4, DISCS),
-        (TENFOLD, 0.4, 0.0, DISCS),
-        (LogNormalRadii(1e-4, 1e-2), 0.3, 0.0, DISCS),
-        (LogNormalRadii(1e-3, 2e-3), 0.2, 1e-5, SPHERES),
+        (EQUAL, 0.4, DISCS),
+        (TENFOLD, 0.4, DISCS),
+        (LogNormalRadii(1e-4, 1e-2), 0.3, DISCS),
+        (LogNormalRadii(1e-3, 2e-3), 0.2, SPHERES),
+        (EQUAL, 0.72, DISCS),
+        (TENFOLD, 0.76, DISCS),
+        (LogNormalRadii(1, 2), 0.5, SPHERES),
     ],
 )
-def test_a_packing_meets_its_specification(law, fraction, gap, shape, method):
-    packing = Packing(300, fraction, law, gap, method, shape).make(np.random.default_rng(1))
+def test_a_packing_meets_its_specification(law, fraction, shape):
+    packing = Packing(300, fraction, law, shape).make(np.random.default_rng(1))
     assert len(packing) % 300 == 0
     assert packing.fraction == pytest.approx(fraction, abs=1e-12)
-    assert brute_gap(packing) >= gap - 1e-15
+    assert brute_gap(packing) >= -1e-15
     assert smallest_gap(packing) == pytest.approx(brute_gap(packing), abs=1e-12)
     if law is not EQUAL:
         assert stats.kstest(packing.radii, law.cdf).pvalue > 1e-4
-
-
-@pytest.mark.parametrize(
-    ("law", "fraction", "shape"),
-    [(EQUAL, 0.72, DISCS), (TENFOLD, 0.76, DISCS), (LogNormalRadii(1, 2), 0.5, SPHERES)],
-)
-def test_dense_packings_beyond_sequential_addition(law, fraction, shape):
-    packing = Packing(300, fraction, law, shape=shape).make(np.random.default_rng(2))
-    assert brute_gap(packing) >= 0
-    assert packing.fraction == pytest.approx(fraction, abs=1e-12)
-    with pytest.raises(FailedError, match=r"no place for \d+ of"):
-        Packing(300, fraction, law, 0.0, "sequential", shape).make(np.random.default_rng(2))
 
 
 def test_one_seed_gives_one_packing_whatever_the_workers():
@@ -78,11 +68,8 @@ def test_one_seed_gives_one_packing_whatever_the_workers():
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [
-        ("number", 0), ("fraction", 0.9), ("fraction", -0.1), ("gap", -1.0), ("gap", np.nan),
-        ("method", "poured"),
-    ],
-)  # fmt: skip
+    [("number", 0), ("fraction", 0.9), ("fraction", -0.1), ("fraction", np.nan)],
+)
 def test_a_specification_without_meaning_is_refused(key, value):
     with pytest.raises(RefusedError) as refused:
         Packing(**({"number": 10, "fraction": 0.2, "radii": EQUAL} | {key: value}))
@@ -95,11 +82,9 @@ def _generator():
 
 def test_what_finds_no_place_fails_with_the_numbers():
     with pytest.raises(FailedError, match="still overlap"):
-        relaxation.relaxed(np.ones(40), np.full(2, 11.5), gap=0.2, generator=_generator())
-    with pytest.raises(RefusedError, match="gaps that leave"):
-        Packing(50, 0.2, EQUAL, gap=5e-3).make(_generator())
-    with pytest.raises(RefusedError, match="more than 100000"):
-        Packing(50, 0.2, EQUAL, gap=1e3).make(_generator())
+        relaxation.relaxed(np.ones(40), np.full(2, 11.5), _generator())
+    with pytest.raises(FailedError, match=r"no place for \d+ of"):
+        random_sequential(np.ones(300), np.full(2, 36.0), _generator())
 
 
 def test_particles_without_meaning_are_refused():
@@ -117,7 +102,7 @@ def test_particles_without_meaning_are_refused():
 
 
 def test_sequential_centres_are_uniform_and_without_direction():
-    packing = Packing(2000, 0.2, TENFOLD, method="sequential").make(np.random.default_rng(4))
+    packing = Packing(2000, 0.2, TENFOLD).make(np.random.default_rng(4))
     assert stats.kstest((packing.centres / packing.size).ravel(), "uniform").pvalue > 1e-4
     first, second = close_pairs(packing, 2e-3)
     apart = packing.separation(first, second)
@@ -130,8 +115,7 @@ def test_shaking_brings_discs_nearer_than_pushing_left_them(monkeypatch):
     nearest = []
     for sweeps in (0, relaxation.SWEEPS):
         monkeypatch.setattr(relaxation, "SWEEPS", sweeps)
-        generator = np.random.default_rng(1)
-        centres = relaxation.relaxed(np.ones(400), box, gap=0.0, generator=generator)
+        centres = relaxation.relaxed(np.ones(400), box, np.random.default_rng(1))
         nearest.append(np.sort(pdist(centres) - 2)[:40].mean())
     assert nearest[1] < 0.5 * nearest[0]
 

@@ -8,7 +8,7 @@ from alphacut.rve import Phase
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
 
 pytest.importorskip("dolfinx")
-from alphacut.rve.spheres.octant import Octant
+from tests.rve.spheres.octant import Octant
 
 MATRIX = Phase(20e9)
 
