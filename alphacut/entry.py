@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 
+from alphacut.commands.options import require_prism
 from alphacut.commands.parser import Parser, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
@@ -101,6 +102,8 @@ def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> in
     options, left = top.parse_known_args(ours)
     if left:
         made[options.command].refuse([one for one in left if one.startswith("-")] or left)
+    if names[options.command] not in ("run", "cell", "modulus"):
+        require_prism(petsc)
     check_destinations(made[options.command], options)
     command = import_module(f"alphacut.commands.{names[options.command]}")
     with standard_output(options.json == "-") as out, _plain_warnings():

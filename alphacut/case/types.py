@@ -138,7 +138,7 @@ class Text:
 
 def one_or_many(value: object) -> object:
     """The entry of an array that may stand without brackets."""
-    return value if isinstance(value, list | tuple) else [value]
+    return _not_empty(value) if isinstance(value, list | tuple) else [value]
 
 
 def _not_empty(value: object) -> object:

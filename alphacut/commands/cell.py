@@ -41,6 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solves and reports."""
     content = load(options.case, common.changes(options, common.SAMPLE)).content
+    common.require_prism(petsc, content)
     if content.picture is not None:
         data = image.stage(content.picture, (1.0,), content.modulus.average).once(
             quiet=options.quiet
@@ -96,7 +97,7 @@ def export(radius: RadiusMap, phases: RoundCell, choice: cell.CellChoice, path: 
     """Writes the mesh with displacements and stresses; returns counts."""
     from alphacut.export.fields import cell_fields, check_ending, write_mesh
 
-    check_ending(path, fields=True)
+    check_ending(path)
     mesh = cell_fields(cell.modal_parts(radius, phases), choice.size, choice.layers)
     write_mesh(mesh, path)
     return {"file": str(path), "nodes": len(mesh.points)}

@@ -47,6 +47,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     common.require_workers(options.workers)
     case = load(options.case, common.changes(options, KEYS))
     content, path = case.content, Path(options.out) if options.out else None
+    common.require_prism(petsc, content)
     stage = stage_of(content, petsc)
     kept = path.parent if path else None
     data = stage.once(workers=options.workers, quiet=options.quiet, kept=kept)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
+from alphacut.commands.parser import PETSC_PREFIX
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io import quantity
 from alphacut.io.files import as_json, write_text
 from alphacut.io.problem import BadInput
+
+if TYPE_CHECKING:
+    from alphacut.case.content import Content
 
 SAMPLE = {
     "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
@@ -95,6 +99,22 @@ def require_workers(count: int) -> None:
     """
     if count < 1:
         raise RefusedError("--workers", count, "a whole number 1 or more")
+
+
+def require_prism(petsc: Mapping[str, str], content: Content | None = None) -> None:
+    """Refuses PETSc options where no prism elements are solved.
+
+    Args:
+        petsc: The options, without their prefix.
+        content: The case; None for a command that solves no cell.
+
+    Raises:
+        RefusedError: There are such options.
+    """
+    prism = content is not None and content.round and content.modulus.method == "prism"
+    if petsc and not prism:
+        option = PETSC_PREFIX + next(iter(petsc))
+        raise RefusedError(option, "PETSc's", "options of run, cell, modulus with method prism")
 
 
 def modulus_option(text: str | None) -> FuzzyNumber | None:

@@ -38,6 +38,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     """Computes, draws, reports."""
     common.require_workers(options.workers)
     case, folder = load(options.case, options.set), folder_of(options)
+    common.require_prism(petsc, case.content if "modulus" in case.stages else None)
     require_writable("--out", str(folder), folder=True)
     store = Store(folder, case.text, options.fresh, options.quiet, options.workers)
     with alone("--out", folder) if rank() == 0 else nullcontext():

@@ -1,12 +1,12 @@
-"""The questions that a case may put to its motion; one line each."""
+"""The questions that a case may put to its motion, each a file beside this one."""
 
 from __future__ import annotations
 
-from alphacut.questions import decision, probability, tolerances
+from importlib import import_module
+
 from alphacut.questions.question import Question
 
-QUESTIONS: tuple[Question, ...] = (
-    probability.QUESTION,
-    decision.QUESTION,
-    tolerances.QUESTION,
+NAMES = ("probability", "decision", "tolerances")
+QUESTIONS: tuple[Question, ...] = tuple(
+    import_module(f"alphacut.questions.{name}").QUESTION for name in NAMES
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -41,7 +41,6 @@ class Chain:
         petsc: PETSc options that override the solver's.
         figures: Whether the particles are drawn.
         executor: Processes that compute envelopes side by side.
-        meanwhile: Takes the results before the envelopes, while those are under way.
     """
 
     content: Content
@@ -49,7 +48,6 @@ class Chain:
     petsc: Mapping[str, str] = field(default_factory=dict)
     figures: bool = True
     executor: Executor | None = None
-    meanwhile: Callable[[Results], None] | None = None
 
     def run(self) -> Results:
         """The results of every stage."""
@@ -152,8 +150,6 @@ class Chain:
     def _side_by_side(self, results: Results, structure: Structure, executor: Executor) -> None:
         quiet = replace(self.store, quiet=True)
         under_way = envelope.side_by_side(quiet, structure, results.tasks, executor)
-        if self.meanwhile is not None:
-            self.meanwhile(results)
         with progress("envelopes", quiet=self.store.quiet) as tick:
             for done, future in enumerate(as_completed(under_way), start=1):
                 self.store.put(under_way[future], future.result())

@@ -20,8 +20,6 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document, say
 from alphacut.stages.store import Stage, Store, Work
 
-FOLLOWERS = ("graph-follower", "improved-graph-follower")
-
 if TYPE_CHECKING:
     import xarray
 

@@ -122,17 +122,17 @@ QUESTION = Question(
 '''
 
 
-def test_a_fourth_question_touches_one_file_and_the_table(tmp_path):
+def test_a_fourth_question_touches_one_file_and_one_line(tmp_path):
     """A section, an answer, a figure, lines of the report and a CSV file come of one file."""
     for package in ("fuzzy", "stochastic", "rve", "frame", "pyproject.toml"):
         (tmp_path / package).symlink_to(ROOT / package)
     shutil.copytree(ROOT / "alphacut", tmp_path / "alphacut", symlinks=True)
     questions = tmp_path / "alphacut" / "questions"
     (questions / "mean.py").write_text(FOURTH, encoding="utf-8")
-    table = (questions / "table.py").read_text(encoding="utf-8")
-    table = table.replace("decision, ", "decision, mean, ", 1)
-    table = table.replace("(\n    ", "(\n    mean.QUESTION,\n    ", 1)
-    (questions / "table.py").write_text(table, encoding="utf-8")
+    before = (questions / "table.py").read_text(encoding="utf-8").splitlines()
+    after = [line.replace('"decision", ', '"decision", "mean", ') for line in before]
+    assert sum(old != new for old, new in zip(before, after, strict=True)) == 1
+    (questions / "table.py").write_text("\n".join(after) + "\n", encoding="utf-8")
     case = tmp_path / "case.toml"
     case.write_text(f'{one_case.TEXT}[mean]\nlimits = ["q2 <= 1 m"]\n', encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
