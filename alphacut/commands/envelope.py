@@ -12,8 +12,8 @@ from alphacut.commands import options as common
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import attributes
+from alphacut.report.results import run_text
 from alphacut.stages import envelope
-from alphacut.stages.words import peaks_table
 
 ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
@@ -49,5 +49,5 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if path:
         write_dataset(data, path, attributes(case.text, stage.key))
     document = envelope.document(data, task.fuzzy)
-    common.answer(options, document, out, peaks_table({"all": document}))
+    common.answer(options, document, out, run_text({"envelopes": {"all": document}}))
     return 0

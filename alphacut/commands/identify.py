@@ -9,8 +9,8 @@ from typing import TextIO
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, add_modulus, answer, modulus_option
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.report.results import identified
 from alphacut.stages.identify import learned
-from alphacut.stages.words import learned as lines
 
 ABOUT = "inputs of a frame from its measured natural modes"
 
@@ -28,5 +28,5 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
     frame = content.frame.structure(modulus_option(options.modulus))
     document = learned(content.identify, frame, content.envelope.alpha).document()
-    answer(options, document, out, "".join(f"{line}\n" for line in lines(document)))
+    answer(options, document, out, "".join(f"{line}\n" for line in identified(document)))
     return 0

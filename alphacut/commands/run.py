@@ -17,10 +17,10 @@ from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.output_paths import alone, require_writable
 from alphacut.io.provenance import FORMAT, command, door, versions
+from alphacut.report.results import run_text
 from alphacut.stages import shares
 from alphacut.stages.chain import Chain
 from alphacut.stages.store import Store
-from alphacut.stages.words import run_tables
 
 ABOUT = "run every stage of a case: files, figures, summary"
 
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     store = Store(folder, case.text, options.fresh, options.quiet, options.workers)
     with alone("--out", folder) if rank() == 0 else nullcontext():
         document = computed(case, store, petsc, figures=not options.no_figures)
-    common.answer(options, document, out, run_tables(document))
+    common.answer(options, document, out, run_text(document))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {document['seconds']:.0f} s")
         say(f"next: {door('report', folder)}")
@@ -68,6 +68,7 @@ def computed(case: Case, store: Store, petsc: Mapping[str, str], *, figures: boo
         "versions": versions(),
         **results.document(),
         "shares": shares.means(results.shares),
+        "peak_shares": shares.of_peaks(results.shares),
         "changes": list(case.changes),
         "sections": case.traces(),
         "figures": names,

@@ -11,7 +11,9 @@ from pydantic import Field
 from alphacut.case.types import Quantity
 from alphacut.figures.style import BLUE, GREY, INK, figure
 from alphacut.frame.questions.tolerances import tolerances
+from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.io.files import Document
+from alphacut.io.units import engineering
 from alphacut.questions.decision import PRECISION
 from alphacut.questions.limits import in_si
 from alphacut.questions.question import Limited, Motion, Question, Row
@@ -70,8 +72,8 @@ def rows(document: Document) -> list[Row]:
 def _row(name: str, one: Document, document: Document) -> Row:
     modal, share = one["modal"], [end / one["modal"] - 1 for end in one["kept"] if one["modal"]]
     ends = ", ".join(f"{end:+.2%}".replace("-", "−") for end in share) or f"about {modal:g}"
-    own = " … ".join(f"{end:.4g}" for end in one["kept"])
-    kept = "–" if document["kept"] is None else f"{own} (SI)"
+    own = " … ".join(engineering(end, of_storey_frame(name).unit) for end in one["kept"])
+    kept = "–" if document["kept"] is None else own
     return f"tolerance of {name}", kept, document["nature"], ends if kept != "–" else ""
 
 

@@ -13,7 +13,16 @@ from alphacut.io.files import Document
 from alphacut.questions.question import Question
 from alphacut.questions.table import QUESTIONS
 from alphacut.report.html import code, folded, fragment, paragraphs, picture, section, table
-from alphacut.report.results import HEAD, NATURES, extremes, nature_of, peak_rows, results
+from alphacut.report.results import (
+    ANSWERS,
+    NATURES,
+    answers,
+    drivers,
+    extremes,
+    material,
+    motion,
+    nature_of,
+)
 from alphacut.report.safe import figures
 
 TERMS = {
@@ -44,7 +53,9 @@ class Page:
 
     def sections(self) -> Iterator[Markup]:
         """All sections that the results allow, in reading order."""
-        yield section("Key results", table(HEAD, results(self.summary)))
+        results = (material(self.summary), motion(self.summary), (ANSWERS, answers(self.summary)))
+        tables = (table(head, rows) for head, rows in results)
+        yield section("Key results", *tables, paragraphs(*drivers(self.summary)))
         for name in ("microstructure", "modulus", "image", "response"):
             if name in self.summary:
                 yield getattr(self, f"_{name}")(self.summary[name])
@@ -167,7 +178,6 @@ class Page:
             folded(
                 f"{name}: {study['method']}, fuzzy {', '.join(study['fuzzy'])}",
                 table(head, extremes(study)),
-                table(HEAD, [*peak_rows(study)]),
             )
             for name, study in studies.items()
         ]

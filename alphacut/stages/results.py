@@ -14,6 +14,7 @@ from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
+from alphacut.io.units import STANDARD_GRAVITY
 from alphacut.stages import envelope, microstructure, modulus, response
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.identify import Learned, narrower
@@ -92,13 +93,27 @@ class Results:
         if self.structure is not None and self.structure.linear is not None:
             omega = frequencies(self.structure.linear)
             numbers["structure"] = {"omega_rad_per_s": omega, "period_s": 2 * np.pi / omega[0]}
+            numbers["structure"] |= sizes(self.structure)
         if self.envelopes:
-            of = {task.name: task.fuzzy for task in self.tasks}
+            of = {task.name: task for task in self.tasks}
             numbers["envelopes"] = {
-                name: envelope.document(data, of[name]) for name, data in self.envelopes.items()
+                name: envelope.document(data, of[name].fuzzy) | {"drawn": of[name].output}
+                for name, data in self.envelopes.items()
             }
         if self.learned is not None:
             numbers["update"] = self.learned.document()
             if self.update is not None and self.learned.posterior is not None:
                 numbers["update"]["envelope_width"] = narrower(self.update)
         return numbers
+
+
+def sizes(structure: Structure) -> Document:
+    """Weight of a storey frame in N, and the height in m of the storey of each drift."""
+    if structure.frame is None:
+        return {}
+    modal = {name: number.modal for name, number in structure.numbers.items()}
+    masses = [modal[f"m{floor}"] for floor in range(1, len(structure.frame.masses) + 1)]
+    drifts = [name for name in structure.outputs if name.startswith("drift")]
+    heights = {name: modal.get(name.replace("drift", "l")) for name in drifts}
+    weight = sum(masses) * float(STANDARD_GRAVITY)
+    return {"weight_N": weight, "heights_m": {x: height for x, height in heights.items() if height}}

@@ -15,11 +15,13 @@ import numpy as np
 
 from alphacut import frame
 from alphacut.case.structure import Structure
+from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced, propagate
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.width_contributions import Shares, width_shares
 from alphacut.io.files import say
+from alphacut.io.provenance import NESTED
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import Campaign
 from alphacut.stages.store import Stage, Work
@@ -42,7 +44,7 @@ def stage(
 
     cell = campaign and [campaign.task.identity, campaign.inputs, campaign.alpha]
     motion = structure and [structure.model, structure.numbers, task]
-    return Stage("shares", [cell, motion], ("stochastic", "rve", "fuzzy", "frame"), compute)
+    return Stage("shares", [cell, motion], (*NESTED, "alphacut"), compute)
 
 
 def dataset(
@@ -64,8 +66,9 @@ def dataset(
         except ModalError as error:
             say(f"no shares of the width over time: {error}")
         else:
-            variables["share"] = (("input", "time", "output"), shares.share, {"units": "1"})
-            variables["width"] = (("time", "output"), shares.width, {"units": "SI, by output"})
+            variables["share"] = (("input", "time", "output"), shares.share[:, 1:], {"units": "1"})
+            variables["peak_share"] = (("input", "output"), shares.share[:, 0], {"units": "1"})
+            variables["width"] = (("time", "output"), shares.width[1:], {"units": "SI, by output"})
             coordinates |= {"input": list(shares.names), "output": list(structure.outputs)}
             coordinates["time"] = ("time", time, {"units": "s"})
     return xarray.Dataset(variables, coordinates, {"study": task.name if task else ""})
@@ -95,7 +98,9 @@ def _cell_range(campaign: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[
 
 
 def of_motion(structure: Structure, task: EnvelopeTask) -> tuple[Shares, Array]:
-    """Shares of a study's inputs in every output's width, (inputs, times, outputs); times.
+    """Shares of a study's inputs in the widths of every output's peak and motion; the times.
+
+    The shares have the shape (inputs, 1 + times, outputs), those of the peak first.
 
     Raises:
         ModalError: The modal method cannot treat the structure.
@@ -123,7 +128,11 @@ def of_motion(structure: Structure, task: EnvelopeTask) -> tuple[Shares, Array]:
                 **few,
             )
         times.append(result.time)
-        return result.lower[0], result.upper[0]
+        of = peaks(result)
+        return (
+            np.concatenate([of.lower[:1], result.lower[0]]),
+            np.concatenate([of.upper[:1], result.upper[0]]),
+        )
 
     inputs = structure.inputs(task.fuzzy)
     return width_shares(bounds, inputs, groups=groups), times[0]
@@ -149,3 +158,12 @@ def means(data: xarray.Dataset) -> dict[str, dict[str, float]]:
             names = map(str, data["input"].values)
             table[output] = {x: float(weighted.sel(input=x, output=output)) for x in names}
     return table
+
+
+def of_peaks(data: xarray.Dataset) -> dict[str, dict[str, float]]:
+    """Shares of the inputs in the width of each output's peak; empty without a motion."""
+    if "peak_share" not in data:
+        return {}
+    names = [*map(str, data["input"].values)]
+    each = {str(x): data["peak_share"].sel(output=x).values for x in data["output"].values}
+    return {x: dict(zip(names, map(float, shares), strict=True)) for x, shares in each.items()}

@@ -10,8 +10,7 @@ import pytest
 
 from alphacut.fuzzy.result import Nature
 from alphacut.report.page import report
-from alphacut.report.results import nature_of, outward, peak_rows
-from alphacut.report.results import results as rows_of
+from alphacut.report.results import answers, drivers, motion, nature_of, outward, run_text
 from alphacut.report.safe import MOST, cleaned, figures, plain_name
 from alphacut.report.tables import write_tables
 
@@ -102,23 +101,34 @@ def test_an_unknown_word_is_never_a_stronger_nature(text, nature):
     assert nature_of(text) is nature
 
 
-STUDY = {
-    "alpha": [0, 1],
-    "fuzzy": ["E"],
-    "max": {"q1": 1.0},
-    "peak": {"q1": {"lower": [10.371, 10.4], "upper": [12.0, 11.0], "error": [0.2, 0.1]}},
-}
+def peaks_of(**ends):
+    """A summary with the peaks of some outputs at α = 0, 0.5 and 1."""
+    each = {x: {"lower": low, "upper": up, "error": [0.0002]} for x, (low, up) in ends.items()}
+    study = {"alpha": [0, 0.5, 1], "nature": "estimated", "peak": each}
+    return {
+        "envelopes": {"all": study},
+        "structure": {"heights_m": {"drift1": 4.0}, "weight_N": 1e6},
+    }
 
 
-def test_a_least_peak_is_stated_with_its_error():
-    (row,) = peak_rows({**STUDY, "nature": "estimated"})
-    assert row[2] == "10.17 m … 12.20 m"
-    assert row[3:] == ("estimated", "200 mm")
+def test_peaks_are_stated_in_the_units_that_engineers_compare():
+    ends = {
+        "drift1": ([0.010371, 0.0105, 0.011], [0.012004, 0.0115, 0.011]),
+        "a3": ([1.0, 1.5, 2.0], [3.0, 2.5, 2.0]),
+        "base_shear": ([1e4, 1e4, 2e4], [4e4, 3e4, 2e4]),
+    }
+    limits = {"drift1": {"limit": 0.02, "verdict": "kept from α = 0.05 up"}}
+    head, rows = motion({**peaks_of(**ends), "decision": {"limits": limits}})
+    assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit")
+    assert rows[0] == ("drift1, mm", "11", "10.5 … 11.5", "10.37 … 12.01", "0.2", "20, kept")
+    assert rows[1][:4] == ("  % of storey", "0.275", "0.262 … 0.288", "0.2592 … 0.3001")
+    assert rows[2][:2] == ("a3, g", "0.2039")
+    assert rows[4][:4] == ("  % of weight", "2", "1 … 3", "1 … 4")
 
 
-def test_attained_bounds_say_what_is_reached_and_no_more():
-    (row,) = peak_rows({**STUDY, "nature": "attained"})
-    assert row[1:4] == ("≥ 10.90 m", "≥ 11.80 m", "attained")
+def test_what_drives_the_peak_is_one_line_of_the_largest_shares():
+    shares = {"q1": {"E": 0.1}, "q2": {"E": 0.2, "m1": 0.5, "d": 0.05, "l": 0.3}}
+    assert [*drivers({"peak_shares": shares})] == ["driven by peak of q2: m1 50%, l 30%, E 20%"]
 
 
 @pytest.mark.parametrize("value", [24.77334, -0.0123456, 1e9 / 7, 0.0, 25.0])
@@ -129,10 +139,15 @@ def test_a_printed_bound_is_no_narrower_than_it_was(value):
     assert float(f"{high:.4g}") == pytest.approx(high, rel=1e-12)
 
 
-def test_the_first_table_has_a_row_for_every_result(results):
-    names = [row[0] for row in rows_of(summary_of(results))]
-    assert names[:2] == ["peak of |q2|", "peak of |drift1|"]
-    assert any("tolerance" in name for name in names)
+def test_the_first_tables_have_a_row_for_every_result(results):
+    summary = summary_of(results)
+    assert [row[0] for row in motion(summary)[1]] == ["q2, m", "drift1, m", "  % of storey"]
+    assert any("tolerance" in row[0] for row in answers(summary))
+    shares = summary["peak_shares"]["q2"]
+    assert set(shares) == {"E", "m1"}
+    assert 0.5 < sum(shares.values()) < 1.5
+    text = run_text(summary)
+    assert max(map(len, text.splitlines())) <= 80
 
 
 @pytest.fixture(scope="module")
