@@ -6,7 +6,6 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Midpoint, Ru
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import Auto
-from alphacut.frame.methods.follower_record import FollowerRecord, record
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.named import METHODS
@@ -22,7 +21,7 @@ from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact",
-    "FollowerRecord", "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
+    "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
-    "Sampled", "Search", "StoreyFrame", "envelope", "pendulum", "record",
+    "Sampled", "Search", "StoreyFrame", "envelope", "pendulum",
 ]  # fmt: skip

@@ -32,15 +32,15 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     walk, output = recorded(results, task)
     drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
     panels = [named[letter] for letter in "12345"]
-    new = [step for step in walk.steps if step.found >= 0]
+    new = [step for step in walk.steps if step.new >= 0]
     first = [step for step in new if step.node == new[0].node]
     later = next(
         (step for step in new if step.node > 0.5 * len(walk.time) and step.guess > 0), new[-1]
     )
     base(panels[0], walk, [0], node=first[0].node, last=0)
     panels[0].plot(walk.time, walk.graphs[0], color=BLUE, lw=1.3)
-    base(panels[1], walk, [0, *(step.found for step in first)], node=first[0].node, last=len(first))
-    base(panels[2], walk, range(later.found + 1), node=later.node, last=1)
+    base(panels[1], walk, [0, *(step.new for step in first)], node=first[0].node, last=len(first))
+    base(panels[2], walk, range(later.new + 1), node=later.node, last=1)
     panels[2].plot(walk.time, walk.graphs[later.guess], color=BLUE, lw=1.3, label="guess")
     panels[2].legend(loc="lower right", fontsize=8)
     base(panels[3], walk, range(len(walk.graphs)), node=None, last=0)
@@ -96,6 +96,6 @@ def recorded(results: Results, task: EnvelopeTask) -> tuple[FollowerRecord, str]
     for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
         fine = share * task.section.gain * task.tolerance(structure).value
         walk = record_flow(flow, output=output, tolerance=fine)
-        if any(step.found >= 0 for step in walk.steps):
+        if any(step.new >= 0 for step in walk.steps):
             break
     return walk, flow.outputs[output]

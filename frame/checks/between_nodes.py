@@ -28,14 +28,14 @@ FLOOR = 0.1
 """Least stray of a step, as a share of the largest of all steps."""
 
 
-def with_stray(found: Envelope, flow: UnitFlow) -> Envelope:
+def with_stray(of: Envelope, flow: UnitFlow) -> Envelope:
     """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
-    if found.between is not None:
-        return found
+    if of.between is not None:
+        return of
     corners = probes(flow.boxes)
     between = stray(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
-    facts = {**found.facts, "between_nodes": float((between / flow.scale).max())}
-    return replace(found, between=between, facts=facts)
+    facts = {**of.facts, "between_nodes": float((between / flow.scale).max())}
+    return replace(of, between=between, facts=facts)
 
 
 def stray(flow: Flow, points: Array) -> Array:
@@ -71,15 +71,15 @@ def ground_stray(ground: Accelerogram, time: Array) -> Array:
     Row j is that of the step that ends at node j; the jump where the record ends counts.
     """
     samples = np.arange(len(ground.acceleration)) * ground.step
-    found = np.zeros(len(time))
+    strays = np.zeros(len(time))
     values = ground.at(time)
     ends = (samples, np.asarray(ground.acceleration)), (samples[-1:], np.zeros(1))
     for places, accelerations in ends:
         step = np.searchsorted(time, places * (1 + 1e-12))
         inside = (step > 0) & (step < len(time))
         off = np.abs(accelerations - np.interp(places, time, values))[inside]
-        np.maximum.at(found, step[inside], off)
-    return found
+        np.maximum.at(strays, step[inside], off)
+    return strays
 
 
 @singledispatch

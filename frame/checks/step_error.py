@@ -67,20 +67,20 @@ def step_error(flow: UnitFlow) -> Array:
     return MARGIN * so_far
 
 
-def step_error_at_bounds(found: Envelope, flow: UnitFlow, steps: Array) -> Array:
+def step_error_at_bounds(of: Envelope, flow: UnitFlow, steps: Array) -> Array:
     """Errors of a linear scheme from the points at which bounds are reached besides, (T, m).
 
     A structure may resonate between the corners, and the scheme at other parameters than the truth.
 
     Args:
-        found: The envelope of the scheme's trajectories.
+        of: The envelope of the scheme's trajectories.
         flow: These trajectories.
         steps: From `step_error`, shape (T, m).
     """
     if exact(flow.flow) or not isinstance(flow.flow, LinearFlow):
         return steps
-    at, d = np.stack([found.lower_at, found.upper_at]), len(found.parameters)
-    peaks = np.abs([found.lower, found.upper]).argmax(2)[:, :, None, :, None]
+    at, d = np.stack([of.lower_at, of.upper_at]), len(of.parameters)
+    peaks = np.abs([of.lower, of.upper]).argmax(2)[:, :, None, :, None]
     highest = np.take_along_axis(at, peaks, 2).reshape(-1, d)
     others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
     points = np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0)
@@ -89,7 +89,7 @@ def step_error_at_bounds(found: Envelope, flow: UnitFlow, steps: Array) -> Array
 
 
 def exact(flow: Flow) -> bool:
-    """Whether trajectories have no error but rounding."""
+    """True if trajectories have no error but rounding."""
     return isinstance(flow, LinearFlow) and isinstance(flow.integrator, Exact)
 
 
@@ -112,21 +112,21 @@ def _(flow: LagrangianFlow, points: Array) -> tuple[Array, Array]:
     return fine, np.abs(flow.values(points) - fine) * gain / (gain - 1)
 
 
-def with_step_error(found: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
+def with_step_error(of: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     """The envelope with the time-stepping error in its errors.
 
     Args:
-        found: The envelope of the scheme's trajectories.
+        of: The envelope of the scheme's trajectories.
         flow: These trajectories.
         steps: From `step_error`, shape (T, m).
     """
     alike = [unit == flow.units[flow.reference] for unit in flow.units]
-    error, basis = found.error + steps, found.basis
+    error, basis = of.error + steps, of.basis
     if steps.any():
         basis = (*basis, f"{scheme_of(flow.flow)} steps of {flow.time[1]:g} s")
-    facts = {"step_error": float(steps[:, alike].max()), **found.facts}
+    facts = {"step_error": float(steps[:, alike].max()), **of.facts}
     facts["estimated_error"] = float((error / flow.scale).max())
-    return replace(found, error=error, basis=basis, facts=facts)
+    return replace(of, error=error, basis=basis, facts=facts)
 
 
 def scheme_of(flow: Flow) -> str:

@@ -99,19 +99,19 @@ class March(ABC):
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                found = self._march(points, derivatives=derivatives)
+                motion = self._march(points, derivatives=derivatives)
         except (np.linalg.LinAlgError, StepError) as failure:
             self._locate(points, failure)
-        if not np.isfinite(found.value).all():
-            bad, node = np.argwhere(~np.isfinite(found.value).all(-1))[0]
+        if not np.isfinite(motion.value).all():
+            bad, node = np.argwhere(~np.isfinite(motion.value).all(-1))[0]
             when = f"not finite from t = {self.time[node]:g} s on at {self._named(points[bad])}"
             raise RefusedError(
                 "trajectory", when, "motions that exist", f"{WITHIN}, or a smaller step"
             )
-        return found
+        return motion
 
     def _locate(self, points: Array, failure: Exception) -> NoReturn:
-        """Raise a failure with its parameters, found by halving the set of points."""
+        """Raise a failure with its parameters, located by halving the set of points."""
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -166,11 +166,11 @@ class LinearFlow(March):
         return self.system.outputs
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        found = self._absolute(points, derivatives=derivatives)
+        motion = self._absolute(points, derivatives=derivatives)
         if relative := relative_to_ground(self.system):
             assert self.system.ground is not None
-            found.value[..., relative] -= self.system.ground.at(self.time)[:, None]
-        return found
+            motion.value[..., relative] -= self.system.ground.at(self.time)[:, None]
+        return motion
 
     def _absolute(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)

@@ -34,7 +34,7 @@ class FollowerStep(NamedTuple):
         output: Index of the output.
         side: +1 upper bound, −1 lower bound.
         guess: Index of the best stored graph, the initial guess.
-        found: Index of the new graph, or −1 when the guess stays.
+        new: Index of the new graph, or −1 when the guess stays.
         predicted: The bound that the Taylor model promises.
     """
 
@@ -43,7 +43,7 @@ class FollowerStep(NamedTuple):
     output: int
     side: int
     guess: int
-    found: int
+    new: int
     predicted: float
 
 

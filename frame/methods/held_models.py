@@ -16,7 +16,7 @@ Models = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class HeldModels:
-    """What is kept of jets; of each place (node, output, side) for the one that holds its bound.
+    """Kept parts of jets; of each place (node, output, side) for the one that holds its bound.
 
     Args:
         kept: By the number of nodes from a place: value (T, m, 2), and derivatives behind.

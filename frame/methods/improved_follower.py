@@ -62,14 +62,14 @@ class ImprovedFollower:
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
             raise RefusedError("tolerance", self.tolerance, "a positive number")
         if min(self.budget, self.spread, self.batch) < 1 or not 0 < self.reach <= 2:
-            given = (self.budget, self.spread, self.batch, self.reach)
-            raise RefusedError("budget, spread, batch, reach", given, "counts; a reach in (0, 2]")
+            values = (self.budget, self.spread, self.batch, self.reach)
+            raise RefusedError("budget, spread, batch, reach", values, "counts; a reach in (0, 2]")
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of two passes from different points, corrected by what their models promise.
 
         The error is twice what the models still promise and what an independent sample finds
-        beyond the bounds, and twice what one pass found beyond the other. Where neighbouring
+        beyond the bounds, and twice what one pass leads beyond the other. Where neighbouring
         trajectories part there is none, and the bounds are attained, no more.
         """
         begun, other = time.perf_counter(), replace(self, seed=self.seed + 1)

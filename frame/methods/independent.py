@@ -1,4 +1,4 @@
-"""What followers may have missed, by trajectories that share nothing with their search."""
+"""Estimates of what followers miss, by trajectories that share nothing with their search."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ trajectories part."""
 
 def beyond(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
     """How far a sample of each level leaves the bounds (A, T, m, 2), shape (A, m), and its size."""
-    found, count = np.zeros((len(bounds), len(flow.outputs))), 0
+    missed, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level, bound in enumerate(bounds):
         lower, upper = flow.boxes.unit(level)
         points = (lower + upper) / 2 + (upper - lower) / 2 * sample(len(lower), level)
@@ -27,8 +27,8 @@ def beyond(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
         for chunk in np.array_split(points, -(-len(points) // 32)):
             values = flow.values(chunk)
             off = np.maximum(values.max(0) - bound[..., 1], -values.min(0) - bound[..., 0])
-            found[level] = np.maximum(found[level], off.max(0))
-    return found, count
+            missed[level] = np.maximum(missed[level], off.max(0))
+    return missed, count
 
 
 def sample(d: int, level: int) -> Array:
@@ -40,6 +40,6 @@ def sample(d: int, level: int) -> Array:
 
 
 def parted(steepest: Array, bounds: Array) -> bool:
-    """Whether trajectories part: their steepest slopes (m,) beside the range of (T, m, 2)."""
+    """True if trajectories part: their steepest slopes (m,) beside the range of (T, m, 2)."""
     width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
     return bool((steepest > PARTED * width).any())

@@ -77,8 +77,8 @@ class Pursuit:
         self.promise[:] = self.value
         if len(self.points) and (upper > lower).any():
             places = np.nonzero(np.isfinite(self.value))
-            found = self._optima(self.at[places], self.held.models(0, places), places[-1])
-            self.promise[places], self.target[places] = found
+            optima = self._optima(self.at[places], self.held.models(0, places), places[-1])
+            self.promise[places], self.target[places] = optima
 
     def leave(self, level: int) -> None:
         """Post-processing of a level."""
@@ -116,10 +116,10 @@ class Pursuit:
         for shift in (1, -1):  # of the node asked about from that of the rival
             t, o, side = np.add(jumps, [shift < 0, 0, 0]).T
             rivals, places = (t, o, side), (t + shift, o, side)
-            found = self._optima(self.at[rivals], self.held.models(shift, rivals), side)
-            more = found[0] > self.promise[places]
+            optima = self._optima(self.at[rivals], self.held.models(shift, rivals), side)
+            more = optima[0] > self.promise[places]
             places = tuple(x[more] for x in places)
-            self.promise[places], self.target[places] = (x[more] for x in found)
+            self.promise[places], self.target[places] = (x[more] for x in optima)
 
     def _optima(
         self, points: Array, models: tuple[Array, Array, Array], side: Array

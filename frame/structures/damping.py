@@ -66,8 +66,7 @@ def square_root(operator: Jet, mass: Array) -> Jet:
     total = omega[:, :, None] + omega[:, None, :]
 
     def solved(right: Array) -> Array:
-        found: Array = X @ ((Y @ right @ X) / total) @ Y
-        return found
+        return np.asarray(X @ ((Y @ right @ X) / total) @ Y)
 
     first, value = solved(operator.first), (X * omega[:, None, :]) @ Y
     if not len(operator.second):

@@ -64,15 +64,15 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
     Args:
         matrices: The structure.
         rows: Observation rows, V = (S, m, 2n).
-        chosen: Indices of the modes wanted, among those that oscillate, by rising |λ|; all modes
+        chosen: Indices of the modes, among those that oscillate, by rising |λ|; all modes
             when None.
 
     Raises:
-        ModalError: A mode that is wanted does not oscillate (overdamped or free to drift).
+        ModalError: A chosen mode does not oscillate (overdamped or free to drift).
     """
     values, X, Y = eigenvectors(state_matrix(matrices))
-    wanted = np.arange(values.value.shape[-1] // 2) if chosen is None else chosen
-    values = values[..., wanted]
+    some = np.arange(values.value.shape[-1] // 2) if chosen is None else chosen
+    values = values[..., some]
     if not oscillating(values.value).all():
         raise ModalError(
             "a mode does not oscillate: modal intervening variables need damping below critical in"
@@ -80,10 +80,10 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
         )
     start = concatenate([matrices.q0, matrices.v0], -2)
     kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
-    seen = rows @ X[..., wanted]  # V = (S, m, n)
+    seen = rows @ X[..., some]  # V = (S, m, n)
 
     def through(excitation: Jet | Array) -> Jet:
-        share = (Y @ excitation)[..., wanted, 0][..., None, :]
+        share = (Y @ excitation)[..., some, 0][..., None, :]
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
     return Modes(values, through(start), through(kick), len(kick) // 2)
@@ -94,7 +94,7 @@ def require_single(matrices: Matrices, chosen: Array) -> None:
 
     Args:
         matrices: The structure.
-        chosen: Indices of the modes wanted, by rising |λ|.
+        chosen: Indices of the modes, by rising |λ|.
 
     Raises:
         ModalError: There is such a pair.

@@ -55,15 +55,15 @@ def _(system: StoreyFrame, box: Box) -> dict[str, int]:
             raise UnprovedError(
                 f"{name} reaches {lower:g}: a negative damper feeds energy into the structure"
             )
-    found = dict.fromkeys(box, 1)
-    found |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
+    degree = dict.fromkeys(box, 1)
+    degree |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
     if accelerations(system):  # forces over masses; forces hold the masses too where weights press
         own = 1 if system.gravity else 0
         masses = {name: ends for name, ends in box.items() if name[0] == "m"}
         if any(name[1] == "_" for name in masses):
             raise UnprovedError("an acceleration is a force over masses that a field gives")
-        found |= {name: own + inverse_cube_degree(*ends) for name, ends in masses.items()}
-    return found
+        degree |= {name: own + inverse_cube_degree(*ends) for name, ends in masses.items()}
+    return degree
 
 
 def accelerations(system: LinearSystem) -> dict[int, int]:

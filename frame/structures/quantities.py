@@ -76,7 +76,7 @@ class Parameter:
     range: str = ""
 
     def admits(self, low: float, high: float) -> bool:
-        """Whether all values from `low` to `high` are finite and within the range."""
+        """True if all values from `low` to `high` are finite and within the range."""
         above = {POSITIVE: low > 0, NOT_NEGATIVE: low >= 0, RATIO: low >= 0 and high < 1}
         return bool(np.isfinite([low, high]).all() and above.get(self.range, True))
 
