@@ -6,12 +6,16 @@ derivative along θ.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
+
+WHOLE = slice(None)
+"""All parts of a form."""
 
 
 def strain(u: Any) -> Any:
@@ -26,14 +30,16 @@ class CellForm:
     Args:
         space: Displacements of two components.
         points: Values at quadrature points, or in cells.
-        dx: The measure.
+        parts: Measures of the parts of the mesh, which can be assembled one by one.
 
     Attributes:
         density: f_Θ of eq. 1 at the points; 1 where there is no θ.
         share: Part of the particle at the points, 0 or 1 (eq. 13).
     """
 
-    def __init__(self, space: fem.FunctionSpace, points: fem.FunctionSpace, dx: Any) -> None:
+    def __init__(
+        self, space: fem.FunctionSpace, points: fem.FunctionSpace, parts: Sequence[Any]
+    ) -> None:
         mesh = space.mesh
         self.density, self.share = fem.Function(points), fem.Function(points)
         self._phases = [fem.Constant(mesh, np.zeros((3, 3))) for _ in range(2)]
@@ -43,20 +49,23 @@ class CellForm:
         stiffness = matrix + self.share * (inclusion - matrix)  # eq. 13
         stress = stiffness * strain(u)  # eq. 6
         # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
-        self._stiffness = compiled(density * ufl.dot(stress, strain(v)) * dx)
-        self._load = compiled(-density * ufl.dot(stiffness * self._uniform, strain(v)) * dx)
+        left = density * ufl.dot(stress, strain(v))
+        right = -density * ufl.dot(stiffness * self._uniform, strain(v))
+        self._stiffness = [compiled(left * dx) for dx in parts]
+        self._load = [compiled(right * dx) for dx in parts]
 
     def set_phases(self, stiffness: tuple[Array, Array]) -> None:
         """Take the Voigt matrices of matrix and particle, in Pa."""
         for constant, value in zip(self._phases, stiffness, strict=True):
             constant.value[:] = value
 
-    def add_stiffness(self, matrix: PETSc.Mat) -> None:
+    def add_stiffness(self, matrix: PETSc.Mat, parts: slice = WHOLE) -> None:
         """Add the stiffness of eq. 7 to a matrix, whose local-to-global map reduces it."""
-        petsc.assemble_matrix(matrix, self._stiffness)
+        for form in self._stiffness[parts]:
+            petsc.assemble_matrix(matrix, form)
         matrix.assemble()
 
-    def load(self, uniform: Array) -> Array:
+    def load(self, uniform: Array, parts: slice = WHOLE) -> Array:
         """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
         self._uniform.value[:] = uniform
-        return np.array(fem.assemble_vector(self._load).array)
+        return np.sum([fem.assemble_vector(form).array for form in self._load[parts]], axis=0)

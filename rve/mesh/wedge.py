@@ -16,6 +16,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import basix
 
 SLICES = 3  # Gauss points along θ in a layer
+POINTS = 6  # of each slice of a wedge
 PRISM = basix.CellType.prism
 
 

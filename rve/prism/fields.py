@@ -74,7 +74,7 @@ def cell_fields(
     mean /= np.bincount(cells.ravel())[:, None, None]
     volume = np.empty(len(cells))
     heights = form.of_slices(form.slices()[1])
-    volume[form.wedge] = (form.areas() * heights[..., None]).sum(axis=(1, 2))
+    volume[form.wedge] = (form.areas * heights[..., None]).sum(axis=(1, 2))
     nodes = kept % grid.nodes
     return CellFields(positions[nodes], cells, inside, total[nodes], mean, volume)
 

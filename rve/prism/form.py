@@ -9,7 +9,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.fenicsx import MPI, at_points, basix, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm, strain
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import SLICES, slab_rule, wedge
+from alphacut.rve.mesh.wedge import POINTS, SLICES, slab_rule, wedge
 from alphacut.stochastic import RadiusMap, layered_rule
 
 
@@ -31,6 +31,7 @@ class PrismForm:
         wedge: Wedge of the grid that each of its cells is, shape (m,).
         layer: Its layer.
         elastic: Stiffness and loads.
+        areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
@@ -56,8 +57,13 @@ class PrismForm:
             "quadrature_points": points,
             "quadrature_weights": weights,
         }
-        dx = ufl.Measure("dx", domain=self.mesh, metadata=rule)
-        self.elastic = CellForm(self.space, fem.functionspace(self.mesh, at_each), dx)
+        # a mesh that knows nothing of the particle has it at points of the first part
+        inside = self.grid.inside[self.wedge] & self.grid.conforming
+        parts = [
+            ufl.Measure("dx", self.mesh, 1, rule, [(1, np.flatnonzero(one).astype(np.int32))])
+            for one in (~inside, inside)
+        ]
+        self.elastic = CellForm(self.space, fem.functionspace(self.mesh, at_each), parts)
         self._u = fem.Function(self.space)
         self._strain = at_points(strain(self._u), points)
         self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
@@ -80,13 +86,13 @@ class PrismForm:
                 f"density of θ at {theta[~(density > 0)][0]:.4g}", f"{density.min():g}",
                 "positive densities", "shorten the support, or take the series",
             )  # fmt: skip
-        if not self.mesh.comm.allreduce(int((self.areas() <= 0).any())) == 0:
+        self.areas = self._areas()
+        if not self.mesh.comm.allreduce(int((self.areas <= 0).any())) == 0:
             raise FoldedMeshError(
                 f"the mesh folds over where it follows the radius through {self.grid.layers} layers"
                 " in θ", "take more layers or a smaller mesh size",
             )  # fmt: skip
-        points = len(slab_rule()[1]) // SLICES
-        self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), points)
+        self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
         self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
 
     def _inside(self, positions: Array, radius: RadiusMap) -> Array:
@@ -106,8 +112,7 @@ class PrismForm:
         self._u.x.array[:] = displacement.ravel()
         return self._at_points(self._strain, 3)
 
-    def areas(self) -> Array:
-        """Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4."""
+    def _areas(self) -> Array:
         weights = slab_rule()[1].reshape(SLICES, -1)
         planar = weights / (2 * weights.sum(axis=1, keepdims=True))
         heights = np.diff(self._levels)[self.layer]
@@ -134,6 +139,5 @@ class PrismForm:
 
     def by_layer(self, values: Array) -> Array:
         """Sums over this rank's wedges of each layer of values (cells, …), shape (layers, …)."""
-        sums = np.zeros((self.grid.layers, *values.shape[1:]))
-        np.add.at(sums, self.layer, values)
-        return sums
+        member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
+        return np.asarray(np.tensordot(member, values, axes=1))

@@ -1,7 +1,8 @@
 """Galerkin's projection of a map's samples on solutions at two moduli of the particle.
 
-Stiffness and loads are affine in the modulus, so both ends of a range tell all between. The energy
-is stationary, so the error of projected moduli is the square of that of the displacements.
+Stiffness and loads are affine in the modulus E: K_0 + t K_1 and f_0 + t f_1, where K_1 is of the
+particle alone at the range's upper end and t is E over that. The energy is stationary, so the error of projected moduli is the square
+of that of the displacements.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from alphacut.rve.solver.options import SolverOptions
 
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
 _CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)
+_SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+_PHASES = slice(0, 1), slice(1, 2)  # parts of the mesh
 ROUND_OFF = 1e-9  # of a solution that the others carry already
 
 
@@ -27,20 +30,19 @@ class ModulusBasis:
     """Solutions of one map at two moduli inside a range.
 
     Args:
-        nodes: The moduli, in Pa.
-        stiffness: The system at the nodes, projected, shape (2, fields, fields).
-        loads: The loads at the nodes, projected, shape (2, fields, loads).
+        stiffness: K_0 and K_1, projected, shape (2, fields, fields).
+        loads: f_0 and f_1, projected, shape (2, fields, loads).
         strains: Of the macroscopic strains alone, then of the solutions.
         iterations: Of the solutions.
-        error: Energy of the residual, the largest at the ends and half-way between them, over that
-            of the affine field.
+        unit: Modulus that K_1 is of, in Pa.
+        error: Energy of the residual, the larger at the ends, over that of the affine field.
     """
 
-    nodes: tuple[float, float]
     stiffness: Array
     loads: Array
     strains: SliceStrains
     iterations: tuple[int, ...]
+    unit: float
     error: float = np.nan
 
     def project(self, modulus: float) -> SliceStrains:
@@ -50,14 +52,10 @@ class ModulusBasis:
 
     def coefficients(self, modulus: float) -> Array:
         """Of the solutions for each load, shape (fields, loads)."""
-        low, high = self.shares(modulus)
-        system, loads = (low * a + high * b for a, b in (self.stiffness, self.loads))
+        system, loads = (
+            one[0] + modulus / self.unit * one[1] for one in (self.stiffness, self.loads)
+        )
         return np.asarray(np.linalg.solve(system, loads))
-
-    def shares(self, modulus: float) -> tuple[float, float]:
-        """Of the system at the nodes in that at a modulus."""
-        share = (modulus - self.nodes[0]) / (self.nodes[1] - self.nodes[0])
-        return 1 - share, share
 
 
 def modulus_basis(
@@ -75,31 +73,32 @@ def modulus_basis(
     Raises:
         ConvergenceError: A linear solve stopped early.
     """
-    systems, forces, solved = [], [], []
-    solver: LinearSolver | None = None
-    nodes = tuple(ends[0] + share * (ends[1] - ends[0]) for share in _CHEBYSHEV)
-    for modulus in nodes:
-        problem.assemble((matrix.stiffness, Phase(modulus, poisson).stiffness))
-        systems.append(problem.matrix.copy())
-        forces.append(problem.loads(strains))
+    phases = matrix.stiffness, Phase(ends[1], poisson).stiffness
+    systems = [problem.assemble(phases, phase).copy() for phase in _PHASES]
+    forces = [problem.loads(strains, phase) for phase in _PHASES]
+    solver, solved = None, []
+    for share in _CHEBYSHEV:
+        part = (ends[0] + share * (ends[1] - ends[0])) / ends[1]
+        systems[0].copy(problem.matrix, _SAME)
+        problem.matrix.axpy(part, systems[1], _SAME)
         solver = solver or problem.solver(SolverOptions())  # its factors serve both
-        solved.append(solver.solve(forces[-1], systems[-1]))
+        solved.append(solver.solve([_sum(*pair, part) for pair in zip(*forces, strict=True)]))
+    assert solver is not None
     vectors = _orthonormal([v for solutions in solved for v in solutions.vectors])
-    images = [[_product(system, v) for v in vectors] for system in systems]
+    images = [[system * v for v in vectors] for system in systems]
     stiffness, loads = (
         np.array([[[v.dot(w) for w in side] for v in vectors] for side in sides])
         for sides in (images, forces)
     )
-    rest: Array = np.zeros((len(problem.form.node), 2))
     none: Array = np.zeros(3)
-    fields = [(strain, rest) for strain in strains]
-    fields += [(none, problem.field(v)) for v in vectors]
-    means = problem.slice_strains(fields)
+    means = problem.slice_strains(
+        [(strain, None) for strain in strains] + [(none, problem.field(v)) for v in vectors]
+    )
     iterations = sum((solutions.iterations for solutions in solved), ())
-    basis = ModulusBasis((nodes[0], nodes[1]), stiffness, loads, means, iterations)
+    basis = ModulusBasis(stiffness, loads, means, iterations, ends[1])
     scale = CELL_AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
-    assert solver is not None
-    left = [_left_out(basis, e, images, forces, solver) for e in (ends[0], sum(ends) / 2, ends[1])]
+    # half-way it is as large as at the ends or less: the nodes are those of Chebyshev
+    left = [_left_out(basis, modulus, images, forces, solver) for modulus in ends]
     return replace(basis, error=float((np.array(left) / scale).max()))
 
 
@@ -111,16 +110,22 @@ def _left_out(
     solver: LinearSolver,
 ) -> Array:
     """Energy of the residual at a modulus, by the preconditioner, shape (loads,)."""
-    coefficients, energies = basis.coefficients(modulus), []
-    low, high = basis.shares(modulus)
-    for k, column in enumerate(coefficients.T):
-        residual = low * forces[0][k] + high * forces[1][k]
-        shares = np.concatenate([-low * column, -high * column])
+    part, energies = modulus / basis.unit, []
+    for k, column in enumerate(basis.coefficients(modulus).T):
+        residual = _sum(forces[0][k], forces[1][k], part)
+        shares = np.concatenate([-column, -part * column])
         residual.maxpy(shares.tolist(), images[0] + images[1])
         answer = residual.duplicate()
         solver.ksp.pc.apply(residual, answer)
         energies.append(residual.dot(answer))
     return np.array(energies)
+
+
+def _sum(matrix: PETSc.Vec, particle: PETSc.Vec, part: float) -> PETSc.Vec:
+    """The load with the particle's scaled."""
+    total = matrix.copy()
+    total.axpy(part, particle)
+    return total
 
 
 def _orthonormal(vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
@@ -134,9 +139,3 @@ def _orthonormal(vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
             vector.normalize()
             basis.append(vector)
     return basis
-
-
-def _product(matrix: PETSc.Mat, vector: PETSc.Vec) -> PETSc.Vec:
-    product = vector.duplicate()
-    matrix.mult(vector, product)
-    return product

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.form import WHOLE
 from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.wedge import POINTS, SLICES
 from alphacut.rve.prism.form import PrismForm
 from alphacut.rve.solver.krylov import LinearSolver
 from alphacut.rve.solver.numbering import LevelNumbering
@@ -74,6 +77,7 @@ class PrismProblem:
         self.numbering = LevelNumbering(grid, identify(grid.plane), comm)
         self._local = self.numbering.local_map(self.form.node)
         self.matrix = self.numbering.matrix(self._local)
+        self._solver: LinearSolver | None = None
 
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
@@ -85,20 +89,33 @@ class PrismProblem:
         self.map = radius_map
         self.form.place(radius_map)
 
-    def assemble(self, stiffness: tuple[Array, Array]) -> PETSc.Mat:
-        """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa."""
+    def assemble(self, stiffness: tuple[Array, Array], parts: slice = WHOLE) -> PETSc.Mat:
+        """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa.
+
+        Args:
+            stiffness: Of matrix and particle, (3, 3) each.
+            parts: Of the mesh: all, or one phase alone.
+        """
         self.form.elastic.set_phases(stiffness)
         self.matrix.zeroEntries()
-        self.form.elastic.add_stiffness(self.matrix)
+        self.form.elastic.add_stiffness(self.matrix, parts)
         return self.matrix
 
-    def loads(self, strains: Array) -> list[PETSc.Vec]:
+    def loads(self, strains: Array, parts: slice = WHOLE) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
-        return [self.numbering.vector(self._local, self.form.elastic.load(one)) for one in strains]
+        forces = [self.form.elastic.load(one, parts) for one in strains]
+        return [self.numbering.vector(self._local, one) for one in forces]
 
     def solver(self, options: SolverOptions) -> LinearSolver:
-        """The solver of the stiffness as assembled."""
-        return LinearSolver(self.matrix, self.numbering, self.map.distribution, options)
+        """The solver of the stiffness as assembled; the default's analysis serves every map."""
+        parts = self.matrix, self.numbering, self.map.distribution, options
+        if options != SolverOptions():
+            return LinearSolver(*parts)
+        if self._solver is None:
+            self._solver = LinearSolver(*parts)
+        else:
+            self._solver.renew(self.map.distribution)
+        return self._solver
 
     def field(self, vector: PETSc.Vec) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
@@ -106,11 +123,16 @@ class PrismProblem:
         scatter.scatter(vector, whole)
         return self.numbering.to_nodes(np.array(whole.array_r), self.form.node)
 
-    def slice_strains(self, fields: list[tuple[Array, Array]]) -> SliceStrains:
-        """Mean strains of fields, each a macroscopic strain (3,) and a fluctuation (nodes, 2)."""
+    def slice_strains(self, fields: Sequence[tuple[Array, Array | None]]) -> SliceStrains:
+        """Mean strains of fields, each a macroscopic strain (3,) and a fluctuation (nodes, 2).
+
+        None is a fluctuation of zero.
+        """
         form = self.form
-        strain = np.stack([form.strains(u) + uniform for uniform, u in fields], axis=-1)
-        area, share = form.areas(), form.particle()
+        strain = np.empty((len(form.wedge), SLICES, POINTS, 3, len(fields)))
+        for k, (uniform, u) in enumerate(fields):
+            strain[..., k] = uniform if u is None else form.strains(u) + uniform
+        area, share = form.areas, form.particle()
         parts = np.stack([area * (1 - share), area * share]) / CELL_AREA  # (2, cells, 3, points)
         sums = np.einsum("pmsq,msqif->pmsif", parts, strain)
         means = np.stack([form.by_layer(one) for one in sums])

@@ -44,7 +44,7 @@ class PlaneCell:
         plane.geometry.x[:, :2] = nodes[plane.geometry.input_global_indices]
         space = fem.functionspace(plane, element)
         dx = ufl.Measure("dx", domain=plane, metadata={"quadrature_degree": 2 * order + 1})
-        self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), dx)
+        self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), [dx])
         self._form.density.x.array[:] = 1.0
         self._form.share.x.array[:] = mesh.inside[plane.topology.original_cell_index]
         self._places: Array = np.empty((len(nodes), 2))

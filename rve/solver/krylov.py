@@ -65,23 +65,22 @@ class LinearSolver:
         with in_database(options), uninterrupted():
             self.ksp.setFromOptions()
             if options.by_levels:
-                self.ksp.pc.setPythonContext(ThetaPreconditioner(matrix, numbering, law))
+                self.by_levels = ThetaPreconditioner(matrix, numbering, law)
+                self.ksp.pc.setPythonContext(self.by_levels)
             self.ksp.setUp()
 
-    @uninterrupted()
-    def solve(self, loads: Sequence[PETSc.Vec], matrix: PETSc.Mat | None = None) -> Solutions:
-        """Solutions for all loads, one after another.
+    def renew(self, law: ThetaLaw) -> None:
+        """Take the matrix as it is now; for the preconditioner by levels."""
+        with uninterrupted():
+            self.by_levels.renew(law)
 
-        Args:
-            loads: Right-hand sides.
-            matrix: A stiffness near that of the preconditioner, in its place.
+    @uninterrupted()
+    def solve(self, loads: Sequence[PETSc.Vec]) -> Solutions:
+        """Solutions for all loads, one after another, with the matrix as it is now.
 
         Raises:
             ConvergenceError: The tolerance was not reached, or a solution is not finite.
         """
-        if matrix is not None:
-            self.matrix = matrix
-            self.ksp.setOperators(matrix)
         solved = [self._solve(load) for load in loads]
         pairs = zip(loads, (x for x, _ in solved), strict=True)
         residual = max(self._residual(load, x) for load, x in pairs)

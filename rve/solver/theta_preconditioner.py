@@ -93,11 +93,12 @@ class PlaneSolver:
     """A solver of one level, by default a Cholesky factor.
 
     Args:
-        matrix: The level's block.
+        matrix: The level's block; its values may change, its pattern stays.
     """
 
     def __init__(self, matrix: PETSc.Mat) -> None:
         matrix.setOption(PETSc.Mat.Option.SPD, True)
+        self.matrix = matrix
         self._ksp = PETSc.KSP().create(matrix.comm)
         self._ksp.setOperators(matrix)
         self._ksp.setType("preonly")
@@ -105,11 +106,16 @@ class PlaneSolver:
         self._ksp.pc.setFactorSolverType(factors())
         self._ksp.setOptionsPrefix(PREFIX + LEVEL)
         self._ksp.setFromOptions()
-        self._ksp.setUp()
         self._solution, self._load = matrix.createVecs()
 
+    def set_up(self, mass: float) -> None:
+        """Factorise the block over its mass along θ."""
+        self.matrix.scale(1 / mass)
+        self._ksp.setUp()
+        self._ksp.pc.setUp()  # where values changed, KSP leaves it to the next solve
+
     def __call__(self, load: Array) -> Array:
-        """Solution for a load, shape (n,); it is overwritten by the next."""
+        """Solution for a load, shape (n,)."""
         self._load.array[:] = load
         self._ksp.solve(self._load, self._solution)
         return np.array(self._solution.array_r)
@@ -119,21 +125,49 @@ class ThetaPreconditioner:
     """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``.
 
     Args:
-        matrix: The reduced stiffness.
+        matrix: The reduced stiffness; its values may change.
         numbering: Its unknowns.
         law: Law of θ.
     """
 
     def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
-        self.numbering = numbering
-        self.mass = theta_mass(law, numbering.grid.levels(law))
+        self.matrix, self.numbering = matrix, numbering
         self.injection = _injection(numbering)
-        levels, middles = self._blocks(matrix)
-        self.levels = [PlaneSolver(block) for block in levels]
-        self.middles = [PlaneSolver(block) for block in middles]
-        vector = matrix.createVecLeft()
-        self.scatter, self.whole = PETSc.Scatter.toAll(vector)
-        self.own = vector
+        self.own = matrix.createVecLeft()
+        self.scatter, self.whole = PETSc.Scatter.toAll(self.own)
+        self._sets = self._spans()
+        self._parts = matrix.createSubMatrices(self._sets)
+        n, v, layers = numbering.planar, numbering.between, numbering.grid.layers
+        self._hats = [_hat(n, v, below=k > 0, above=k < layers) for k in numbering.levels]
+        blocks = [part.PtAP(hat) for part, hat in zip(self._parts, self._hats, strict=False)]
+        self.levels = [PlaneSolver(block) for block in blocks]
+        self.middles = [PlaneSolver(part) for part in self._parts[len(blocks) :]]
+        self._set_up(law)
+
+    def renew(self, law: ThetaLaw) -> None:
+        """Take the matrix as it is now; the analysis of its pattern is kept."""
+        self.matrix.createSubMatrices(self._sets, submats=self._parts)
+        for part, hat, level in zip(self._parts, self._hats, self.levels, strict=False):
+            part.PtAP(hat, level.matrix)
+        self._set_up(law)
+
+    def _set_up(self, law: ThetaLaw) -> None:
+        self.mass = theta_mass(law, self.numbering.grid.levels(law))
+        for k, level in zip(self.numbering.levels, self.levels, strict=True):
+            level.set_up(self.mass.hats[k])
+        for k, middle in zip(self.numbering.middles, self.middles, strict=True):
+            middle.set_up(self.mass.bubbles[k])
+
+    def _spans(self) -> list[PETSc.IS]:
+        """Unknowns of this rank's levels with those half-way beside them, and of those alone."""
+        numbering = self.numbering
+        n, v, stride = numbering.planar, numbering.between, numbering.stride
+        spans = [
+            (max(0, k * stride - v), min(k * stride + n + v, numbering.size))
+            for k in numbering.levels
+        ]
+        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.middles]
+        return [PETSc.IS().createStride(b - a, a, 1, comm=PETSc.COMM_SELF) for a, b in spans]
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc."""
@@ -169,29 +203,6 @@ class ThetaPreconditioner:
     def _restricted(self, nodes: Array) -> Array:
         """Jᵀ times rows on all nodes."""
         return np.asarray((self.injection.T @ nodes.T).T)
-
-    def _blocks(self, matrix: PETSc.Mat) -> tuple[list[PETSc.Mat], list[PETSc.Mat]]:
-        """K_k and K_b of this rank's levels."""
-        numbering, mass = self.numbering, self.mass
-        n, v, stride, layers = (
-            numbering.planar, numbering.between, numbering.stride, numbering.grid.layers,
-        )  # fmt: skip
-        spans = [
-            (max(0, k * stride - v), min(k * stride + n + v, numbering.size))
-            for k in numbering.levels
-        ]
-        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.middles]
-        sets = [PETSc.IS().createStride(b - a, a, 1, comm=PETSc.COMM_SELF) for a, b in spans]
-        parts = matrix.createSubMatrices(sets)
-        levels = []
-        for k, part in zip(numbering.levels, parts, strict=False):
-            block = part.PtAP(_hat(n, v, below=k > 0, above=k < layers))
-            block.scale(1 / mass.hats[k])
-            levels.append(block)
-        middles = list(parts[len(levels) :])
-        for k, block in zip(numbering.middles, middles, strict=True):
-            block.scale(1 / mass.bubbles[k])
-        return levels, middles
 
 
 def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:

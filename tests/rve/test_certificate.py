@@ -105,7 +105,7 @@ class TestProductSpace:
         from alphacut.rve.form import CellForm
 
         right = CellForm.load
-        monkeypatch.setattr(CellForm, "load", lambda self, strain: -right(self, strain))
+        monkeypatch.setattr(CellForm, "load", lambda self, *parts: -right(self, *parts))
         with pytest.raises(CertificateError, match=r"Hill.Mandel"):
             self.solve()
 
