@@ -1,8 +1,8 @@
 """Galerkin's projection of a map's samples on solutions at two moduli of the particle.
 
 Stiffness and loads are affine in the modulus E: K_0 + t K_1 and f_0 + t f_1, where K_1 is of the
-particle alone at the range's upper end and t is E over that. The energy is stationary, so the error of projected moduli is the square
-of that of the displacements.
+particle alone at the range's upper end and t is E over that. The energy is stationary, so the error
+of projected moduli is the square of that of the displacements.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at m
 _CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 _PHASES = slice(0, 1), slice(1, 2)  # parts of the mesh
+_LOOSE = SolverOptions(overrides={"ksp_rtol": "1e-6"})  # its square is what a modulus is off by
 ROUND_OFF = 1e-9  # of a solution that the others carry already
 
 
@@ -81,7 +82,7 @@ def modulus_basis(
         part = (ends[0] + share * (ends[1] - ends[0])) / ends[1]
         systems[0].copy(problem.matrix, _SAME)
         problem.matrix.axpy(part, systems[1], _SAME)
-        solver = solver or problem.solver(SolverOptions())  # its factors serve both
+        solver = solver or problem.solver(_LOOSE)  # its factors serve both
         solved.append(solver.solve([_sum(*pair, part) for pair in zip(*forces, strict=True)]))
     assert solver is not None
     vectors = _orthonormal([v for solutions in solved for v in solutions.vectors])

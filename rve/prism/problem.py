@@ -107,14 +107,12 @@ class PrismProblem:
         return [self.numbering.vector(self._local, one) for one in forces]
 
     def solver(self, options: SolverOptions) -> LinearSolver:
-        """The solver of the stiffness as assembled; the default's analysis serves every map."""
-        parts = self.matrix, self.numbering, self.map.distribution, options
-        if options != SolverOptions():
-            return LinearSolver(*parts)
-        if self._solver is None:
-            self._solver = LinearSolver(*parts)
-        else:
-            self._solver.renew(self.map.distribution)
+        """The solver of the stiffness as assembled; the last, if by levels, is renewed."""
+        law, last = self.map.distribution, self._solver
+        if last is not None and last.options == options and options.by_levels:
+            last.renew(law)
+            return last
+        self._solver = LinearSolver(self.matrix, self.numbering, law, options)
         return self._solver
 
     def field(self, vector: PETSc.Vec) -> Array:

@@ -56,7 +56,7 @@ class LinearSolver:
     def __init__(
         self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
     ) -> None:
-        self.matrix = matrix
+        self.matrix, self.options = matrix, options
         self.ksp = PETSc.KSP().create(matrix.comm)
         self.ksp.setOptionsPrefix(PREFIX)
         self.ksp.setOperators(matrix)
