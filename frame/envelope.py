@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.arrays import Array
@@ -74,7 +73,3 @@ class Envelope(Bounds):
         notes: dict[str, str | int] = {"nature": str(self.nature), "notes": "; ".join(self.notes)}
         notes["trajectories"] = self.evaluations
         return dataset.assign_attrs(notes | dict(self.facts))
-
-    def to_csv(self, path: str | Path) -> None:
-        """Write a table: a row for each node of time, columns with units in their titles."""
-        super().to_csv(path)

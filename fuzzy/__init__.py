@@ -1,7 +1,6 @@
 """Fuzzy inputs through any model: α-cuts, methods of search, bounds."""
 
 from alphacut.fuzzy.campaign.store import Store
-from alphacut.fuzzy.decisions.limits import decide
 from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
 from alphacut.fuzzy.knowledge.known import Known
@@ -30,6 +29,6 @@ __all__ = [
     "Automatic", "Bounds", "Crisp", "Ellipsoidal", "Extended", "FailedError", "FuzzyNumber",
     "General", "Interval", "IntervalQuasiMonteCarlo", "Known", "Linear", "Metamodel", "Nature",
     "Optimisation", "PiecewiseLinear", "RandomInput", "RandomResponse", "Reduced", "RefusedError",
-    "Signed", "Store", "Trapezoidal", "Triangular", "decide", "from_data", "jointly", "levels",
+    "Signed", "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels",
     "propagate", "width_shares",
 ]  # fmt: skip

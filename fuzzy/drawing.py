@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BLUE = "#0072B2"
+_DOTTED = {"color": "black", "linestyle": ":", "linewidth": 0.8}
 
 
 def new_axes(axes: Axes | None) -> Axes:
@@ -26,51 +27,42 @@ def new_axes(axes: Axes | None) -> Axes:
     return pyplot.subplots(figsize=(5.0, 3.0), layout="constrained")[1]
 
 
-def draw_membership(
-    axes: Axes,
-    alpha: ArrayLike,
-    lower: ArrayLike,
-    upper: ArrayLike,
-    *,
-    name: str = "",
-    steps: bool = False,
-) -> None:
-    """Draw the membership function through α-cuts, from the lowest one up.
+def draw_membership(axes: Axes, alpha: Array, lower: Array, upper: Array, error: Array) -> None:
+    """Draw a membership function in steps: each cut holds up to the next level.
 
     Args:
         axes: Where to draw.
-        alpha: Levels, rising, shape (n,).
-        lower: Lower ends of the cuts, shape (n,).
-        upper: Upper ends of the cuts, shape (n,).
-        name: Name in the legend; none if empty.
-        steps: Whether each cut is drawn up to the next level; else ends go straight between them.
+        alpha: Levels, rising, shape (A,).
+        lower: Lower ends of the cuts, shape (A,).
+        upper: Upper ends of the cuts, shape (A,).
+        error: Of both ends, drawn dotted, shape (A,).
     """
-    grade, low, high = (np.asarray(ends, float) for ends in (alpha, lower, upper))
-    if steps:
-        grade, low, high = (np.repeat(grade, 2)[1:], *(np.repeat(x, 2)[:-1] for x in (low, high)))
+    grade, low, high = np.repeat(alpha, 2)[1:], np.repeat(lower, 2)[:-1], np.repeat(upper, 2)[:-1]
     x, y = np.concatenate([low, high[::-1]]), np.concatenate([grade, grade[::-1]])
-    (line,) = axes.plot(x, y, linewidth=1.8, label=name or None)
-    axes.fill(x, y, color=line.get_color(), alpha=0.12, linewidth=0)
+    axes.plot(x, y, color=_BLUE, linewidth=1.8)
+    axes.fill(x, y, color=_BLUE, alpha=0.12, linewidth=0)
+    for end in (lower - error, upper + error):
+        axes.plot(end, alpha, **_DOTTED)
     axes.set(ylabel="membership μ", ylim=(0, 1.08))
 
 
 def draw_bands(
-    axes: Axes, x: ArrayLike, alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike
+    axes: Axes, time: Array, alpha: Array, lower: Array, upper: Array, error: Array
 ) -> None:
-    """Draw a band for each level, darker for a higher one.
+    """Draw a band over time for each level, darker for a higher one.
 
     Args:
         axes: Where to draw.
-        x: Abscissas, shape (n,).
-        alpha: Levels, rising, shape (levels,).
-        lower: Lower ends, shape (levels, n).
-        upper: Upper ends, shape (levels, n).
+        time: Nodes, shape (T,), in s.
+        alpha: Levels, rising, shape (A,).
+        lower: Lower ends, shape (A, T).
+        upper: Upper ends, shape (A, T).
+        error: Of the widest band, drawn dotted, shape (A, T).
     """
-    grades = np.asarray(alpha, float)
-    bands = zip(grades, np.asarray(lower), np.asarray(upper), strict=True)
-    for grade, low, high in bands:
-        shade = 0.15 + 0.45 * float(grade)
-        axes.fill_between(
-            x, low, high, color=_BLUE, alpha=shade, linewidth=0.4, label=f"α = {grade:g}"
-        )
+    for grade, low, high in zip(alpha, lower, upper, strict=True):
+        look = {"color": _BLUE, "alpha": 0.15 + 0.45 * grade, "linewidth": 0.4}
+        axes.fill_between(time, low, high, label=f"α = {grade:g}", **look)
+    for end in (lower[0] - error[0], upper[0] + error[0]):
+        axes.plot(time, end, **_DOTTED)
+    axes.set(xlabel="time [s]")
     axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1, 1))

@@ -14,7 +14,7 @@ The three natures promise, of each output, level (and time):
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -23,18 +23,23 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.drawing import draw_bands, draw_membership, new_axes
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, chosen, require
 from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
-from alphacut.fuzzy.shown import Shown
 
 if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+
     from alphacut.fuzzy.samples.model import Samples
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 ROUND_OFF = 1e-9
 """Share of an output's size by which bounds may miss each other for reasons of rounding."""
+_ROWS = 25
+"""Levels of all outputs that a text has at most."""
 
 
 class Nature(StrEnum):
@@ -62,7 +67,7 @@ class Ends(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Bounds(Shown):
+class Bounds:
     """α-cuts of the outputs of a function of fuzzy inputs, over time where there is one.
 
     Args:
@@ -270,6 +275,86 @@ class Bounds(Shown):
             inner=_of(self.inner, columns),
             outer=_of(self.outer, columns),
         )
+
+    def __str__(self) -> str:
+        """Nature and cost; bounds of the first outputs, a line for each level; notes."""
+        count = max(1, _ROWS // len(self.alpha))
+        lines = [
+            line for column in range(len(self.outputs))[:count] for line in self._lines(column)
+        ]
+        hidden = len(self.outputs) - count
+        more = [f"… and {hidden} outputs more: bounds(NAME) has them"] if hidden > 0 else []
+        return "\n".join([self._head, *lines, *more, *self.said()])
+
+    __repr__ = __str__
+
+    @property
+    def _head(self) -> str:
+        """Nature, what it rests on, and what it cost."""
+        rests = f" (given that {' and '.join(self.basis)})" if self.basis else ""
+        over = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
+        most = f" of at most {self.budget:,}" if self.budget else ""
+        cost = f"{self.evaluations:,} evaluations{most}, {self.seconds:.2g} s"
+        return f"bounds {self.nature}{rests}{over} by the method {self.method}: {cost}"
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Outputs with their units."""
+        pairs = zip(self.outputs, self.units or ("",) * len(self.outputs), strict=True)
+        return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
+
+    def _lines(self, column: int) -> Iterator[str]:
+        """A line for each level of an output, with the extremes over time where there is one."""
+        low, high, error = self.minimum[:, column], self.maximum[:, column], self.error[..., column]
+        nature = self.nature_of(self.outputs[column])
+        differs = f", {nature}" if nature != self.nature else ""
+        worst = error if self.time is None else error.max(axis=1)
+        for row in zip(self.alpha, low, high, worst, strict=True):
+            alpha, *ends, miss = (_digits(x) for x in row)
+            yield f"{self.named[column]}, α = {alpha}: {' … '.join(ends)}, error {miss}{differs}"
+
+    def plot(self, output: str | None = None, axes: Axes | None = None) -> Axes:
+        """Draw one output: a membership function, or bands over time, with its error.
+
+        Args:
+            output: Name of the output; the first one if not given.
+            axes: Where to draw; a new figure if not given.
+
+        Returns:
+            The axes drawn on.
+        """
+        column = 0 if output is None else self.column(output)
+        low, high, error = (x[..., column] for x in (self.lower, self.upper, self.error))
+        axes, wide = new_axes(axes), np.nan_to_num(error)
+        title = f"bounds {self.nature_of(self.outputs[column])}"
+        title += f", error up to {_digits(wide.max())}, dotted" if wide.max() > 0 else ""
+        axes.set_title(title, fontsize="medium")
+        if self.time is None:
+            draw_membership(axes, self.alpha, low, high, wide)
+            axes.set_xlabel(self.named[column])
+        else:
+            draw_bands(axes, self.time, self.alpha, low, high, wide)
+            axes.set_ylabel(self.named[column])
+        return axes
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Bounds over (alpha, time, output), where they are attained over (…, parameter)."""
+        import xarray
+
+        middle = {} if self.time is None else {"time": self.time}
+        axes = {"alpha": self.alpha, **middle, "output": list(self.outputs)}
+        places = {**axes, "parameter": list(self.inputs)}
+        tables = {name: (tuple(axes), getattr(self, name)) for name in ("lower", "upper", "error")}
+        tables |= {name: (tuple(places), getattr(self, name)) for name in ("lower_at", "upper_at")}
+        tables["nature"] = (("output",), np.array([str(self.nature_of(x)) for x in self.outputs]))
+        tables["label"] = (("output",), np.array(self.named))
+        facts = {"method": self.method, "evaluations": self.evaluations, "seconds": self.seconds}
+        return xarray.Dataset(tables, places, {**facts, "basis": "; ".join(self.basis)})
+
+
+def _digits(value: float) -> str:
+    """A number with six digits; empty where it is not known."""
+    return "" if np.isnan(value) else f"{value + 0.0:.6g}"
 
 
 def _of(pair: Ends | None, columns: list[int]) -> Ends | None:

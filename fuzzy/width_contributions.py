@@ -12,7 +12,6 @@ from alphacut.fuzzy.refused import chosen
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
-from alphacut.fuzzy.tables import html_table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,29 +45,16 @@ class Shares:
 
     def __str__(self) -> str:
         """A line for each output and input or group, the least and the greatest share."""
-        return "\n".join([self._head, *(f"  {a}, {b}: {words}" for a, b, words in self._rows)])
-
-    __repr__ = __str__
-
-    def _repr_html_(self) -> str:
-        """The shares as a table, for notebooks."""
-        header = ("output", "input", "share of the width lost")
-        return html_table(header, self._rows, below=self._head)
-
-    @property
-    def _head(self) -> str:
-        fixed = "share of the width lost where the input is fixed at the middle of its cut at α = 1"
-        return f"{fixed}, least … greatest over levels and times, by bounds {self.nature}"
-
-    @property
-    def _rows(self) -> list[tuple[str, str, str]]:
-        """Output, input, and its shares over all levels and times."""
         percent = 100 * self.share
-        return [
-            (output, name, f"{percent[i, ..., k].min():.3g} … {percent[i, ..., k].max():.3g} %")
+        head = "share of the width lost where the input is fixed, least … greatest over levels and"
+        rows = [
+            f"  {output}, {name}: {percent[i, ..., k].min():.3g} … {percent[i, ..., k].max():.3g} %"
             for k, output in enumerate(self.outputs or map(str, range(self.width.shape[-1])))
             for i, name in enumerate(self.names)
         ]
+        return "\n".join([f"{head} times, by bounds {self.nature}", *rows])
+
+    __repr__ = __str__
 
 
 def width_shares(

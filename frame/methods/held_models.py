@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import prod
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.fuzzy.campaign.memory import require_bytes
 
 Models = tuple[Array, Array, Array]
 """Values (K,), first derivatives (K, d) and second derivatives (K, d, d)."""
@@ -32,14 +30,8 @@ class HeldModels:
             shifts: 0 is the place itself, 1 the next node, −1 the one before.
             shape: (T, m, 2).
             d: Number of parameters.
-
-        Raises:
-            TooLargeError: They do not fit into memory.
         """
         sizes = (shape, (*shape, d), (*shape, d, d))
-        what = f"models of {shape[0]:,} nodes, {shape[1]} outputs and {d} inputs"
-        cure = "take a greater step, a shorter duration, or fewer outputs or inputs"
-        require_bytes(8 * len(shifts) * sum(map(prod, sizes)), what, cure)
         return cls({k: tuple(np.zeros(size) for size in sizes) for k in shifts})  # type: ignore[misc]
 
     def keep(self, jet: Jet, holder: Array) -> None:

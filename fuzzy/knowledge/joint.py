@@ -133,12 +133,6 @@ class JointClaim:
         """The claim of a number computed from the inputs; None where no input has one."""
         return None if self.rule is None else Claim(self.rule.means, self.conditions)
 
-    @property
-    def brief(self) -> str:
-        """The same; where nothing is claimed, the names of the opinions alone."""
-        opinions = f"opinions: {', '.join(self.opinions)}" if self.opinions else ""
-        return opinions if self.rule is None else str(self)
-
     def __str__(self) -> str:
         """The claim in one sentence; empty where nothing is fuzzy."""
         if self.rule is None:

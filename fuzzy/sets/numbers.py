@@ -7,17 +7,13 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.drawing import draw_membership, new_axes
 from alphacut.fuzzy.refused import real, require
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 class Cut(NamedTuple):
@@ -75,22 +71,6 @@ class FuzzyNumber(ABC):
         x = np.asarray(x, float)
         grade = np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
         return np.where(np.isnan(x), np.nan, grade)
-
-    def plot(self, axes: Axes | None = None, *, quantity: str = "p", name: str = "") -> Axes:
-        """Draw the membership function (Fig. 36).
-
-        Args:
-            axes: Where to draw; a new figure if not given.
-            quantity: Label of the abscissa, with its unit.
-            name: Name in the legend of the axes; none if empty.
-
-        Returns:
-            The axes drawn on.
-        """
-        axes = new_axes(axes)
-        draw_membership(axes, *self.cuts, name=name)
-        axes.set_xlabel(quantity)
-        return axes
 
 
 def level(alpha: float) -> float:

@@ -21,7 +21,6 @@ from alphacut.fuzzy import (
     Signed,
     Trapezoidal,
     Triangular,
-    decide,
     from_data,
     jointly,
     levels,
@@ -92,8 +91,6 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: run(store="/proc/none/s.db", identity={"v": 1}), "store"),
         (lambda: run(store="s.db"), "identity"),
         (lambda: model_key({"f": abs}), "identity"),
-        (lambda: decide(run(), {}), "limits"),
-        (lambda: decide(run(), {"z": 1}), "output"),
         (lambda: run(alpha=[0.5]).number(), "alpha"),
         (
             lambda: width_shares(lambda x: run(inputs=x), X, groups={"g": ("z",)}),

@@ -1,4 +1,4 @@
-"""Fuzzy numbers: cuts, membership, drawings."""
+"""Fuzzy numbers: cuts and membership."""
 
 import itertools
 
@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alphacut.fuzzy import Crisp, Interval, PiecewiseLinear, Trapezoidal, Triangular
-from alphacut.fuzzy.plots import figure_36, figure_37
 from alphacut.fuzzy.sets.stepwise import outer_steps
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
@@ -59,12 +58,3 @@ def test_a_level_beside_a_decimal_by_rounding_is_that_decimal():
         assert steps.cut(k / 10) == steps.cut(float(grid[k])) == (grid[k], 3 - grid[k])
     assert steps.cut(0.35) == steps.cut(0.3)  # the wider one
     assert steps.known(0.35) == pytest.approx(0.3)
-
-
-def test_pictures_show_every_set_with_its_name_and_axis():
-    axes = figure_36().axes[0]
-    names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert names[:2] == ["crisp number", "crisp interval"]
-    assert (len(axes.lines), axes.get_ylabel()) == (5, "membership μ")
-    assert len(figure_37().axes[0].lines) == 1 + 6
-    assert Triangular(1, 2, 3).plot(quantity="E [GPa]").get_xlabel() == "E [GPa]"
