@@ -10,6 +10,7 @@ from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import Drawn, about, judged, reached
 
 TOLERANCE = 1e-3
+METHOD = ImprovedFollower(TOLERANCE, budget=1500)
 
 
 def swinging(rng):
@@ -64,7 +65,7 @@ def test_errors_cover_or_bounds_are_called_attained(kind):
         share = float(rng.choice([0.02, 0.05, 0.1]))
         inputs = {name: about(system.parameters[name], share) for name in names}
         drawn = Drawn(system, inputs, duration=4.0, step=0.02)
-        found = envelope(system, inputs, method=ImprovedFollower(TOLERANCE), **drawn.motion)
+        found = envelope(system, inputs, method=METHOD, **drawn.motion)
         attained += found.nature is Nature.ATTAINED
         fine = LagrangianFlow(system, tuple(inputs), 4.0, 0.02, "composition4")
         before = len(table.violations)
