@@ -9,9 +9,9 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.passing import ANY, passing
-from alphacut.frame.questions.peaks import peaks
+from alphacut.frame.questions.peaks import Peaks, peaks
 from alphacut.frame.questions.probability import probabilities
-from alphacut.frame.questions.tolerances import scaled, tolerances
+from alphacut.frame.questions.tolerances import _judged, scaled, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
@@ -128,6 +128,16 @@ def test_tolerances_at_their_ends(limit, kept, passed):
         ONE, {"m1": Triangular(900, 1000, 1100)}, {"q1": limit}, duration=2, step=0.01
     )
     assert (answer.kept, answer.passed) == (kept, passed)
+
+
+@pytest.mark.parametrize(
+    ("limit", "kept", "passed"), [(1.5, False, False), (2.0, True, False), (0.9, False, True)]
+)
+def test_a_limit_between_what_is_reached_and_what_is_excluded_is_neither(limit, kept, passed):
+    """A motion is known to reach 1, none passes 2; kept is what no motion passes."""
+    one, name = np.ones((1, 1)), (Nature.GUARANTEED,)
+    found = Peaks(np.zeros(1), ("q1",), 0 * one, 1.9 * one, 0.1 * one, one, name)
+    assert _judged(found, {"q1": limit})[:2] == (kept, passed)
 
 
 def speed(rng, count):
