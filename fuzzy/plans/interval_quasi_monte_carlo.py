@@ -21,7 +21,7 @@ from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.refused import chosen, real, require
-from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, PiecewiseLinear
 
@@ -79,11 +79,6 @@ class IntervalResponse:
         responses = np.atleast_1d(np.asarray(at, float))
         least = (upper[..., None] <= responses).mean(axis=0)
         return least, (lower[..., None] <= responses).mean(axis=0)
-
-    def exceedance(self, limit: ArrayLike, output: str = "y") -> tuple[Array, Array]:
-        """Bounds of the probability to exceed each limit (m,), two arrays (levels, m)."""
-        lower, upper = self.p_box(limit, output)
-        return 1 - upper, 1 - lower
 
     def quantile(self, probability: ArrayLike, output: str = "y") -> tuple[Array, Array]:
         """Bounds of quantiles at probabilities (m,), two arrays (levels, m)."""
@@ -160,19 +155,14 @@ class IntervalQuasiMonteCarlo:
             )
             for drawn in zip(*numbers, strict=True)
         ]
-        return _gathered(results, tuple(alpha))
-
-
-def _gathered(results: Sequence[Bounds], alpha: tuple[float, ...]) -> IntervalResponse:
-    """The response over all points, with the weakest of the natures."""
-    return IntervalResponse(
-        alpha,
-        results[0].outputs,
-        np.array([one.lower for one in results]),
-        np.array([one.upper for one in results]),
-        sum(one.evaluations for one in results),
-        min((one.nature for one in results), key=list(Nature).index),
-    )
+        return IntervalResponse(
+            tuple(alpha),
+            results[0].outputs,
+            np.array([one.lower for one in results]),
+            np.array([one.upper for one in results]),
+            sum(one.evaluations for one in results),
+            min((one.nature for one in results), key=list(Nature).index),
+        )
 
 
 def _numbers(one: RandomInput, u: Array, alpha: Sequence[float]) -> list[PiecewiseLinear]:

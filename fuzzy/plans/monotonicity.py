@@ -1,8 +1,9 @@
 """Verification of monotonicity: the sign of every input's effect on every output, level by level.
 
-A sign is *proved* where the caller states it or where a range of the gradient over the whole box
-excludes 0. Otherwise it is *seen*: differences at probes of the box all have it, with a margin.
-What is seen is evidence, not proof, and the bounds that rest on it are attained only.
+A sign is *proved* where a range of the gradient over the whole box excludes 0, or where the caller
+states it and no sample contradicts it: each stated input is changed alone to look. Otherwise it is
+*seen*: differences at probes of the box all have it, with a margin. What is seen is evidence, not
+proof, and the bounds that rest on it are attained only.
 """
 
 from __future__ import annotations
@@ -85,8 +86,10 @@ def verify(
     outputs = outputs or columns
     signs = model.known.stated(domain.names, outputs)
     proved = signs != 0
-    rows = []
     lowers, uppers = domain.boxes
+    for column in np.flatnonzero(proved.any(axis=0)):
+        model(_changed(domain.modal, signs, lowers[0], uppers[0], int(column)))
+    rows = []
     for row in range(len(lowers)):
         lower, upper = lowers[row], uppers[row]
         signs, proved = signs.copy(), proved.copy()
@@ -97,6 +100,18 @@ def verify(
             signs = np.where(signs == 0, seen, signs)
         rows.append((signs, proved))
     return Effects(outputs, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+
+
+def _changed(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
+    """Points at which a stated sign shows alone: both ends of one input, the others fixed.
+
+    They are fixed at their modal values, and at the extreme corners of every pattern of signs.
+    """
+    rises = np.unique(signs >= 0, axis=0)
+    corners = np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
+    points = np.repeat(np.concatenate([modal[None], corners]), 2, axis=0)
+    points[::2, column], points[1::2, column] = lower[column], upper[column]
+    return np.asarray(np.unique(points, axis=0))
 
 
 def _prove(

@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.knowledge.known import Known, contradiction, negligible
-from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.samples.model import Samples, Values
 from alphacut.fuzzy.sets.boxes import Domain
@@ -83,33 +83,35 @@ class Design:
 
 
 def proving(bounds: Bounds, samples: Samples, proved: Mask, known: Known) -> Bounds:
-    """Bounds that are guaranteed where corners prove them and no sample contradicts that.
+    """Bounds of the outputs that corners prove as guaranteed ones.
 
     Args:
         bounds: Attained at the corners that the knowledge names.
         samples: All samples of the model.
         proved: Outputs that the knowledge covers on every level, shape (outputs,).
         known: The knowledge.
+
+    Raises:
+        RefusedError: A sample contradicts the knowledge.
     """
     if not proved.any():
         return bounds
     signs = known.stated(tuple(bounds.inputs), bounds.outputs)
     beyond = _beyond(bounds, samples)
-    natures, notes = [], []
-    for column, name in enumerate(bounds.outputs):
-        own = samples.values.array[:, column]
-        pair = contradiction(samples.points, own, signs[column]) if proved[column] else None
-        sound = proved[column] and not beyond[column] and pair is None
-        natures.append(Nature.GUARANTEED if sound else Nature.ATTAINED)
-        if proved[column] and not sound:
-            notes.append(f"samples contradict what is known of {name}{_between(bounds, pair)}")
+    for column in np.flatnonzero(proved):
+        pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
+        if beyond[column] or pair is not None:
+            cure = f"samples contradict it{_between(bounds, pair)}"
+            key, words = f"known of {bounds.outputs[column]}", "; ".join(known.words)
+            raise RefusedError(key, repr(words), "facts that hold over the whole supports", cure)
+    natures = tuple(Nature.GUARANTEED if own else Nature.ATTAINED for own in proved)
+    agree = f"which {len(samples.points):,} samples do not contradict"
     return replace(
         bounds,
-        natures=tuple(natures),
+        natures=natures,
         nature=min(natures, key=list(Nature).index),
-        basis=known.words if Nature.GUARANTEED in natures else (),
+        basis=tuple(f"{fact}, {agree}" for fact in known.words),
         inner=Ends(bounds.lower, bounds.upper),
-        notes=(*bounds.notes, *notes),
     )
 
 

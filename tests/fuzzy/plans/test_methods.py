@@ -145,7 +145,9 @@ def test_only_outputs_whose_signs_are_stated_or_verified_are_guaranteed():
 
     verified = propagate(curved, INPUTS, Signed(), known=Known(gradient_range=gradient))
     assert verified.natures == (Nature.GUARANTEED, Nature.ATTAINED)
-    assert verified.basis == ("the range of the gradient holds, as stated by the caller",)
+    assert len(verified.basis) == 1
+    assert verified.basis[0].startswith("the range of the gradient holds, as stated by the caller")
+    assert f"which {len(verified.samples.points)} samples do not contradict" in verified.basis[0]
     seen = propagate(curved, INPUTS, Signed())
     assert seen.nature is Nature.ATTAINED
     np.testing.assert_allclose(seen.bounds("up"), stated.bounds("up"))
@@ -160,17 +162,31 @@ def test_only_outputs_whose_signs_are_stated_or_verified_are_guaranteed():
         (Automatic(), {"a": 1, "b": 1}),
     ],
 )
-def test_wrong_signs_are_contradicted_by_the_samples(method, wrong):
-    result = propagate(lambda a, b: a - b, INPUTS, method, known=Known(wrong))
-    assert result.nature is Nature.ATTAINED
-    assert "contradict what is known of y" in result.notes[-1]
-    assert not result.basis
+@pytest.mark.parametrize("small", [1.0, 1e-6])
+def test_wrong_signs_are_contradicted_by_the_samples(method, wrong, small):
+    """Also those of small effects, which no corner of the right signs of large ones shows."""
+    large = next(name for name in wrong if wrong[name] == {"a": 1, "b": -1}[name])
+    sizes = {name: 1.0 if name == large else small for name in wrong}
+    with pytest.raises(RefusedError, match="larger than at") as refused:
+        propagate(lambda a, b: sizes["a"] * a - sizes["b"] * b, INPUTS, method, known=Known(wrong))
+    assert refused.value.key == "known of y"
+    assert "signs of a, b" in refused.value.value
+
+
+def test_a_wrong_sign_of_one_output_is_refused_by_its_name():
+    def outputs(a, b):
+        return {"first": a + b, "second": a - 1e-9 * b}
+
+    known = Known({"a": 1, "b": {"first": 1, "second": 1}})
+    with pytest.raises(RefusedError) as refused:
+        propagate(outputs, INPUTS, Signed(), known=known)
+    assert refused.value.key == "known of second"
 
 
 def test_a_sample_beyond_the_corners_refutes_them():
-    known = Known(monotone=("x",))
     inputs = {"x": Triangular(-1.0, 0.1, 1.0)}
-    assert propagate(lambda x: x**2, inputs, General(), known=known).nature is Nature.ATTAINED
+    with pytest.raises(RefusedError, match="samples contradict it"):
+        propagate(lambda x: x**2, inputs, General(), known=Known(monotone=("x",)))
 
 
 @pytest.mark.parametrize("method", [Automatic(), Optimisation()])
