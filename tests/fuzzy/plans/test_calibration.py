@@ -1,7 +1,5 @@
 """Stated errors against true ones over families of functions: half an error is seen."""
 
-import os
-
 import numpy as np
 import pytest
 
@@ -19,70 +17,15 @@ from alphacut.fuzzy.plans.alpha_cut_optimisation import attained
 from alphacut.fuzzy.plans.automatic import _Passes
 from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
-
-GRID = 41
-
-
-def smooth(rng, n):
-    """A quadratic, a wave and a slope."""
-    slope, wave = rng.normal(0, 2, n), rng.normal(0, 2, n)
-    matrix, size = rng.normal(0, 1, (n, n)), rng.normal(0, 0.5)
-    return lambda x: x @ slope + ((x @ matrix) * x).sum(-1) / 2 + size * np.sin(x @ wave)
-
-
-def hills(rng, n):
-    """Five bells, some narrow."""
-    centres, heights = rng.uniform(-1, 1, (5, n)), rng.normal(0, 1, 5)
-    widths = rng.uniform(0.3, 1.2, 5)
-    return lambda x: sum(
-        h * np.exp(-(((x - c) / w) ** 2).sum(-1))
-        for h, c, w in zip(heights, centres, widths, strict=True)
-    )
-
-
-def jump(rng, n):
-    """A slope with a step across a plane."""
-    slope, normal, offset = rng.normal(0, 1, n), rng.normal(0, 1, n), rng.uniform(-0.5, 0.5)
-    height = rng.normal(0, 2)
-    return lambda x: x @ slope + height * (x @ normal > offset)
-
-
-def kink(rng, n):
-    """The greatest of four slopes."""
-    slopes, offsets = rng.normal(0, 1, (4, n)), rng.normal(0, 0.3, 4)
-    return lambda x: (x @ slopes.T + offsets).max(-1)
-
-
-FAMILIES = [smooth, hills, jump, kink]
-
-
-def true_ends(function, inputs, alpha):
-    """Least and greatest value over a grid of a cut, polished from its best points."""
-    from scipy.optimize import minimize
-
-    ends = np.array([number.cut(alpha) for number in inputs.values()])
-    axes = [np.linspace(*end, GRID) for end in ends]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(ends))
-    values, best = function(grid), []
-    for sign in (1.0, -1.0):
-        place = grid[np.argsort(sign * values)[:3]]
-        polished = [
-            minimize(lambda x, s=sign: s * function(x), p, bounds=ends, method="L-BFGS-B").fun
-            for p in place
-        ]
-        best.append(sign * min(*polished, (sign * values).min()))
-    return best
+from tests.calibration.functions import FAMILIES, jump, named, numbers, true_ends
 
 
 def shortfalls(method, family, seed):
     """Nature, and true error over stated error at each end of two cuts."""
     rng = np.random.default_rng(seed)
-    n = int(rng.integers(1, 4))
-    function = family(rng, n)
-    corners = np.sort(rng.uniform(-1, 1, (n, 3)), axis=1)
-    inputs = {f"x{i}": Triangular(*corners[i]) for i in range(n)}
+    function, inputs = family(rng, n := int(rng.integers(1, 4))), numbers(rng, n)
     result = propagate(
-        lambda **x: function(np.stack(list(x.values()), -1)),
+        named(function),
         inputs,
         method,
         alpha=(0.0, 0.5),
@@ -117,15 +60,6 @@ def test_errors_of_the_default_cover_in_every_family():
     assert covered >= 0.98 * total, table
     assert table["smooth"][0] >= 4, table  # most smooth functions are worth an estimate
     assert max(row[3] for row in table.values()) < 0.05, table
-
-
-@pytest.mark.slow
-def test_errors_of_the_default_cover_with_free_seeds():
-    start = int(os.environ.get("SEED", np.random.default_rng().integers(10**9)))
-    table = calibrate(Automatic(), range(start, start + 150))
-    print(start, table)
-    total, covered = (sum(row[k] for row in table.values()) for k in (1, 2))
-    assert covered >= 0.995 * total, (start, table)
 
 
 def test_a_surface_over_a_jump_states_no_error_that_it_does_not_keep():

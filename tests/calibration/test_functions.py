@@ -1,0 +1,83 @@
+"""Estimated and guaranteed bounds of random functions by each plan that states an error."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy import (
+    Automatic,
+    Known,
+    Metamodel,
+    Nature,
+    Optimisation,
+    Reduced,
+    RefusedError,
+    Signed,
+    propagate,
+)
+from tests.calibration import functions
+from tests.calibration.declared import Calibration, free_seed
+
+ALPHA = (0.0, 0.5)
+PLANS = {
+    "automatic": (Automatic(), 100),
+    "surface of corners": (Metamodel(60, 20), 25),
+    "surface of a search": (Metamodel(40, 20, Optimisation(starts=1, look=4)), 5),
+}
+
+
+def bounded(function, inputs, plan, **options):
+    named = functions.named(function)
+    return propagate(
+        named, inputs, plan, alpha=ALPHA, vectorised=True, budget=10**6, progress=False, **options
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLANS)
+def test_errors_cover_or_bounds_are_called_attained(name):
+    """Functions of one to three inputs, smooth ones and ones with hills, kinks and jumps."""
+    plan, count = PLANS[name]
+    seed, estimated = free_seed(name), dict.fromkeys(functions.FAMILIES, 0)
+    table = Calibration(f"functions by {name}: declared over true", seed)
+    for number in range(count):
+        for kind, family in enumerate(functions.FAMILIES):
+            rng = np.random.default_rng([seed, number, kind])
+            function, inputs = family(rng, n := int(rng.integers(1, 4))), functions.numbers(rng, n)
+            result = bounded(function, inputs, plan)
+            if result.nature is not Nature.ESTIMATED:
+                continue
+            estimated[family] += 1
+            for level, alpha in enumerate(ALPHA):
+                low, high = functions.true_ends(function, inputs, alpha)
+                lacks = np.array([result.lower[level, 0] - low, high - result.upper[level, 0]])
+                table.estimated(
+                    family.__name__,
+                    result.error[level, 0],
+                    np.maximum(lacks, 0),
+                    size=max(abs(low), abs(high), high - low),
+                    least=1e-3 * (high - low),
+                    case=(number, alpha),
+                )
+    print({family.__name__: f"{k} of {count} estimated" for family, k in estimated.items()})
+    table.judge()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plan", [Signed(), Reduced()])
+def test_no_value_leaves_the_guaranteed_bounds(plan):
+    """Monotone functions with effects from 1e-6 to 1; a sign that is stated wrongly is refused."""
+    seed = free_seed(plan.name)
+    table = Calibration(f"monotone functions by {plan.name}: proved over attained width", seed)
+    for number in range(60):
+        rng = np.random.default_rng([seed, number])
+        function, signs = functions.monotone(rng, n := int(rng.integers(1, 4)))
+        inputs = functions.numbers(rng, n)
+        result = bounded(function, inputs, plan, known=Known(signs))
+        assert result.nature is Nature.GUARANTEED
+        ends = [functions.true_ends(function, inputs, alpha) for alpha in ALPHA]
+        size = np.abs(ends).max()
+        table.guaranteed("ends", result.bounds(), np.array(ends).T, size=size, case=number)
+        wrong = signs | {f"x{k}": -signs[f"x{k}"] for k in [int(rng.integers(n))]}
+        with pytest.raises(RefusedError):
+            bounded(function, inputs, plan, known=Known(wrong))
+    table.judge()
