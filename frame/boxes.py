@@ -190,7 +190,7 @@ class UnitFlow:
             (index for index, name in enumerate(self.outputs) if Output(name).unit == "m"), 0
         )
 
-    def told(self, value: float) -> str:
+    def in_words(self, value: float) -> str:
         """An error or gap in words, with the unit of a tolerance."""
         unit = "of each peak" if self.relative else Output(self.outputs[self.reference]).unit
         return f"{value:.3g} {unit}"

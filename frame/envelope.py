@@ -45,16 +45,6 @@ class Envelope(Bounds):
         """All evaluations."""
         return self.evaluations
 
-    @property
-    def inner_lower(self) -> Array | None:
-        """Lower bounds that are attained beside proved ones."""
-        return self.inner.lower if self.inner else None
-
-    @property
-    def inner_upper(self) -> Array | None:
-        """Upper bounds that are attained beside proved ones."""
-        return self.inner.upper if self.inner else None
-
     def to_dataset(self) -> xarray.Dataset:
         """The envelope as an xarray dataset with units; ready for NetCDF."""
         dataset = super().to_dataset()

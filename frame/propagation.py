@@ -110,7 +110,7 @@ def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
         return of
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
-        proof = Proof(gap=way.tolerance / 4, patient=False).run(exact)
+        proof = Proof(gap=way.tolerance / 4, boxes=1000).run(exact)
     except (UnprovedError, ModalError):
         return of
     return beside(of, proof, over.scale)

@@ -104,7 +104,7 @@ def rows(rng: np.random.Generator, frames: int, systems: int) -> Iterator[dict[s
         low, high = tried(flow, inputs, rng)
         methods: list[Any] = [frame.ImprovedFollower(1e-3)]
         if linear:
-            methods += [frame.Proof(tolerance=1e-2, patient=False), frame.Search(1e-3)]
+            methods += [frame.Proof(tolerance=1e-2), frame.Search(1e-3)]
         for method in methods:
             row = {"system": number, "inputs": len(inputs), "method": method.name}
             try:

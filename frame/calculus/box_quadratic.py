@@ -130,5 +130,5 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
 
 def _best_of_starts(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     starts = [np.zeros_like(g), linear_maximum(g, lower, upper)]
-    found = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
-    return np.asarray(found[np.arange(len(g)), gain(g, H, found).argmax(1)])
+    optima = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
+    return np.asarray(optima[np.arange(len(g)), gain(g, H, optima).argmax(1)])

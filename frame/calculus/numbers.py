@@ -23,8 +23,8 @@ def require_number(name: str, value: object, unit: str) -> None:
     Raises:
         RefusedError: It is a text, a list or nothing.
     """
-    given = np.asarray(value)
-    if given.ndim or given.dtype.kind not in FINITE:
+    array = np.asarray(value)
+    if array.ndim or array.dtype.kind not in FINITE:
         raise RefusedError(name, repr(value), f"a number{f', in {unit}' if unit else ''}")
 
 

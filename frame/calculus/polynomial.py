@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement, pairwise
-from math import comb, prod
+from math import comb
 
 import numpy as np
-from scipy.fft import dctn
 from scipy.sparse import csr_array
 
 from alphacut.frame.calculus.jet import Array, Jet
@@ -113,26 +113,14 @@ class Polynomial:
                 out[i, j] = out[j, i] = derivative(self.index, j, self.slope[i])
         return out
 
-    def quadratic(self, u: Array) -> tuple[Array, Array, Array]:
-        """Values (S, K), first derivatives (S, d, K), second ones (d, d, K), of degree 2."""
-        bent = self.curve[:, :, 0]
-        turned = product(u, bent.reshape(u.shape[1], -1)).reshape(len(u), *bent.shape[1:])
-        value = self.coefficients[0] + (u[:, :, None] * (self.slope[:, 0] + turned / 2)).sum(1)
-        return value, self.slope[:, 0] + turned, bent
+    @classmethod
+    def beside(cls, parts: Sequence[Polynomial]) -> Polynomial:
+        """Vectors of polynomials of the same monomials as one."""
+        return cls(parts[0].index, np.hstack([part.coefficients for part in parts]))
 
-    def along(self, u: Array, axes: Array, moved: Array) -> Array:
-        """Values (N, L, M, K) on lines through points (N, d), of degree 2.
-
-        Args:
-            u: Points on the lines.
-            axes: Each line's direction, shape (N, L).
-            moved: Distances from the point along the line, shape (N, L, M).
-        """
-        value, slope, bent = self.quadratic(u)
-        first = np.take_along_axis(slope, axes[:, :, None], 1)[:, :, None]
-        second = bent[axes, axes][:, :, None] / 2
-        far = moved[..., None]
-        return np.asarray(value[:, None, None] + far * (first + far * second))
+    def divided(self, scale: Array) -> Polynomial:
+        """Each polynomial over a number of its own, `scale` (K,)."""
+        return Polynomial(self.index, self.coefficients / scale)
 
     def __call__(self, u: Array) -> Array:
         """Values at (S, d), shape (S, K)."""
@@ -143,11 +131,6 @@ class Polynomial:
         B, parts = basis(u, self.index), [self.coefficients, *self._packed]
         both = np.hstack([product(B[:, : len(part)], part) for part in parts])
         return both.reshape(len(u), -1, self.coefficients.shape[1])
-
-    def derivatives(self, u: Array) -> tuple[Array, Array, Array]:
-        """Values (S, K), first (S, d, K) and second derivatives (S, pairs i ≤ j, K)."""
-        jets, after = self.jets(u), 1 + u.shape[1]
-        return jets[:, 0], jets[:, 1:after], jets[:, after:]
 
     @cached_property
     def _packed(self) -> list[Array]:
@@ -174,43 +157,6 @@ def fit(u: Array, data: Jet, degree: int) -> Polynomial:
     q, r = np.linalg.qr(rows / scale)
     solution = np.linalg.solve(r, product(q.T, values)) / scale[:, None]
     return Polynomial(index, solution)
-
-
-@dataclass(frozen=True)
-class ChebyshevGrid:
-    """The Gauss–Chebyshev points on which a polynomial of given degrees is known by its values.
-
-    Args:
-        degrees: Largest exponent along each axis, d of them.
-    """
-
-    degrees: tuple[int, ...]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Points along each axis."""
-        return tuple(degree + 1 for degree in self.degrees)
-
-    def __len__(self) -> int:
-        return prod(self.shape)
-
-    @property
-    def points(self) -> Array:
-        """All points, shape (S, d)."""
-        axes = [np.cos(np.pi * (np.arange(n) + 0.5) / n) for n in self.shape]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
-
-    def coefficients(self, values: Array) -> Array:
-        """Chebyshev coefficients of values (S, …), same shape, the constant first.
-
-        Since no product exceeds 1 on the box, Σ ‖c_j‖ bounds ‖polynomial‖ there, for any norm.
-        """
-        out = dctn(
-            values.reshape(*self.shape, -1), type=2, axes=range(len(self.shape)), overwrite_x=True
-        ) / len(self)
-        for axis in range(len(self.shape)):
-            out[(slice(None),) * axis + (0,)] /= 2
-        return np.asarray(out.reshape(values.shape))
 
 
 @dataclass(frozen=True)
@@ -249,8 +195,9 @@ class LowerGrid:
         return leja(max(self.degrees) + self.excess + 1)[self.index]
 
     def coefficients(self, values: Array) -> Array:
-        """Chebyshev coefficients of values (S, …), as those of `ChebyshevGrid`.
+        """Chebyshev coefficients of values (S, …), same shape, the constant first.
 
+        Since no product exceeds 1 on the box, Σ ‖c_j‖ bounds ‖polynomial‖ there, for any norm.
         The matrix of T_k at the points is L U along each axis, and so is that of all terms, since
         with a term the set holds all of lower exponents.
         """
@@ -287,11 +234,11 @@ class LowerGrid:
 def leja(count: int) -> Array:
     """Leja points on [−1, 1], each as far from those before it as it can be, shape (count,)."""
     places = np.cos(np.linspace(0, np.pi, 4001))
-    found, apart = [0.0], np.abs(places)
-    while len(found) < count:
-        found.append(float(places[apart.argmax()]))
-        apart = apart * np.abs(places - found[-1])
-    return np.array(found)
+    points, apart = [0.0], np.abs(places)
+    while len(points) < count:
+        points.append(float(places[apart.argmax()]))
+        apart = apart * np.abs(places - points[-1])
+    return np.array(points)
 
 
 @lru_cache

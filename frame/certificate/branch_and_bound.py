@@ -13,12 +13,10 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.frontier import Frontier
 from alphacut.frame.certificate.piece import Piece, Problems
 from alphacut.frame.certificate.remainder import Remainder
@@ -137,16 +135,16 @@ class Tree:
         return tree
 
     def examined(self, frontier: Frontier, workers: int) -> Frontier:
-        """What is still open after one examination of all boxes of a frontier."""
+        """Boxes and items still open after one examination of all boxes of a frontier."""
 
-        def found(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
+        def of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
             return self._piece(frontier, *part).examined(self.problems)
 
         if workers == 1:
-            results = list(map(found, frontier.pieces(PIECE)))
+            results = list(map(of, frontier.pieces(PIECE)))
         else:
             with ThreadPoolExecutor(workers) as pool:
-                results = list(pool.map(found, frontier.pieces(PIECE)))
+                results = list(pool.map(of, frontier.pieces(PIECE)))
         code, value, _ = (np.concatenate(part) for part in zip(*results, strict=True))
         higher = np.flatnonzero(value > self.problems.best[frontier.problem] + HIGHER)
         if len(higher):
@@ -192,20 +190,11 @@ class Tree:
         fresh = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
         begin = np.flatnonzero(fresh)
         row_box, row_node = box[begin], node[begin]
-        started, together = self._parts
-        jets = together.jets(centre)
+        jets, started = self.model.together.jets(centre), self.model.started
         rows, count = np.searchsorted(row_box, np.arange(len(centre) + 1)), self.model.count
         forced = self._forced(jets[:, 0, :count], row_box, row_node)
         place = centre, radius, edges, rows, np.append(begin, len(box))
         return Piece(*place, row_node, column, jets, count, started, forced)
-
-    @cached_property
-    def _parts(self) -> tuple[bool, Polynomial]:
-        """Whether the free motion is one, and eigenvalues and all parts' shares side by side."""
-        model, load = self.model, [] if self.model.load is None else [self.model.load.share]
-        started = not load or bool(model.coefficient.coefficients.any())
-        parts = [model.eigenvalue, *[model.coefficient][: int(started)], *load]
-        return started, Polynomial(parts[0].index, np.hstack([part.coefficients for part in parts]))
 
     def _forced(self, rate: Array, box: Array, node: Array) -> Array | None:
         """Waves under a load of boxes `box` (R,) with eigenvalues (B, n) at nodes, (R, 3, n)."""

@@ -56,7 +56,6 @@ def certify(
     workers: int = 1,
     budget: float = 4000,
     progress: Callable[[float], None] | None = None,
-    told: Callable[[float], str] = "{:.3g}".format,
 ) -> Certificate:
     """Encloses the bounds of all levels, the narrowest first.
 
@@ -69,7 +68,6 @@ def certify(
         workers: Threads.
         budget: Most boxes per bound on average.
         progress: Called with the fraction done.
-        told: A gap in words, with its unit.
 
     Raises:
         ValueError: The model error alone exceeds the gap.
@@ -78,31 +76,31 @@ def certify(
     model, unit, error = model.in_units(scale), scale[:, None], model_error / scale
     rounding = Remainder.of(model, *model.boxes.unit(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for
-    slack = (1 - 1e-6) * gap - float((2 * error + rounding).max())
+    limit = float((2 * error + rounding).max())
+    slack = (1 - 1e-6) * gap - limit
     if slack <= 0:
-        limit = float((2 * error + rounding).max())
         raise ValueError(
-            f"certify: the gap {told(gap)} is not above twice the model error, {told(limit)}; ask"
+            f"certify: the gap {gap:.3g} is not above twice the model error, {limit:.3g}; ask"
             " for a wider gap or a lower tolerance"
         )
-    levels, found = len(model.boxes.alpha), list[Enclosed]()
+    levels, enclosed = len(model.boxes.alpha), list[Enclosed]()
     for done, level in enumerate(reversed(range(levels))):
         share = None if progress is None else (lambda x, done=done: progress((done + x) / levels))
-        within = found[-1] if found else None
+        within = enclosed[-1] if enclosed else None
         method = BranchAndBound(slack, budget)
-        found.append(_level(model, level, within, method, workers=workers, progress=share))
+        enclosed.append(_level(model, level, within, method, workers=workers, progress=share))
     shape = (levels, *error.shape, 2)
-    inner = np.stack([part.value for part in found[::-1]]).reshape(shape)
-    outer = np.stack([part.proved for part in found[::-1]]).reshape(shape)
+    inner = np.stack([part.value for part in enclosed[::-1]]).reshape(shape)
+    outer = np.stack([part.proved for part in enclosed[::-1]]).reshape(shape)
     # what holds on a wider box holds on those inside it
     outer = np.minimum.accumulate(outer, axis=0) + error[..., None]
     between = _between(model) + _growth(model, error)
     return Certificate(
         (inner - (error + rounding)[..., None]) * unit,
-        np.stack([part.point for part in found[::-1]]).reshape(*shape, -1),
+        np.stack([part.point for part in enclosed[::-1]]).reshape(*shape, -1),
         outer * unit,
         between * scale,
-        sum(part.boxes for part in found),
+        sum(part.boxes for part in enclosed),
         scale,
     )
 

@@ -69,7 +69,7 @@ class Frontier:
             start = stop
 
     def children(self, code: Array) -> Frontier:
-        """What the examination's codes (I,) leave open."""
+        """Boxes and items that the examination's codes (I,) leave open."""
         d = self.place.shape[1]
         split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
         count, box = 2 * d + 3**d, self.box[split]

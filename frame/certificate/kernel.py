@@ -54,7 +54,7 @@ def separable(g: Array, H: Array, r: Array) -> float:
 def stays_below(
     g: Array, H: Array, low: Array, high: Array, allowed: float, work: Array, L: Array
 ) -> bool:
-    """Whether g·x + x·H·x/2 ≤ allowed for low ≤ x ≤ high is shown by a concave function above.
+    """Shows by a concave function above that g·x + x·H·x/2 ≤ allowed for low ≤ x ≤ high.
 
     That is the same plus Σ s_i (x_i − low_i)(high_i − x_i)/2 (αBB: Adjiman and Floudas), and above
     it, where it is concave, lies each of its tangents. `work` (3, d) and `L` (d, d) are scratch.
@@ -128,9 +128,9 @@ def along(bound: Array, r: Array, out: Array) -> None:
 
 @compiled
 def left_out(reach: float, e: Array, c: Array) -> float:
-    """What C exp((λ − λ₀ − i ω·x) t) exp(i s) leaves out with C = C₀, λ = λ₀ + i ω·x, over |wave|.
+    """Bound of what C = C₀, λ = λ₀ + i ω·x leave out of C exp((λ − λ₀ − i ω·x) t + i s).
 
-    It is a sixth of a bound of the third derivative of their difference, by Leibniz' rule, with
+    It is over |wave|, a sixth of a bound of the third derivative of their difference, by Leibniz' rule, with
     bounds along the radii of the derivatives of λ t, `e` (0 … 3, of the real part alone the first),
     and of C, `c` (0 … 3). Beyond `TURN` it is infinite.
     """

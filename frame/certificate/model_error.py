@@ -10,13 +10,13 @@ Damping by one ratio for all modes is no polynomial; `ratio_damping` bounds what
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.polynomial import ChebyshevGrid, LowerGrid, Polynomial
+from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import Part, parts
@@ -26,18 +26,14 @@ from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence as dependence
 from alphacut.frame.structures.linear import evaluate
 
-MOST_NUMBERS = 120_000_000
-"""Values of the defects on their grid, at most: 1 GB."""
-DEAR = 3
-"""Cost of a value where points are as few as terms, beside one on a grid of all combinations."""
+MOST_NUMBERS = 60_000_000
+"""Values of the defects on their grid, at most: 0.5 GB."""
 CHUNK = 10_000
 Sample = Callable[[Array], dict[str, Array]]
 
 
-def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
+def proved_error(model: ModalModel) -> Array:
     """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs.
-
-    Unless `patient`, inputs are refused whose combinations are more than can be afforded.
 
     Raises:
         UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme
@@ -55,7 +51,9 @@ def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
         (part, partial(_defects, model, part, states, ratio))
         for part, states in zip(parts(model, growth), fit_states(model), strict=False)
     ]
-    grid = _grid(model, [sample for _, sample in samples], patient=patient)
+    grid = _grid(model)
+    for _, sample in samples:
+        _require_affordable(grid, sample)
     structure = _expanded(grid, partial(_structure, model))
     stiffness, mass = Comparison.of(structure["stiffness"]), Comparison.of(structure["mass"])
     deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
@@ -84,7 +82,7 @@ def proved_error(model: ModalModel, *, patient: bool = True) -> Array:
 def _reading(
     rows: Array, stiffness: Comparison, mass: Comparison, ratio: RatioDamping | None
 ) -> Array:
-    """What each output reads of a deviation of unit energy, shape (m,)."""
+    """Share of a deviation of unit energy that each output reads, shape (m,)."""
     size = len(stiffness.factor)
     rows = np.moveaxis(rows, 1, 0)  # (m, J, 2N)
     moved = np.array([stiffness.sup_dual(row[:, :size]) for row in rows])
@@ -94,52 +92,34 @@ def _reading(
     return np.asarray(np.hypot(moved, speeding))
 
 
-def _grids(model: ModalModel) -> tuple[ChebyshevGrid, LowerGrid]:
-    """Points on which all defects are known by their values: all combinations, and fewer."""
-    box = dict(
-        zip(
-            model.boxes.names,
-            zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True),
-            strict=True,
-        )
+def _grid(model: ModalModel) -> LowerGrid:
+    """Points on which all defects are known by their values."""
+    ends = zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True)
+    exponents = dependence.degrees(
+        model.flow.system, dict(zip(model.boxes.names, ends, strict=True))
     )
-    exponents = dependence.degrees(model.flow.system, box)
-    own, more = tuple(exponents[name] for name in model.boxes.names), 2 * model.degree
-    return ChebyshevGrid(tuple(more + degree for degree in own)), LowerGrid(own, more)
+    return LowerGrid(tuple(exponents[name] for name in model.boxes.names), 2 * model.degree)
 
 
-def _grid(
-    model: ModalModel, samples: Sequence[Sample], *, patient: bool
-) -> ChebyshevGrid | LowerGrid:
-    """The points that are taken: fewer than all combinations where these cost more."""
-    (whole, few), count = _grids(model), len(model.boxes.names)
-    middle = np.zeros((1, count))
-    sizes = [
-        {key: x.size * (2 if np.iscomplexobj(x) else 1) for key, x in sample(middle).items()}
-        for sample in samples
-    ]
-    width, m = max(sum(size.values()) for size in sizes), len(model.outputs)
-    if len(whole) * width <= MOST_NUMBERS:
-        return few if DEAR * len(few) < len(whole) else whole
-    if not patient:
+def _require_affordable(grid: LowerGrid, sample: Sample) -> None:
+    """Refuse a grid on which the numbers of `sample` are too many.
+
+    Raises:
+        UnprovedError: They are.
+    """
+    d = len(grid.degrees)
+    width = sum(
+        x.size * (2 if np.iscomplexobj(x) else 1) for x in sample(np.zeros((1, d))).values()
+    )
+    if len(grid) * width > MOST_NUMBERS:
         raise dependence.UnprovedError(
-            f"with {count} fuzzy inputs a proof takes minutes and is not tried unasked;"
-            " envelope.certify asks for one, which with a wide gap may take less time than"
-            " estimated bounds, and fewer fuzzy inputs are proved at once"
-        )
-    if DEAR * len(few) * width > MOST_NUMBERS:
-        own = sizes[0]["outputs"] // m
-        most = (MOST_NUMBERS // DEAR // len(few) - width) // own + m  # outputs that leave room
-        fewer = f"up to {most} of the {m} outputs at once, " if most > 0 else ""
-        raise dependence.UnprovedError(
-            f"the error of the modes takes {len(few)} points of {count} fuzzy inputs, and"
-            f" {MOST_NUMBERS // DEAR // width} are affordable; {fewer}narrower or fewer"
+            f"the error of the modes takes {len(grid)} points of {d} fuzzy inputs, and"
+            f" {MOST_NUMBERS // width} are affordable; fewer outputs at once, narrower or fewer"
             " inputs, or a shorter duration, can be proved"
         )
-    return few
 
 
-def _expanded(grid: ChebyshevGrid | LowerGrid, sample: Sample) -> dict[str, Array]:
+def _expanded(grid: LowerGrid, sample: Sample) -> dict[str, Array]:
     """Chebyshev coefficients of `sample` at unit coordinates (S, d), each (J, …)."""
     pieces = [sample(chunk) for chunk in np.array_split(grid.points, -(-len(grid) // CHUNK))]
     return {

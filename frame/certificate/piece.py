@@ -78,12 +78,12 @@ class Piece:
 
     def waves(self, time: Array) -> Array:
         """Waves of all parts at the rows, with nodes (T,), shape (R, P, 3, n)."""
-        found = [] if self.forced is None else [self.forced]
+        parts = [] if self.forced is None else [self.forced]
         if self.started:
             t = time[self.node][:, None]
             wave = np.exp(self.rate[0, self.box_of_row] * t)
-            found.insert(0, np.stack([wave, t * wave, t * t * wave], 1))
-        return np.stack(found, 1)
+            parts.insert(0, np.stack([wave, t * wave, t * t * wave], 1))
+        return np.stack(parts, 1)
 
     @cached_property
     def box_of_row(self) -> Array:
@@ -91,7 +91,7 @@ class Piece:
         return np.repeat(np.arange(len(self.centre)), np.diff(self.row_start))
 
     def tables(self) -> Array:
-        """What waves carry into values, gradients and Hessians, shape (B, m, 6 P n, q).
+        """Factors of waves in values, gradients and Hessians, shape (B, m, 6 P n, q).
 
         Along the third axis are all parts, orders of the waves and modes, each with its real and
         its imaginary part.
@@ -123,7 +123,7 @@ class Piece:
         bounds = (over.tensor, over.margin, over.rate[2].reshape(d * d, -1))
         bounds += (over.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:])
         wave = np.ascontiguousarray(self.waves(problems.time)).reshape(len(self.node), -1)
-        found: tuple[Array, Array, Array] = examine(
+        outcome: tuple[Array, Array, Array] = examine(
             (self.row_start, self.item_start, self.node, self.column),
             (self.centre, self.radius, self.edges, self.tables(), shares, rates),
             wave.view(float),
@@ -133,7 +133,7 @@ class Piece:
             problems.gap,
             self.forced is None,
         )
-        return found
+        return outcome
 
 
 def _in_planes(x: Array) -> Array:

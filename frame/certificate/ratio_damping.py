@@ -109,7 +109,7 @@ class RatioDamping:
 
     @classmethod
     def of(cls, model: ModalModel) -> Self | None:
-        """That of a model; None without a damping ratio.
+        """Damping of a model by its ratio; None without one.
 
         Raises:
             UnprovedError: Modes have ratios of their own.

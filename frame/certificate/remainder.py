@@ -164,8 +164,8 @@ def _partitions(items: list[str]) -> list[list[str]]:
     """All ways to divide letters into blocks."""
     if not items:
         return [[]]
-    first, found = items[0], []
+    first, ways = items[0], []
     for rest in _partitions(items[1:]):
-        found.append([first, *rest])
-        found += [[*rest[:k], first + rest[k], *rest[k + 1 :]] for k in range(len(rest))]
-    return found
+        ways.append([first, *rest])
+        ways += [[*rest[:k], first + rest[k], *rest[k + 1 :]] for k in range(len(rest))]
+    return ways

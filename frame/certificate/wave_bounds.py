@@ -50,7 +50,7 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
     elapsed = np.where(
         growth == 0, time, np.expm1(growth * time) / np.where(growth == 0, 1.0, growth)
     )
-    found = [
+    free = [
         Part(
             model.coefficient,
             powers * np.exp(growth * time),
@@ -61,7 +61,7 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
     ]
     ground = model.flow.system.ground
     if model.load is None or ground is None:
-        return found
+        return free
     steps = len(model.time) - 1
     parts = ceil(model.flow.step / ground.step - 1e-9)
     h, count = model.flow.step / parts, parts * steps
@@ -74,7 +74,7 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
         for kernel in (np.stack(kernels), swell, np.ones((count, 1)))
     )
     return [
-        *found,
+        *free,
         Part(model.load.share, waves, elapsed, push[:, 0], model.load.truncation, forced=True),
     ]
 

@@ -21,6 +21,9 @@ from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.progress_bar import Progress, stage
 from alphacut.fuzzy.refused import RefusedError
 
+BOXES = 1000
+"""Boxes that a proof may look at for each bound, on average."""
+
 
 @dataclass(frozen=True)
 class Auto:
@@ -54,7 +57,7 @@ class Auto:
         many = len(flow.boxes.names) > MOST_PARAMETERS
         proof: Proof | DualProof = DualProof(workers=self.workers)
         if not many:
-            proof = Proof(tolerance=self.tolerance, patient=False, workers=self.workers)
+            proof = Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers)
         try:
             why = "dual: many inputs" if many else "proof: the structure is linear"
             return _noted(proof.run(flow, progress), why)
@@ -62,12 +65,12 @@ class Auto:
             why = f"unproved: {error}"
         stage(progress, f"search ({why})")
         try:
-            found = Search(self.tolerance, seed=self.seed).run(flow, progress)
-            return _noted(found, f"search; {why}")
+            search = Search(self.tolerance, seed=self.seed)
+            return _noted(search.run(flow, progress), f"search; {why}")
         except ModalError as error:
             why = f"{why}; no search: {error}"
         return _noted(follower.run(flow, progress), f"improved-graph-follower; {why}")
 
 
-def _noted(found: Envelope, why: str) -> Envelope:
-    return replace(found, notes=(why, *found.notes))
+def _noted(envelope: Envelope, why: str) -> Envelope:
+    return replace(envelope, notes=(why, *envelope.notes))

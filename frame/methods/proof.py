@@ -44,8 +44,6 @@ USUAL = 10.0
 """Proved over sampled error of the model, seldom less."""
 ATTEMPTS = 5
 """Models of rising degree that are tried on a box."""
-MOST_BOXES = 2e7
-"""Boxes for all bounds of a level together: seconds, or a minute under a record."""
 
 
 class GapError(UnprovedError):
@@ -64,7 +62,6 @@ class Proof:
         boxes: Most boxes looked at for each bound, on average; where they end, the gap is wider.
         parts: Most parts of the box with polynomials of their own.
         budget: Most eigen-analyses on each part.
-        patient: Whether to try what may take minutes.
         workers: Threads, which do not change the result; all cores unless given.
 
     Raises:
@@ -77,7 +74,6 @@ class Proof:
     boxes: float = 4000
     parts: int = 8
     budget: int = 280
-    patient: bool = True
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -149,38 +145,37 @@ class Proof:
             GapError: It takes too much.
             UnprovedError: No degree can help, or a proof needs more than is affordable.
         """
-        wanted, before, largest = gap / 30, 0, np.inf
+        aim, before, largest = gap / 30, 0, np.inf
         for _ in range(ATTEMPTS):
             how = {"budget": self.budget, "scale": flow.scale, "energy": True}
-            model = fit_modes(linear, boxes, tolerance=wanted, **how)  # type: ignore[arg-type]
+            model = fit_modes(linear, boxes, tolerance=aim, **how)  # type: ignore[arg-type]
             if model.degree <= before:
                 break
             sampled = float((model.error / flow.scale).max())
             largest = USUAL * sampled  # a bound is seldom less, and takes time
             if largest <= PORTION * gap:
-                error = proved_error(model, patient=self.patient)
+                error = proved_error(model)
                 largest = float((error / flow.scale).max())
                 if largest <= PORTION * gap:
                     return model, error
             # a degree more divides it by ten or so
-            wanted, before = sampled * min(0.99, 4 * PORTION * gap / largest), model.degree
+            aim, before = sampled * min(0.99, 4 * PORTION * gap / largest), model.degree
         raise GapError(
-            f"the proved error of the modes, some {flow.told(largest)}, takes too much of the gap"
-            f" {flow.told(gap)}",
+            f"the proved error of the modes, some {flow.in_words(largest)}, takes too much of the"
+            f" gap {flow.in_words(gap)}",
             "narrower or fewer fuzzy inputs, or a wider gap, can be proved",
         )
 
     def _certified(
         self, flow: UnitFlow, model: ModalModel, error: Array, gap: float, tick: Progress
     ) -> Certificate:
-        size = 2 * len(flow.outputs) * len(flow.time)
         return certify(
             model,
             gap=gap,
             model_error=error,
             scale=flow.scale,
             workers=self.workers or os.cpu_count() or 1,
-            budget=self.boxes if self.patient else min(self.boxes / 4, MOST_BOXES / size),
+            budget=self.boxes,
             progress=tick,
         )
 

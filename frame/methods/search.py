@@ -32,8 +32,7 @@ from alphacut.frame.modal.first_pass import exchange, first_optima
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, Response, best_of_few, best_of_pool
-from alphacut.frame.modal.starting_points import fresh_points, trajectories
+from alphacut.frame.modal.optima import Optima, Response, best_of, fresh_points, trajectories
 from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
@@ -105,17 +104,17 @@ class Search:
         # what leads: polynomials where they are as good as is asked for, or the exact motions
         enough = bool((model.error / flow.scale).max() <= SMALL * tolerance)
         way = exact.model if enough else exact
-        levels, found = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
+        levels, solved = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
             tick = share(progress, done / levels, (done + 1) / levels)
-            within = found[-1][0] if found else None
-            found.append(self._level(way, *flow.boxes.unit(level), tolerance, within, tick))
+            within = solved[-1][0] if solved else None
+            solved.append(self._level(way, *flow.boxes.unit(level), tolerance, within, tick))
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         scale = flow.scale[:, None]
-        values = [x.side * exact.value_at(x.point, x.node, x.output) for x, _ in found[::-1]]
+        values = [x.side * exact.value_at(x.point, x.node, x.output) for x, _ in solved[::-1]]
         bounds = np.maximum.accumulate(np.stack(values)[::-1])[::-1].reshape(shape) * scale
-        at = np.stack([optima.point for optima, _ in found[::-1]]).reshape(*shape, -1)
-        missed = np.stack([error for _, error in found[::-1]]).reshape(shape) * scale
+        at = np.stack([optima.point for optima, _ in solved[::-1]]).reshape(*shape, -1)
+        missed = np.stack([error for _, error in solved[::-1]]).reshape(shape) * scale
         missed += 2 * enough * model.error.max(0)[:, None]
         error = np.maximum(missed.max(-1), _rounding(model, np.abs(bounds).max((0, 1, 3))))
         facts = {
@@ -176,8 +175,8 @@ class Search:
         pool = fresh_points(rng, *box[:2], size)
         nodes = np.sort(rng.permutation(len(grid))[: max(1, count // (2 * m))])
         values = trajectories(_polynomials(way), pool, nodes)
-        rivals = [best_of_pool(pool, values, nodes, 1)[0]]
-        rivals += [best_of_few(pool, values, nodes, few, rng) for few in FEW]
+        rivals = [best_of(pool, values, nodes)]
+        rivals += [best_of(pool, values, nodes, few, rng) for few in FEW]
         improved = np.zeros(len(optima.value), bool)
         for rival in rivals:
             own = np.arange(len(rival.value))
@@ -216,7 +215,7 @@ def _follow(
 
 
 def _missed(gains: list[Array], outputs: int, quiet: float) -> Array:
-    """What bounds may miss by the gains (T, 2 m) of the last passes, each as if of all bounds."""
+    """Bounds of what may be missed, from the gains (T, 2 m) of the last passes."""
     last = np.max(gains[-2:], axis=0)
     by_output = last.reshape(len(last), outputs, 2).max((0, 2))
     return np.asarray(UNSEEN * np.maximum(quiet, np.repeat(by_output, 2)) + 0 * last)

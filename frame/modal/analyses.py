@@ -51,12 +51,12 @@ def analyse(
     if states:
         size = rows.value.shape[-1]
         rows = rows.like(np.broadcast_to(np.eye(size), (len(unit), size, size)))
-    found = modes(matrices, rows, chosen)
-    rate = _discrete(found.eigenvalue, flow)
+    own = modes(matrices, rows, chosen)
+    rate = _discrete(own.eigenvalue, flow)
     if not order:
-        return Modes(rate, found.coefficient, found.load, found.of)
+        return Modes(rate, own.coefficient, own.load, own.of)
     return Modes(
-        boxes.in_unit(rate), boxes.in_unit(found.coefficient), boxes.in_unit(found.load), found.of
+        boxes.in_unit(rate), boxes.in_unit(own.coefficient), boxes.in_unit(own.load), own.of
     )
 
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.newton import refine
-from alphacut.frame.modal.optima import Optima, Response, best_of_pool
-from alphacut.frame.modal.starting_points import trajectories
+from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 SAMPLES = 256
@@ -38,7 +37,7 @@ def first_optima(
         unit = np.vstack([np.zeros((1, len(lower))), chebyshev_points(len(lower), SAMPLES)])
         points = (lower + upper) / 2 + (upper - lower) / 2 * unit
     total = len(model.time)
-    optima = best_of_pool(points, trajectories(model, points), np.arange(total), 1)[0]
+    optima = best_of(points, trajectories(model, points), np.arange(total))
     if not (upper > lower).any():
         return optima
     grid = np.arange(len(optima.value)).reshape(total, -1)

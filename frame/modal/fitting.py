@@ -80,11 +80,11 @@ def fit_modes(
 
 
 def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) -> bool:
-    """Whether no degree within the budget reaches the tolerance at the rate seen so far.
+    """Tells whether no degree within the budget reaches the tolerance at the rate seen so far.
 
     Args:
         reached: Errors of degrees 2, 3, …
-        tolerance: The error wanted.
+        tolerance: The error needed.
         d: Number of parameters.
         budget: Most eigen-analyses.
     """
@@ -92,11 +92,11 @@ def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) ->
         return len(reached) >= 4 and reached[-1] >= reached[-3]
     rate = (reached[-1] / reached[-3]) ** 0.5
     degree = 1 + len(reached) + log(tolerance / reached[-1]) / log(rate)
-    wanted = ceil(degree) - 1  # a degree of grace
+    needed = ceil(degree) - 1  # a degree of grace
     return (
-        wanted > 12
-        or terms(d, wanted) > MOST_TERMS
-        or len(_held_out(d)) + len(fit_points(d, wanted)) > budget
+        needed > 12
+        or terms(d, needed) > MOST_TERMS
+        or len(_held_out(d)) + len(fit_points(d, needed)) > budget
     )
 
 
@@ -107,16 +107,16 @@ class _Samples:
     flow: LinearFlow
     boxes: Boxes
     chosen: Array
-    found: Modes | None = None
+    known: Modes | None = None
 
     def fitted(self, points: Array, degree: int) -> ModalModel:
         """The model of a degree from analyses at `points`."""
-        known = 0 if self.found is None else self.found.eigenvalue.value.shape[0]
-        if known < len(points):
-            fresh = analyse(self.flow, self.boxes, points[known:], self.chosen)
-            self.found = fresh if self.found is None else self.found.joined(fresh)
-        assert self.found is not None
-        return _fitted(self.flow, self.boxes, points, self.found, degree, self.chosen)
+        count = 0 if self.known is None else self.known.eigenvalue.value.shape[0]
+        if count < len(points):
+            fresh = analyse(self.flow, self.boxes, points[count:], self.chosen)
+            self.known = fresh if self.known is None else self.known.joined(fresh)
+        assert self.known is not None
+        return _fitted(self.flow, self.boxes, points, self.known, degree, self.chosen)
 
 
 def fit_points(d: int, degree: int) -> Array:
@@ -134,27 +134,27 @@ def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
         does.
     """
     unit = fit_points(len(model.boxes.names), model.degree)
-    found = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
+    own = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
     flat = (
-        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)
+        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, own.load)
     )
     free, forced = (fit(unit, jet, model.degree) for jet in flat)
     return free, forced
 
 
 def _fitted(
-    flow: LinearFlow, boxes: Boxes, points: Array, found: Modes, degree: int, chosen: Array
+    flow: LinearFlow, boxes: Boxes, points: Array, own: Modes, degree: int, chosen: Array
 ) -> ModalModel:
     flat = [
-        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (found.coefficient, found.load)
+        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, own.load)
     ]
-    rate = fit(points, found.eigenvalue, degree)
+    rate = fit(points, own.eigenvalue, degree)
     ground, load = flow.system.ground, None
     if ground is not None:
         load = LoadTables.build(ground, flow.time, rate, fit(points, flat[1], degree))
     share = fit(points, flat[0], degree)
     nothing = np.zeros((len(flow.time), len(flow.outputs)))
-    return ModalModel(flow, boxes, rate, share, load, chosen, found.of, nothing, 0)
+    return ModalModel(flow, boxes, rate, share, load, chosen, own.of, nothing, 0)
 
 
 def _held_out(d: int) -> Array:

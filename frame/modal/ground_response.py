@@ -18,49 +18,42 @@ REACH = 6.0
 MOST_STEPS = 40_000  # of a table
 FADED = 37.0
 """Exponent at which what is left of a window has fallen below round-off."""
-Waves = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
 class LoadTable:
-    """R_k(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds near the middle λ_k of the box.
+    """R(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds of one mode near its λ in the middle of the box.
 
     Time is cut into windows so short that phases change little over the box within one. The part of
-    R that arises in the window of t_j is Σ_i moment[j, k, i] x^i with x = (λ − λ_k) / scale; what
+    R that arises in the window of t_j is Σ_i moment[j, i] x^i with x = (λ − middle) / scale; what
     earlier windows leave behind goes on as exp(λ (t_j − their end)). Far nodes have more between.
 
     Args:
-        middle: λ_k in the middle of the box, shape (n,).
+        middle: λ in the middle of the box.
         scale: Length that makes the coefficients of order one, in 1/s.
-        moment: Coefficients, shape (T, n, order).
-        starts: First node of every window, rising from 0, shape (W,).
+        moment: Coefficients, shape (T, order).
+        ends: Last node of every window but the last, rising, shape (W − 1,).
         time: Nodes, those between included, shape (T,), in s.
         every: Steps from one of the caller's nodes to the next.
-        share: What one unit of R_k puts into the outputs, n m polynomials.
         truncation: Bound of what the series leave out of R, as a share of ∫ |a(s)| exp(Re λ (t −
             s)) ds.
     """
 
-    middle: Array
+    middle: complex
     scale: float
     moment: Array
-    starts: Array
+    ends: Array
     time: Array
     every: int
-    share: Polynomial
     truncation: float
 
     @classmethod
-    def build(
-        cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial
-    ) -> LoadTable:
-        """The table for modes whose eigenvalues are `rate` over the unit box.
+    def build(cls, ground: Accelerogram, time: Array, middle: complex, spread: float) -> LoadTable:
+        """The table of a mode whose eigenvalue strays from `middle` by at most `spread`, in 1/s.
 
         Raises:
             ModalError: Phases change by thousands over the box within one step.
         """
-        middle = rate.coefficients[0]
-        spread = float(np.abs(rate.coefficients[1:]).sum(0).max())
         every = max(1, ceil(spread * (time[1] - time[0]) / REACH))
         if every > max(4, MOST_STEPS // len(time)):
             raise ModalError(
@@ -68,145 +61,59 @@ class LoadTable:
                 f" within a step of {time[1] - time[0]:.4g} s; take a smaller one"
             )
         time = np.linspace(time[0], time[-1], every * (len(time) - 1) + 1) if every > 1 else time
-        length = min(len(time) - 1, max(1, int(REACH / max(spread, 1e-12) / (time[1] - time[0]))))
-        starts = np.arange(0, len(time) - 1, length)
-        window = length * (time[1] - time[0])
-        order = max(6, ceil(2.72 * spread * window + 18))
-        left = left_out(spread * window, order)
-        return cls(
-            middle,
-            1 / window,
-            _moments(ground, middle, time, starts, window, spread, order),
-            starts,
-            time,
-            every,
-            share,
-            left,
-        )
+        h, steps = time[1] - time[0], len(time) - 1
+        length = min(steps, max(1, int(REACH / max(spread, 1e-12) / h)))
+        phase = spread * length * h
+        order = max(6, ceil(2.72 * phase + 18))
+        moment = _moments(ground, middle, h, (steps, length), spread, order)
+        ends, left = np.arange(length, steps, length), left_out(phase, order)
+        return cls(middle, 1 / (length * h), moment, ends, time, every, left)
 
-    def values(self, unit: Array, rate: Array) -> Array:
-        """Response of the outputs at points (S, d) with eigenvalues (S, n), shape (S, T, m)."""
-        share = self.share(unit).reshape(*rate.shape, -1)  # (S, n, m)
-        powers, h = self._powers(rate), self.time[1] - self.time[0]
-        series = np.ascontiguousarray(powers.swapaxes(0, 1))  # (n, S, order)
-        out = np.zeros((len(unit), len(self.time), share.shape[-1]))
-        left = np.zeros_like(rate)  # what is left of earlier windows at the start of this one
-        ends = np.append(self.starts[1:], len(self.time) - 1)
-        for start, end in zip(self.starts, ends, strict=True):
-            rows, count = slice(start + 1, end + 1), end - start
-            own = (series @ self.moment[rows].transpose(1, 2, 0)).transpose(1, 2, 0)  # (S, J, n)
-            out[:, rows] = 2 * (own.real @ share.real - own.imag @ share.imag)
-            if start:
-                first = np.exp(rate * h) * left
-                out[:, rows] += decaying(rate, first[..., None] * share, h, count)
-            left = np.exp(rate * (count * h)) * left + own[:, -1]
-        return out[:, :: self.every]
-
-    def response(self, rate: Array, node: Array) -> Waves:
-        """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
+    def response(self, rate: Array, node: Array) -> Array:
+        """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N), for eigenvalues (N,)."""
         from alphacut.frame.modal.window_series import window_series  # Numba takes time to import
 
         fade = FADED / max(float(-rate.real.max(initial=-np.inf)), 1e-300)
-        where = (self.middle, self.scale, self.moment, self.starts[1:], self.time, fade)
-        R, slope, curve = window_series(rate, self.every * node, *where)
-        return R, slope, curve
-
-    def _powers(self, rate: Array) -> Array:
-        """Powers of the scaled deviation, shape (S, n, order)."""
-        x = (rate - self.middle) / self.scale
-        plain = np.ones((*x.shape, self.moment.shape[-1]), complex)
-        for i in range(1, plain.shape[-1]):
-            plain[..., i] = plain[..., i - 1] * x
-        return plain
+        where = (self.middle, self.scale, self.moment, self.ends, self.time, fade)
+        waves: Array = window_series(np.ascontiguousarray(rate), self.every * node, *where)
+        return waves
 
 
 @dataclass(frozen=True, eq=False)
 class LoadTables:
-    """Tables of modes grouped by the spread of their eigenvalues.
+    """Tables of all modes.
 
     Args:
         share: What one unit of R_k puts into the outputs, n m polynomials.
-        tables: One table per group.
-        members: Indices of the modes of each group.
+        tables: One of each mode.
     """
 
     share: Polynomial
     tables: tuple[LoadTable, ...]
-    members: tuple[Array, ...]
 
     @classmethod
     def build(
         cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial
     ) -> LoadTables:
         """The tables for modes whose eigenvalues are `rate` over the unit box."""
-        spread = np.abs(rate.coefficients[1:]).sum(0)
-        octave = np.floor(np.log2(np.maximum(spread, 1e-12) / max(spread.max(), 1e-12)))
-        members = tuple(np.flatnonzero(octave == o) for o in np.unique(octave))
-        columns = share.coefficients.reshape(len(share.index), rate.coefficients.shape[1], -1)
-        tables = tuple(
-            LoadTable.build(
-                ground,
-                time,
-                Polynomial(rate.index, rate.coefficients[:, own]),
-                Polynomial(share.index, columns[:, own].reshape(len(share.index), -1)),
-            )
-            for own in members
-        )
-        return cls(share, tables, members)
+        spread = np.abs(rate.coefficients[1:]).sum(0).tolist()
+        pairs = zip(rate.coefficients[0].tolist(), spread, strict=True)
+        return cls(share, tuple(LoadTable.build(ground, time, *pair) for pair in pairs))
 
     def in_units(self, scale: Array) -> LoadTables:
         """The same for outputs divided by their scale (m,)."""
-        tables = tuple(replace(table, share=_divided(table.share, scale)) for table in self.tables)
-        return LoadTables(_divided(self.share, scale), tables, self.members)
+        return replace(self, share=self.share.divided(np.tile(scale, len(self.tables))))
 
     @property
     def truncation(self) -> Array:
         """Bound of the series' rest, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds, (n,)."""
-        out = np.empty(sum(map(len, self.members)))
-        for table, own in zip(self.tables, self.members, strict=True):
-            out[own] = table.truncation
-        return out
+        return np.array([table.truncation for table in self.tables])
 
-    @property
-    def starts(self) -> Array:
-        """First node of every window of the group that needs most."""
-        return max((table.starts for table in self.tables), key=len)
-
-    def values(self, unit: Array, rate: Array) -> Array:
-        """As `LoadTable.values`."""
-        parts = [
-            table.values(unit, rate[:, own])
-            for table, own in zip(self.tables, self.members, strict=True)
-        ]
-        return sum(parts[1:], parts[0])
-
-    def response(self, rate: Array, node: Array) -> Waves:
-        """As `LoadTable.response`."""
-        R, dR, ddR = (np.empty_like(rate) for _ in range(3))
-        for table, own in zip(self.tables, self.members, strict=True):
-            R[:, own], dR[:, own], ddR[:, own] = table.response(rate[:, own], node)
-        return R, dR, ddR
-
-
-def decaying(rate: Array, share: Array, step: float, count: int) -> Array:
-    """2 Re Σ_k share_k exp(λ_k j step), j = 0 … count − 1, by fewer exponentials than nodes.
-
-    Args:
-        rate: λ, shape (S, n).
-        share: Shape (S, n, m).
-        step: Of the nodes, in s.
-        count: Number of nodes.
-
-    Returns:
-        Shape (S, count, m).
-    """
-    size = ceil(count**0.5)
-    blocks, (points, n, m) = ceil(count / size), share.shape
-    fast = np.exp(rate[:, None, :] * (np.arange(size) * step)[None, :, None])
-    slow = np.exp(rate[:, None, :] * (np.arange(blocks) * size * step)[None, :, None])
-    right = (fast[:, :, :, None] * share[:, None]).transpose(0, 2, 1, 3).reshape(points, n, -1)
-    out = 2 * (slow.real @ right.real - slow.imag @ right.imag)
-    return np.asarray(out.reshape(points, blocks * size, m)[:, :count])
+    def response(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
+        """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
+        pairs = zip(self.tables, rate.T, strict=True)
+        R, slope, curve = np.stack([table.response(own, node) for table, own in pairs], -1)
+        return R, slope, curve
 
 
 def left_out(phase: float, order: int) -> float:
@@ -214,43 +121,41 @@ def left_out(phase: float, order: int) -> float:
     return exp(order * log(max(phase, 1e-300)) - lgamma(order + 1) + 2 * phase)
 
 
-def _divided(share: Polynomial, scale: Array) -> Polynomial:
-    columns = share.coefficients.reshape(len(share.index), -1, len(scale)) / scale
-    return Polynomial(share.index, columns.reshape(share.coefficients.shape))
-
-
 def _moments(
     ground: Accelerogram,
-    middle: Array,
-    time: Array,
-    starts: Array,
-    window: float,
-    reach: float,
+    middle: complex,
+    h: float,
+    nodes: tuple[int, int],
+    spread: float,
     order: int,
 ) -> Array:
-    """Taylor coefficients of the window's own part of R_k, shape (T, n, order).
+    """Taylor coefficients of the window's own part of R, shape (steps + 1, order).
 
     Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by a rule that
     takes the record as it is; from node to node the series is multiplied by that of exp((λ +
-    x/window) h). A node that ends one window starts the next from nothing. `reach` bounds what
-    |x|/window adds to |λ|, in 1/s.
+    x/window) h). A node that ends one window starts the next from nothing.
+
+    Args:
+        ground: The record.
+        middle: λ.
+        h: Step, in s.
+        nodes: Steps, and steps of a window.
+        spread: Bound of what |x|/window adds to |λ|, in 1/s.
+        order: Number of coefficients.
     """
-    h, steps = time[1] - time[0], len(time) - 1
-    rule = load_rule(ground, h, steps, parts_of(float(np.abs(middle).max()) + reach, h))
-    factorial = np.cumprod(np.concatenate([[1.0], np.arange(1, order)]))
-    series = (rule.tau[:, None] / window) ** np.arange(order) / factorial  # (Q, order)
-    kernel = np.exp(middle * rule.tau[:, None])  # (Q, n)
-    pushed = rule.weight @ (kernel[:, :, None] * series[:, None]).reshape(len(rule.tau), -1)
-    pushed = pushed.reshape(steps, len(middle), order)
-    # (n, order)
-    advance = np.exp(middle * h)[:, None] * (h / window) ** np.arange(order) / factorial
-    # truncated product with `advance` as a matrix
-    product = np.zeros((len(middle), order, order), complex)
+    steps, length = nodes
+    rule = load_rule(ground, h, steps, parts_of(abs(middle) + spread, h))
+    powers, factorial = np.arange(order), np.cumprod([1.0, *range(1, order)])
+    series = (rule.tau[:, None] / (length * h)) ** powers / factorial
+    pushed = rule.weight @ (np.exp(middle * rule.tau)[:, None] * series)
+    windows = -(-steps // length)
+    out = np.zeros((windows * length, order), complex)
+    out[:steps] = pushed
+    out = out.reshape(windows, length, order)
+    advance = np.exp(middle * h) / factorial / length ** powers.astype(float)
+    product = np.zeros((order, order), complex)  # truncated, with `advance`
     for i in range(order):
-        product[:, i, i:] = advance[:, : order - i]
-    out = np.zeros((len(time), len(middle), order), complex)
-    fresh = {int(start) for start in starts}
-    for j in range(1, len(time)):
-        carried = 0.0 if j - 1 in fresh else (out[j - 1][:, None] @ product)[:, 0]
-        out[j] = carried + pushed[j - 1]
-    return out
+        product[i, i:] = advance[: order - i]
+    for j in range(1, length):
+        out[:, j] += out[:, j - 1] @ product
+    return np.concatenate([np.zeros((1, order)), out.reshape(-1, order)[:steps]])

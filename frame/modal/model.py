@@ -2,7 +2,8 @@
 
 Displacements oscillate in the parameters, the more the later; λ_k and C_k do not. With them as
 polynomials every trajectory, derivative and envelope follows without solving the equations of
-motion again.
+motion again: q(t; p) = 2 Re Σ_k C_k(p) w(t; λ_k(p)), with w = exp(λ t) of the start, and the
+response R(t; λ) of `ground_response` under a record.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ import numpy as np
 
 from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.calculus.modal_jet import Parts, composed, composed_quadratics
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.modal.ground_response import LoadTables, decaying
+from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.modal.ground_response import LoadTables
 
 PIECE = 20_000
 """Points whose values are computed together."""
-Waves = Sequence[tuple[Array, Array, Array] | None]
+Waves = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +64,10 @@ class ModalModel:
         """Names of the observed quantities."""
         return self.flow.outputs
 
-    @cached_property
+    @property
     def count(self) -> int:
         """Number of modes n."""
-        return self.eigenvalue.coefficients.shape[1]
+        return int(self.eigenvalue.coefficients.shape[1])
 
     @property
     def degree(self) -> int:
@@ -78,116 +79,96 @@ class ModalModel:
         """Largest |λ| in the middle of the box, in 1/s."""
         return float(np.abs(self.eigenvalue.coefficients[0]).max())
 
-    def turned(self, duration: float) -> float:
-        """Largest change of a lasting mode's phase over the box within a time (s), in rad."""
-        middle, rest = self.eigenvalue.coefficients[0], self.eigenvalue.coefficients[1:]
-        # a mode that has died down has no basins
-        lasting = np.minimum(duration, 5 / np.maximum(-middle.real, 1e-300))
-        return float((np.abs(rest).sum(0) * lasting).max())
-
     def in_units(self, scale: Array) -> ModalModel:
         """The same with every output divided by its scale (m,)."""
-        share = Polynomial(
-            self.coefficient.index, self.coefficient.coefficients / np.tile(scale, self.count)
-        )
+        share = self.coefficient.divided(np.tile(scale, self.count))
         load = None if self.load is None else self.load.in_units(scale)
         return replace(self, coefficient=share, load=load, error=self.error / scale)
 
     @cached_property
+    def started(self) -> bool:
+        """True where there is a free motion."""
+        return self.load is None or bool(self.coefficient.coefficients.any())
+
+    @cached_property
+    def together(self) -> Polynomial:
+        """λ_k and behind them the shares of each part, free and forced: n + n m or n + 2 n m."""
+        shares = [self.coefficient] * self.started + ([self.load.share] if self.load else [])
+        return Polynomial.beside([self.eigenvalue, *shares])
+
+    @cached_property
     def of_output(self) -> list[Polynomial]:
-        """For each output λ_k, C_k and its load response: 2 n or 3 n polynomials."""
-        shares = [self.coefficient.coefficients] + (
-            [] if self.load is None else [self.load.share.coefficients]
-        )
-        m = len(self.outputs)
-        columns = [
-            np.hstack([self.eigenvalue.coefficients, *(share[:, o::m] for share in shares)])
-            for o in range(m)
-        ]
-        return [Polynomial(self.eigenvalue.index, chosen) for chosen in columns]
+        """For each output λ_k and its shares of each part: 2 n or 3 n polynomials."""
+        n, m = self.count, len(self.outputs)
+        rate, shares = np.split(self.together.coefficients, [n], axis=1)
+        index = self.together.index
+        return [Polynomial(index, np.hstack([rate, shares[:, o::m]])) for o in range(m)]
 
     def values(self, unit: Array) -> Array:
         """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
-        rate = self.eigenvalue(unit)
-        share = self.coefficient(unit).reshape(len(unit), self.count, -1)
-        values = decaying(rate, share, self.flow.step, len(self.time))
-        return values if self.load is None else values + self.load.values(unit, rate)
+        n, time = self.count, self.time
+        parts = self.together(unit)
+        rate = parts[:, :n]
+        waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
+        if self.load is not None and self.flow.system.ground is not None:
+            steps = len(time) - 1
+            waves += responses(rate, self.flow.system.ground, self.flow.step, steps)
+        shares = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
+        wave = np.concatenate(waves, -1)
+        return np.asarray(2 * (wave.real @ shares.real - wave.imag @ shares.imag))
 
-    def at(
-        self, unit: Array, node: Array, output: Array, waves: Waves | None = None
-    ) -> tuple[Array, Array, Array]:
-        """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d).
-
-        Args:
-            unit: Unit coordinates.
-            node: Time nodes, shape (N,).
-            output: Which output, shape (N,).
-            waves: Those of the start and, under a load, of the ground, each w, w' and w'' of shape
-                (N, n), where better ones than by the polynomials λ_k are known.
-        """
-        count, d = unit.shape
-        out = np.zeros(count), np.zeros((count, d)), np.zeros((count, d, d))
-        if self.degree <= 2:
-            self._quadratic(unit, node, output, waves, out)
-            return out
+    def at(self, unit: Array, node: Array, output: Array) -> Waves:
+        """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d)."""
+        n, d = self.count, unit.shape[1]
+        row, column = np.triu_indices(d)
+        packed = np.zeros((len(unit), 1 + d + len(row)))
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
-            found = self._taylor(self.of_output[o].derivatives(unit[rows]), node[rows])
-            for total, part in zip(out, found, strict=True):
-                total[rows] = part
-        return out
-
-    def _waves(self, rate: Array, node: Array) -> Waves:
-        """What the start and the ground excite at eigenvalues (N, n); None of what does not."""
-        started = self.coefficient.coefficients.any()
-        free = self._free(rate, node) if started else None
-        return [free, None if self.load is None else self.load.response(rate, node)]
-
-    @cached_property
-    def shares(self) -> list[list[Polynomial]]:
-        """For each output the polynomials of what the start and the ground put into it."""
-        given = [self.coefficient] + ([] if self.load is None else [self.load.share])
-        m = len(self.outputs)
-        return [[Polynomial(x.index, x.coefficients[:, o::m]) for x in given] for o in range(m)]
-
-    def _quadratic(
-        self, unit: Array, node: Array, output: Array, waves: Waves | None, out: Parts
-    ) -> None:
-        """Add to `out` as `at`, for degree 2, whose second derivatives are the same everywhere."""
-        if waves is None:
-            waves = self._waves(self.eigenvalue.quadratic(unit)[0], node)
-        for place, wave in enumerate(waves):
-            if wave is not None:
-                own = [share[place] for share in self.shares]
-                composed_quadratics(unit, self.eigenvalue, own, output, wave, out)
-
-    def _taylor(self, parts: Parts, node: Array) -> Parts:
-        (count, d), rate = parts[1].shape[:2], parts[0][:, : self.count]
-        out = np.zeros(count), np.zeros((count, d)), np.zeros((count, d, d))
-        composed(parts, 1, self._free(rate, node), out)
-        if self.load is not None:
-            composed(parts, 2, self.load.response(rate, node), out)
-        return out
-
-    def _free(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
-        """Exp(λ t) and its derivatives by λ at one node per point, (N, n)."""
-        t = self.time[node][:, None]
-        wave = np.exp(rate * t)
-        return wave, t * wave, t * t * wave
+            jets = self.of_output[o].jets(unit[rows])
+            for place, wave in enumerate(self.waves(jets[:, 0, :n], node[rows]), 1):
+                share = jets[..., place * n : (place + 1) * n]
+                packed[rows] += composed(jets[..., :n], share, wave, d)
+        H = np.empty((len(unit), d, d))
+        H[:, row, column] = H[:, column, row] = packed[:, 1 + d :]
+        return packed[:, 0], packed[:, 1 : 1 + d], H
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
-        values, order = np.empty(len(unit)), np.argsort(output, kind="stable")
-        for rows in np.array_split(order, -(-len(order) // PIECE) or 1):
-            values[rows] = self._value_at(unit[rows], node[rows], output[rows])
-        return values
-
-    def _value_at(self, unit: Array, node: Array, output: Array) -> Array:
         values, n = np.zeros(len(unit)), self.count
         for o in np.unique(output):
-            rows = np.flatnonzero(output == o)
-            parts = self.of_output[o](unit[rows])
-            for place, wave in enumerate(self._waves(parts[:, :n], node[rows]), 1):
-                if wave is not None:
-                    values[rows] += 2 * (parts[:, place * n :][:, :n] * wave[0]).real.sum(1)
+            every = np.flatnonzero(output == o)
+            for rows in np.array_split(every, -(-len(every) // PIECE)):
+                parts = self.of_output[o](unit[rows])
+                for place, wave in enumerate(self.waves(parts[:, :n], node[rows]), 1):
+                    share = parts[:, place * n : (place + 1) * n]
+                    values[rows] += 2 * (share * wave[0]).real.sum(1)
         return values
+
+    def waves(self, rate: Array, node: Array) -> Sequence[Waves]:
+        """The waves w, w', w'' of each part at one node per point, at eigenvalues (N, n)."""
+        parts = []
+        if self.started:
+            t = self.time[node][:, None]
+            wave = np.exp(rate * t)
+            parts.append((wave, t * wave, t * t * wave))
+        return parts if self.load is None else [*parts, self.load.response(rate, node)]
+
+
+def composed(rate: Array, share: Array, waves: Waves, d: int) -> Array:
+    """2 Re Σ_k C_k w(λ_k) with gradient and Hessian (upper triangle) behind, shape (N, q).
+
+    Args:
+        rate: λ_k likewise, shape (N, q, n).
+        share: C_k, shape (N, q, n).
+        waves: w, w' and w'' at λ_k, each (N, n).
+        d: Number of parameters.
+    """
+    w, dw, ddw = (x[:, None] for x in waves)
+    out = (share * w).real.sum(-1)
+    out[:, 1:] += (share[:, :1] * dw * rate[:, 1:]).real.sum(-1)
+    slope = rate[:, 1 : 1 + d]
+    half = share[:, 1 : 1 + d] * dw + slope * (share[:, :1] * ddw / 2)
+    H = (half @ slope.swapaxes(1, 2)).real
+    row, column = np.triu_indices(d)
+    out[:, 1 + d :] += H[:, row, column] + H[:, column, row]
+    return np.asarray(2 * out)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.model import ModalModel
 
 Response = ModalModel | ExactResponse
-FEW = (1, 4, 32)
-"""Points out of which the best are starts of an independent pass, beside the best of all."""
+NEAR, DECADES = 8, 8.0
+"""One in how many fresh points lies near the faces, and how near: decades of the box's width."""
 
 
 @dataclass(eq=False)
@@ -35,10 +34,6 @@ class Optima:
     point: Array
     value: Array
     left: Array
-
-    def take(self, which: Array) -> Optima:
-        """A copy of the problems `which`."""
-        return Optima(*(getattr(self, part.name)[which].copy() for part in fields(self)))
 
     def offer(self, model: Response, points: Array, which: Array) -> Array:
         """Try `points` (W, d) on problems `which` (W,), keep and return the better ones."""
@@ -66,54 +61,52 @@ def problems(nodes: Array, outputs: int, d: int) -> Optima:
     )
 
 
-def best_of_pool(pool: Array, values: Array, nodes: Array, starts: int) -> list[Optima]:
-    """Best points of the pool (P, d) for every problem, and rivals elsewhere."""
-    m = values.shape[-1]
-    chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
-    # points this near the best are taken out together with it
-    reach = 0.25 * np.ptp(pool, axis=0).max()
-    out = [problems(nodes, m, pool.shape[1]) for _ in range(starts)]
-    for column, sign in enumerate((-1.0, 1.0)):
-        left: Array = chosen
-        for optima in out:
-            best = _first_extreme(left, sign)
-            optima.point[column::2], optima.value[column::2] = (
-                pool[best],
-                sign * chosen[best, np.arange(len(best))],
-            )
-            if optima is not out[-1]:
-                unique, index = np.unique(best, return_inverse=True)
-                near = np.stack([np.abs(pool - pool[k]).max(1) < reach for k in unique], 1)
-                left = np.where(near[:, index], -sign * np.inf, left)
-    return out
-
-
-def _first_extreme(values: Array, sign: float) -> NDArray[np.intp]:
-    """The row with the least or greatest value of each column; few columns at a time, in cache."""
-    parts = (values[:, first : first + 64] for first in range(0, values.shape[1], 64))
-    return np.concatenate([x.argmin(0) if sign < 0 else x.argmax(0) for x in parts])
-
-
-def best_of_few(
-    pool: Array, values: Array, nodes: Array, few: int, rng: np.random.Generator
+def best_of(
+    pool: Array,
+    values: Array,
+    nodes: Array,
+    few: int | None = None,
+    rng: np.random.Generator | None = None,
 ) -> Optima:
-    """Best of a few points of the pool (P, d), drawn anew for every problem.
+    """Best points of a pool for every problem at some nodes.
 
     The best of many points has a bias: corners are met exactly, an optimum inside is not, so one
     that lies little above a corner is never begun from. Few points give each basin a chance.
 
     Args:
         pool: Points, shape (P, d).
-        values: Their trajectories, shape (P, T, m), or at `nodes` alone.
+        values: Their trajectories at the nodes, shape (P, len(nodes), m).
         nodes: Time nodes of the problems.
-        few: Points drawn for a problem.
+        few: Points drawn anew for every problem; all of the pool if None.
         rng: Draws them.
     """
     optima = problems(nodes, values.shape[-1], pool.shape[1])
-    chosen = (values if len(nodes) == values.shape[1] else values[:, nodes]).reshape(len(pool), -1)
+    columns = values.reshape(len(pool), -1)
     every = np.arange(len(optima.node))
-    drawn = rng.integers(len(pool), size=(few, len(every)))
-    found = optima.side * chosen[drawn, every // 2]
-    best = found.argmax(0)
-    optima.point[:], optima.value[:] = pool[drawn[best, every]], found[best, every]
+    if rng is None or few is None:
+        best = np.stack([columns.argmin(0), columns.argmax(0)], 1).ravel()
+    else:
+        drawn = rng.integers(len(pool), size=(few, len(every)))
+        best = drawn[(optima.side * columns[drawn, every // 2]).argmax(0), every]
+    optima.point[:], optima.value[:] = pool[best], optima.side * columns[best, every // 2]
     return optima
+
+
+def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int) -> Array:
+    """Random points of a box, many with coordinates on or near faces, shape (size, d)."""
+    pool = rng.uniform(lower, upper, (size, len(lower)))
+    faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
+    nearest = np.where(rng.random(pool.shape) < 0.5, lower, upper)
+    near = np.arange(size) % NEAR == 0  # where an extreme beside a face would be too thin to meet
+    away = 10.0 ** rng.uniform(-DECADES, 0, (int(near.sum()), 1))
+    pool[near] = nearest[near] + away * (pool[near] - nearest[near])
+    pool[faces] = nearest[faces]
+    return pool
+
+
+def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
+    """Values of the model at points (P, d) and the nodes, all unless named, shape (P, T, m)."""
+    rows = slice(None) if nodes is None else nodes
+    return np.concatenate(
+        [model.values(points[k : k + 64])[:, rows] for k in range(0, len(points), 64)]
+    )

@@ -8,7 +8,7 @@ from scipy.linalg import expm, sqrtm
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
-from alphacut.frame.certificate.model_error import _expanded, _grids, _structure
+from alphacut.frame.certificate.model_error import _expanded, _grid, _structure
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.fuzzy import Interval
@@ -55,7 +55,7 @@ def test_the_damping_force_over_a_mass_is_bounded_closely() -> None:
     model = fit_modes(LinearFlow(frame, cuts.names, 1.0, 0.05, Exact()), cuts)
     ratio = RatioDamping.of(model)
     assert ratio is not None
-    grid = _grids(model)[0]
+    grid = _grid(model)
     parts = _expanded(grid, lambda unit: _structure(model, unit))
     bound = ratio.read(*(Comparison.of(parts[name]) for name in ("stiffness", "mass")))
     reached = np.zeros(2)

@@ -4,7 +4,6 @@ enough to be of use.
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,7 @@ from alphacut.frame import (
     StoreyFrame,
 )
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.calculus.polynomial import ChebyshevGrid, Polynomial
+from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate import model_error
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
@@ -162,10 +161,7 @@ def test_a_model_that_is_wrong_is_proved_to_be_no_better(wrong) -> None:
     good = model(system, {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}, 1e-7)
     if wrong == "load":
         assert good.load is not None
-        tables = tuple(replace(table, share=stretched(table.share)) for table in good.load.tables)
-        bad = replace(
-            good, load=replace(good.load, share=stretched(good.load.share), tables=tables)
-        )
+        bad = replace(good, load=replace(good.load, share=stretched(good.load.share)))
     else:
         bad = replace(good, **{wrong: stretched(getattr(good, wrong))})
     unit = np.array([[-1.0, 0.3], [1.0, -0.2], [0.9, 1.0]])
@@ -216,16 +212,6 @@ def test_degree_of_the_inverse_cube_reaches_round_off_and_not_far_beyond(lower, 
     size = np.abs(coefficients) / np.abs(coefficients).max()
     assert size[degree + 1 :].max() < 1e-13
     assert size[: degree // 2 + 1].min() > 1e-14
-
-
-def test_chebyshev_coefficients_are_exact() -> None:
-    grid = ChebyshevGrid((3, 2))
-    x, y = grid.points.T
-    values = np.stack([1 + 2 * x - y, (4 * x**3 - 3 * x) * (2 * y**2 - 1) * 5], -1)
-    found = grid.coefficients(values.copy()).reshape(4, 3, 2)
-    expected = np.zeros((4, 3, 2))
-    expected[0, 0, 0], expected[1, 0, 0], expected[0, 1, 0], expected[3, 2, 1] = 1, 2, -1, 5
-    assert np.abs(found - expected).max() < 1e-14
 
 
 def test_comparison_holds_over_the_box() -> None:
@@ -357,39 +343,10 @@ def test_a_wrong_start_counts_by_its_energy(kind, most, monkeypatch) -> None:
     assert deviation.max() > bound.max() / most
 
 
-def test_fewer_points_than_all_combinations_give_the_same_bound(monkeypatch) -> None:
+def test_a_grid_with_too_many_points_is_refused(monkeypatch) -> None:
     inputs = {"E": Interval(24e9, 26e9), "m1": Interval(19e3, 21e3), "zeta": Interval(0.02, 0.04)}
     frame = replace(SHAKEN, dampers=(), damping_ratio=0.03, outputs=("q3", "drift2"))
-    found = model(frame, inputs)
-    monkeypatch.setattr(model_error, "DEAR", 100)
-    whole = proved_error(found)
-    many = len(ChebyshevGrid((2 * found.degree + 1,) * 3))
-    monkeypatch.setattr(model_error, "MOST_NUMBERS", many)
-    monkeypatch.setattr(model_error, "DEAR", 1e-3)
-    assert proved_error(found) == pytest.approx(whole, rel=1e-6)
-    with pytest.raises(UnprovedError, match="takes minutes and is not tried unasked"):
-        proved_error(found, patient=False)
-    monkeypatch.setattr(model_error, "DEAR", 100)
-    told = (
-        r"points of 3 fuzzy inputs, and \d+ are affordable; narrower or fewer inputs, or a shorter"
-    )
-    with pytest.raises(UnprovedError, match=told):
-        proved_error(found)
-
-
-def test_outputs_are_named_where_fewer_of_them_can_be_proved(monkeypatch) -> None:
-    inputs = {"E": Interval(24e9, 26e9), "m1": Interval(19e3, 21e3), "zeta": Interval(0.02, 0.04)}
-    frame = replace(SHAKEN, dampers=(), damping_ratio=0.03, outputs=("q3", "drift2"))
-    found, alone = (model(replace(frame, outputs=x), inputs) for x in (("q3", "drift2"), ("q3",)))
-    few, told = len(model_error._grids(found)[1]), list[str]()
-    monkeypatch.setattr(model_error, "DEAR", 1)
-    with contextlib.suppress(UnprovedError):
-        while True:  # values at a point, until what was affordable is refused
-            monkeypatch.setattr(model_error, "MOST_NUMBERS", few * (200 - 2 * len(told)))
-            proved_error(found)
-            told.append("proved")
-    named = "up to 1 of the 2 outputs at once, narrower or fewer inputs, or a shorter"
-    assert told
-    with pytest.raises(UnprovedError, match=named):
-        proved_error(found)
-    assert (proved_error(alone) < np.inf).all()
+    monkeypatch.setattr(model_error, "MOST_NUMBERS", 1000)
+    message = r"points of 3 fuzzy inputs, and \d+ are affordable; fewer outputs at once, narrower"
+    with pytest.raises(UnprovedError, match=message):
+        proved_error(model(frame, inputs))
