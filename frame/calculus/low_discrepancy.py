@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 
-SCRAMBLED = 1
+SCRAMBLED = 3
 """Seed of the digits' permutations."""
 
 

@@ -130,8 +130,8 @@ def along(bound: Array, r: Array, out: Array) -> None:
 def left_out(reach: float, e: Array, c: Array) -> float:
     """Bound of what C = C₀, λ = λ₀ + i ω·x leave out of C exp((λ − λ₀ − i ω·x) t + i s).
 
-    It is over |wave|, a sixth of a bound of the third derivative of their difference, by Leibniz' rule, with
-    bounds along the radii of the derivatives of λ t, `e` (0 … 3, of the real part alone the first),
+    Over |wave|, a sixth of a bound of the third derivative of their difference, by Leibniz' rule,
+    with bounds along the radii of the derivatives of λ t, `e` (0 … 3, the first of the real part),
     and of C, `c` (0 … 3). Beyond `TURN` it is infinite.
     """
     z0, z1 = e[1] + e[2] / 2, e[1] + e[2]

@@ -108,9 +108,8 @@ def _require_affordable(grid: LowerGrid, sample: Sample) -> None:
         UnprovedError: They are.
     """
     d = len(grid.degrees)
-    width = sum(
-        x.size * (2 if np.iscomplexobj(x) else 1) for x in sample(np.zeros((1, d))).values()
-    )
+    values = sample(np.zeros((1, d))).values()
+    width = sum(x.size * (2 if np.iscomplexobj(x) else 1) for x in values)
     if len(grid) * width > MOST_NUMBERS:
         raise dependence.UnprovedError(
             f"the error of the modes takes {len(grid)} points of {d} fuzzy inputs, and"

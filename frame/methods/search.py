@@ -40,17 +40,17 @@ from alphacut.fuzzy.progress_bar import Progress, share
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 
-SMALL = 0.1
-"""Share of the wanted error that Newton's method may leave."""
-QUIET = 0.25
-"""Share of the wanted error that the last two passes may gain."""
+SMALL = 0.05
+"""Share of the error allowed that Newton's method may leave, and that the polynomials may have."""
+QUIET = 0.2
+"""Share of the error allowed that the last two passes may gain."""
 UNSEEN = 4.0
-"""Factor on what they gained."""
+"""Factor on what they gained: 0.8 of the error allowed; `SMALL` adds 0.15 at most."""
 FRESH = 1024
 """Fresh points of a pass."""
 VALUES = 16e6
 """Most numbers of their trajectories: 128 MB."""
-DRAWN = 2048
+DRAWN = 1024
 """Bounds that the first pass draws; each further one draws twice as many."""
 FEW = (1, 8)
 """Fresh points out of which the best starts, beside the best of all: the best of many lies too
@@ -98,7 +98,7 @@ class Search:
         if not isinstance(flow.flow, LinearFlow):
             raise ModalError("search: the system is not linear; take the Graph Follower")
         model = fit_modes(
-            flow.flow, flow.boxes, tolerance=tolerance / 10, budget=self.budget, scale=flow.scale
+            flow.flow, flow.boxes, tolerance=SMALL * tolerance, budget=self.budget, scale=flow.scale
         )
         exact = _exact(model, flow)
         # what leads: polynomials where they are as good as is asked for, or the exact motions
@@ -139,15 +139,16 @@ class Search:
         """Optima in a box, and what they may miss, shape (N,)."""
         optima = first_optima(_polynomials(way), lower, upper, SMALL * tolerance)
         every, grid = np.arange(len(optima.value)), _grid(way, optima)
-        optima.value[:] = -np.inf
-        optima.offer(way, optima.point.copy(), every)
+        box = lower, upper, SMALL * tolerance
+        if isinstance(way, ExactResponse):
+            optima.value[:] = -np.inf
+            optima.offer(way, optima.point.copy(), every)
+            refine(way, optima, every, *box)
         if within is not None:
             optima.offer(way, within.point, every)
         tick(0.2)
         if not (upper > lower).any():
             return optima, np.zeros(len(every))
-        box = lower, upper, SMALL * tolerance
-        refine(way, optima, every, *box)
         _follow(way, optima, grid, box, np.ones(len(every), bool))
         tick(0.5)
         gains = list[Array]()
