@@ -68,7 +68,7 @@ def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
 
 
 def _around(bulk: float, shear: float) -> tuple[float, float]:
-    """What Hashin and Shtrikman add to bulk and shear moduli in a reference material."""
+    """Terms that Hashin and Shtrikman add to bulk and shear moduli in a reference material."""
     return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
 
 

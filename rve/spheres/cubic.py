@@ -44,10 +44,3 @@ def hill_average(moduli: Array) -> Array:
     bulk, shear = moduli[..., 0], hill_shear(moduli)
     young = 9 * bulk * shear / (3 * bulk + shear)
     return np.stack([young, (3 * bulk - 2 * shear) / (6 * bulk + 2 * shear)], axis=-1)
-
-
-def young_along(moduli: Array) -> Array:
-    """Young's modulus along ⟨100⟩ and ⟨111⟩, shape (…, 2): its extremes over all directions."""
-    bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
-    along = [9 * bulk * g / (3 * bulk + g) for g in (deviator, shear)]
-    return np.stack(along, axis=-1)

@@ -31,7 +31,7 @@ class HomogenisedSpheres(Homogenised):
 
     @property
     def convention(self) -> str:
-        """What E and ν are of, in words."""
+        """Name of the average that E and ν are of."""
         return "Hill's isotropic average"
 
     @property

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PALE
+from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE, beside
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours
@@ -16,58 +16,54 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+EQUAL = "{} equal discs of the same area fraction, not those of the section"
+
+
+def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
+    """Circles by centres, shape (n, 2), and radii, shape (n,), in m, drawn in mm."""
+    from matplotlib.collections import EllipseCollection
+
+    width = 2e3 * radii
+    place = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
+    axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", **place, **look))
+
+
+def _view(axes: Axes, low: Array, high: Array) -> None:
+    """Limits in m, axes in mm of equal scale, no grid."""
+    axes.set(xlim=1e3 * np.array([low[0], high[0]]), ylim=1e3 * np.array([low[1], high[1]]))
+    axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    axes.grid(visible=False)
+
 
 def plot_discs(axes: Axes, discs: Particles, colour: str = BLUE, view: Array | None = None) -> None:
     """Particles in their rectangle, or in its corner `view` (m), with their images, in mm."""
-    from matplotlib.collections import EllipseCollection
-
     view = discs.size if view is None else view
     centres = np.concatenate([discs.centres + shift for shift in _shifts(discs)])
     radii = np.tile(discs.radii, len(_shifts(discs)))
     seen = ((centres > -radii[:, None]) & (centres < view + radii[:, None])).all(axis=1)
-    centres, width = centres[seen], 2e3 * radii[seen]
-    place = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
-    axes.add_collection(
-        EllipseCollection(width, width, 0 * width, units="xy", color=colour, lw=0, **place)
-    )
-    axes.set(
-        xlim=(0, 1e3 * view[0]),
-        ylim=(0, 1e3 * view[1]),
-        aspect="equal",
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-    )
-    axes.grid(visible=False)
+    _circles(axes, centres[seen], radii[seen], color=colour, lw=0)
+    _view(axes, 0 * view, view)
 
 
-def plot_cells(
-    axes: Axes, diagram: Apollonius, colour: str = INK, view: Array | None = None
-) -> None:
+def plot_cells(axes: Axes, diagram: Apollonius, view: Array | None = None) -> None:
     """Curved walls of the cells, with their images, in the rectangle or its corner `view` (m)."""
     from matplotlib.collections import LineCollection
 
     discs = diagram.discs
     angle = np.asarray(np.linspace(diagram.start, diagram.end, 24), float)
     rho = diagram.radius_at(np.arange(len(diagram.cell), dtype=np.intp), angle)
-    points = discs.centres[diagram.cell] + rho[..., None] * np.stack(
-        [np.cos(angle), np.sin(angle)], axis=-1
-    )
+    along = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    points = discs.centres[diagram.cell] + rho[..., None] * along
     walls = np.concatenate([points + shift for shift in _shifts(discs)], axis=1)
-    seen = (
-        (walls.max(axis=0) > 0) & (walls.min(axis=0) < (discs.size if view is None else view))
-    ).all(axis=1)
-    axes.add_collection(
-        LineCollection(list(1e3 * walls[:, seen].swapaxes(0, 1)), colors=colour, linewidths=0.8)
-    )
+    inside = (walls.max(axis=0) > 0) & (walls.min(axis=0) < (discs.size if view is None else view))
+    lines = list(1e3 * walls[:, inside.all(axis=1)].swapaxes(0, 1))
+    axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8))
 
 
 def _shifts(discs: Particles) -> list[Array]:
     """Shifts of the images of a section, in m; none but zero where it does not repeat."""
-    return (
-        [discs.size * (i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-        if discs.periodic
-        else [np.zeros(2)]
-    )
+    tiles = (-1, 0, 1) if discs.periodic else (0,)
+    return [discs.size * (i, j) for i in tiles for j in tiles]
 
 
 def corner(discs: Particles, number: int = 120) -> Array:
@@ -77,47 +73,32 @@ def corner(discs: Particles, number: int = 120) -> Array:
 
 def draw_cells(diagram: Apollonius) -> Figure:
     """Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
-    import matplotlib.pyplot as plt
-
     discs = diagram.discs
     view = corner(discs)
-    drawn, both = plt.subplots(1, 2, figsize=(9.6, 5.0))
-    bare = apollonius(Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
-    for axes, shown, title in zip(
-        both, (bare, diagram), ("Voronoi cells", "Apollonius cells"), strict=True
-    ):
-        plot_discs(axes, discs, PALE if title.startswith("V") else "#9ecae1", view)
-        plot_cells(axes, shown, view=view)
-        axes.set_title(title)
     width, height = 1e3 * discs.size
     whole = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
-    drawn.suptitle(whole if (view == discs.size).all() else f"a corner of {whole}", fontsize=10)
+    whole = whole if (view == discs.size).all() else f"a corner of {whole}"
+    drawn, (left, right) = beside(whole, "Voronoi cells", "Apollonius cells")
+    bare = apollonius(Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
+    for axes, shown, colour in ((left, bare, PALE), (right, diagram, LIGHT)):
+        plot_discs(axes, discs, colour, view)
+        plot_cells(axes, shown, view)
     return drawn
 
 
 def draw_neighbours(discs: Particles) -> Figure:
     """Delaunay triangulation of equal discs beside their Voronoi cells (Figs. 5, 8)."""
-    import matplotlib.pyplot as plt
     from matplotlib.collections import LineCollection
 
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 5.0))
+    titles = "Delaunay triangulation: the direct neighbours", "Voronoi cells, its dual"
+    drawn, (left, right) = beside(EQUAL.format(len(discs)), *titles)
     direct = neighbours(discs)
     start = discs.centres[direct.first]
+    edges = list(1e3 * np.stack([start, start + direct.apart], axis=1))
     for axes in (left, right):
-        plot_discs(axes, discs, "#9ecae1")
-    left.add_collection(
-        LineCollection(
-            list(1e3 * np.stack([start, start + direct.apart], axis=1)),
-            colors=ORANGE,
-            linewidths=0.8,
-        )
-    )
-    drawn.suptitle(
-        f"{len(discs)} equal discs of the same area fraction, not those of the section", fontsize=10
-    )
-    left.set_title("Delaunay triangulation: the direct neighbours")
+        plot_discs(axes, discs, LIGHT)
+    left.add_collection(LineCollection(edges, colors=ORANGE, linewidths=0.8))
     plot_cells(right, apollonius(discs))
-    right.set_title("Voronoi cells, its dual")
     return drawn
 
 
@@ -128,33 +109,26 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     overlap each other. Right: the true discs within the same distance; only the direct neighbours
     (green) touch the centre's cell.
     """
-    import matplotlib.pyplot as plt
-
-    reach = 3.5 * discs.spacing
+    reach, radius = 3.5 * discs.spacing, float(discs.radii[0])
     centre = int(np.argmin(np.hypot(*(discs.centres - discs.size / 2).T)))
     every = np.arange(len(discs), dtype=np.intp)
     apart = discs.separation(np.full(len(discs), centre, np.intp), every)
-    near = np.flatnonzero((np.hypot(*apart.T) < reach) & (np.arange(len(discs)) != centre))
+    near = apart[(np.hypot(*apart.T) < reach) & (every != centre)]
     direct = neighbours(discs)
     touching = {tuple(np.round(v, 12)) for v in direct.apart[direct.first == centre]}
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 5.0))
-    drawn.suptitle(
-        f"{len(discs)} equal discs of the same area fraction, not those of the section", fontsize=10
-    )
+    colours = [GREEN if tuple(np.round(v, 12)) in touching else LIGHT for v in near]
     fake = _from_pair_distances(discs, len(near), reach, generator)
-    _around(left, fake, float(discs.radii[centre]), reach, ["#9ecae1"] * len(fake))
-    left.set_title(
-        f"pair distances alone: {_overlaps(fake, discs.radii[centre])} of {len(fake)} overlap"
+    drawn, both = beside(
+        EQUAL.format(len(discs)),
+        f"pair distances alone: {_overlaps(fake, radius)} of {len(fake)} overlap",
+        f"the packing: {colours.count(GREEN)} of {len(near)} are direct neighbours",
     )
-    is_direct = [tuple(np.round(apart[k], 12)) in touching for k in near]
-    _around(
-        right,
-        apart[near],
-        float(discs.radii[centre]),
-        reach,
-        [GREEN if yes else "#9ecae1" for yes in is_direct],
-    )
-    right.set_title(f"the packing: {sum(is_direct)} of {len(near)} are direct neighbours")
+    limit = np.full(2, reach + radius)
+    for axes, places, colour in zip(both, (fake, near), (LIGHT, colours), strict=True):
+        _circles(axes, np.zeros((1, 2)), np.array([radius]), color=ORANGE)
+        radii = np.full(len(places), radius)
+        _circles(axes, places, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
+        _view(axes, -limit, limit)
     return drawn
 
 
@@ -178,22 +152,6 @@ def _overlaps(places: Array, radius: float) -> int:
     return int((apart.min(axis=1) < 2 * radius).sum())
 
 
-def _around(axes: Axes, places: Array, radius: float, reach: float, colours: list[str]) -> None:
-    """Particles of one radius around a centre, in mm."""
-    from matplotlib.patches import Circle
-
-    axes.add_patch(Circle((0, 0), 1e3 * radius, color=ORANGE))
-    for x, y, colour in zip(places[:, 0], places[:, 1], colours, strict=True):
-        axes.add_patch(
-            Circle((1e3 * x, 1e3 * y), 1e3 * radius, facecolor=colour, edgecolor=GREY, alpha=0.8)
-        )
-    limit = 1e3 * (reach + radius)
-    axes.set(
-        xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal", xlabel="x [mm]", ylabel="y [mm]"
-    )
-    axes.grid(visible=False)
-
-
 def draw_overlay(picture: Array, discs: Particles) -> Figure:
     """The grey image with the outline of every circle that was taken from it.
 
@@ -202,18 +160,12 @@ def draw_overlay(picture: Array, discs: Particles) -> Figure:
         discs: Circles in the same window; y points up from the lower edge.
     """
     import matplotlib.pyplot as plt
-    from matplotlib.collections import EllipseCollection
 
     width, height = 1e3 * discs.size
     drawn, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
     axes.imshow(picture, cmap="gray", extent=(0, width, 0, height), interpolation="none")
-    across = 2e3 * discs.radii
-    place = {"offsets": 1e3 * discs.centres, "offset_transform": axes.transData}
     outline = {"facecolors": "none", "edgecolors": ORANGE, "linewidths": 1.0}
-    axes.add_collection(
-        EllipseCollection(across, across, 0 * across, units="xy", **place, **outline)
-    )
-    axes.set(xlim=(0, width), ylim=(0, height), xlabel="x [mm]", ylabel="y [mm]")
+    _circles(axes, discs.centres, discs.radii, **outline)
+    _view(axes, 0 * discs.size, discs.size)
     axes.set_title(f"{len(discs)} circles; what has no outline was left out", fontsize="medium")
-    axes.grid(visible=False)
     return drawn

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE
+from alphacut.stochastic.figures.cells import EQUAL
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE, beside
 from alphacut.stochastic.microstructure import Microstructure
 from alphacut.stochastic.microstructure_summary import to_dataset
 from alphacut.stochastic.particles.particles import Particles
@@ -27,14 +28,8 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
     particles = result.study.shape.particles
-    values = 1e3 * np.sort(np.concatenate([one.particles.radii for one in result.sections]))
-    axes.step(
-        values,
-        np.arange(1, len(values) + 1) / len(values),
-        color=BLUE,
-        where="post",
-        label=f"{len(values)} {particles}",
-    )
+    values = 1e3 * np.concatenate([one.particles.radii for one in result.sections])
+    axes.ecdf(values, color=BLUE, label=f"{len(values)} {particles}")
     if law is not None and law.smallest < law.largest:
         grid = np.linspace(law.smallest, law.largest, 400)
         axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
@@ -45,30 +40,19 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
 
 def draw_neighbour_statistics(discs: Particles) -> Figure:
     """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one size."""
-    import matplotlib.pyplot as plt
-
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(9.6, 4.0))
-    drawn.suptitle(
-        f"{len(discs)} equal discs of the same area fraction, not those of the section", fontsize=10
-    )
+    drawn, (left, right) = beside(EQUAL.format(len(discs)))
     direct = neighbours(discs)
     distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
     left.hist(distance, bins=80, density=True, color=BLUE)
     left.axvline(1, color=ORANGE, label="one diameter")
-    left.set(
-        xlabel="distance of direct neighbours / diameter",
-        ylabel="density",
-        xlim=(0.8, np.quantile(distance, 0.999)),
-    )
+    left.set(xlabel="distance of direct neighbours / diameter", ylabel="density")
+    left.set(xlim=(0.8, np.quantile(distance, 0.999)))
     left.legend()
     counts = np.bincount(number)
     right.bar(np.arange(len(counts)), counts / counts.sum(), color=BLUE)
     right.axvline(number.mean(), color=ORANGE, label=f"mean {number.mean():.4g}")
-    right.set(
-        xlabel="number of direct neighbours",
-        ylabel="share of discs",
-        xlim=(2.3, number.max() + 0.7),
-    )
+    right.set(xlabel="number of direct neighbours", ylabel="share of discs")
+    right.set(xlim=(2.3, number.max() + 0.7))
     right.legend()
     return drawn
 
@@ -107,14 +91,8 @@ def draw_areas(result: Microstructure) -> Figure:
         axes.axvline(limit, color=BLUE, lw=1)
     bound, unit = shape.largest, {2: "mm²", 3: "mm³"}[shape.dimensions]
     axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
-    axes.text(
-        bound,
-        axes.get_ylim()[1],
-        f"{shape.particles[:-1]} larger\nthan its cell ",
-        ha="right",
-        va="top",
-        color=GREY,
-    )
+    text = f"{shape.particles[:-1]} larger\nthan its cell "
+    axes.text(bound, axes.get_ylim()[1], text, ha="right", va="top", color=GREY)
     axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
     kept = f"{100 * result.share_kept:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} keep {kept}")
@@ -133,16 +111,12 @@ def draw_pbox(result: Microstructure) -> Figure:
     for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
         scale = 1 if panel is axes else 100
         low, high = np.maximum(share - result.band, 0), np.minimum(share + result.band, 1)
+        label = f"band of ± {result.band:.2g}"
         panel.fill_between(
-            radius,
-            scale * (low - base),
-            scale * (high - base),
-            color=PALE,
-            label=f"band of ± {result.band:.2g}",
+            radius, scale * (low - base), scale * (high - base), fc=PALE, label=label
         )
-        panel.plot(
-            radius, scale * (share - base), color=BLUE, label=f"{len(result.kept.values)} cells"
-        )
+        label = f"{len(result.kept.values)} cells"
+        panel.plot(radius, scale * (share - base), color=BLUE, label=label)
         panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
         panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
     axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
@@ -160,14 +134,12 @@ def draw_map(result: Microstructure) -> Figure:
     law = fit.distribution
     theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
     axes.step(theta, result.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
-    axes.plot(
-        theta,
-        fit.map((box.a2[1], box.a4[1]))(theta),
-        color=ORANGE,
-        ls="--",
-        label=f"a2 = {box.a2[1]:.4f}, a4 = {box.a4[1]:.4f}",
+    fitted = fit.map((box.a2[1], box.a4[1]))
+    label = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}"
+    axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)
+    axes.fill_between(
+        theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy $a_2$, $a_4$"
     )
-    axes.fill_between(theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy a2, a4")
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
     return drawn

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Okabe & Ito
-INK, BLUE, ORANGE, GREEN, GREY, PALE = (
-    "#1a1a1a",
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#8c8c8c",
-    "#dce9f2",
-)
+INK, BLUE, ORANGE, GREEN = "#1a1a1a", "#0072b2", "#d55e00", "#009e73"
+GREY, PALE, LIGHT = "#8c8c8c", "#dce9f2", "#9ecae1"
 SETTINGS: dict[str, Any] = {
     "font.size": 10,
     "axes.spines.top": False,
@@ -44,6 +39,17 @@ def style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
     mpl.use("Agg")
     with mpl.rc_context({**SETTINGS, **more}):
         yield
+
+
+def beside(whole: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
+    """A figure of two panels, with a title for both and one for each, if any."""
+    import matplotlib.pyplot as plt
+
+    drawn, both = plt.subplots(1, 2, figsize=(9.6, 5.0 if titles else 4.0))
+    drawn.suptitle(whole, fontsize=10)
+    for axes, title in zip(both, titles, strict=False):
+        axes.set_title(title)
+    return drawn, list(both)
 
 
 def save(drawn: Figure, stem: Path) -> list[Path]:

@@ -44,20 +44,6 @@ def surface_distance(particles: Particles, first: Rows, second: Rows) -> Array:
     return np.asarray(distance - particles.radii[first] - particles.radii[second])
 
 
-def smallest_gap(particles: Particles) -> float:
-    """Least distance between two surfaces, periodic images included, in m."""
-    own = np.inf
-    if particles.periodic:
-        own = float(particles.size.min() - 2 * particles.radii.max())
-    probe = 0.1 * (float(particles.radii.mean()) + particles.spacing)
-    while probe <= 4 * particles.size.sum():
-        first, second = close_pairs(particles, probe)
-        if len(first):
-            return min(own, float(surface_distance(particles, first, second).min()))
-        probe *= 2
-    return own
-
-
 def balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Rows, Rows]:
     """Numbers of points in balls, shape (n,), and the points of all balls, one after the other."""
     near = tree.query_ball_point(centres, reach, return_sorted=False)

@@ -80,7 +80,7 @@ class LogNormalRadii:
     @property
     def label(self) -> str:
         """The law in words."""
-        return f"log-normal, σ_r = {self.sigma:.4f}"
+        return f"log-normal, σ$_r$ = {self.sigma:.4f}"
 
     @property
     def sigma(self) -> float:
