@@ -91,8 +91,7 @@ class ImageModel:
         least = width * (needed / have) ** (power / 2)
         if needed > have / 4 or least > self.width:
             raise FailedError(
-                f"{model.parts} parts of a pixel give a width of {width:.1e}, those that fit into"
-                f" memory {least:.1e} at best, {self.width:.2e} is allowed",
+                f"a width of {least:.1e} at best fits into memory, {self.width:.2e} is allowed",
                 "take a larger width, or an image of fewer pixels",
             )
         return replace(model, division=2 * model.parts).refined(images, width)
