@@ -1,0 +1,33 @@
+"""What followers may have missed enters their error; where trajectories part there is none."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import GraphFollower, ImprovedFollower, envelope, pendulum
+from alphacut.frame.methods import graph_follower, improved_follower
+from alphacut.fuzzy import Interval, Nature
+
+METHODS = {graph_follower: GraphFollower(), improved_follower: ImprovedFollower(spread=8)}
+
+
+@pytest.mark.parametrize("module", METHODS)
+def test_what_an_independent_sample_reaches_beyond_the_bounds_counts_twice(monkeypatch, module):
+    monkeypatch.setattr(module, "beyond", lambda flow, bounds: (np.full((1, 2), 30.0), 5))
+    inputs, motion = {"l": Interval(0.99, 1.01)}, {"duration": 0.5, "step": 0.05, "alpha": (0,)}
+    error = envelope(pendulum(), inputs, method=METHODS[module], **motion).error
+    assert error == pytest.approx(60, abs=2)
+
+
+@pytest.mark.parametrize(("start", "nature"), [(2.9, Nature.ESTIMATED), (3.14, Nature.ATTAINED)])
+def test_bounds_about_a_separatrix_are_attained_and_no_more(start, nature):
+    """A pendulum let go near its top falls to either side."""
+    system = pendulum(phi0=start, damping=0.0)
+    found = envelope(
+        system,
+        {"phi_0": Interval(start - 0.05, start + 0.05)},
+        duration=3.0,
+        step=0.05,
+        alpha=(0,),
+        method=ImprovedFollower(1e-2, budget=200),
+    )
+    assert found.nature is nature
