@@ -13,13 +13,13 @@ from typing import Literal
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.store import Identity, Store, model_key
-from alphacut.fuzzy.campaign.workers import pool, require_executor
+from alphacut.fuzzy.campaign.workers import running
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.fuzzy.refused import chosen, real, require
+from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, levels
 from alphacut.fuzzy.sets.interaction import Interaction
@@ -88,22 +88,19 @@ def propagate(
     """
     start = perf_counter()
     domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
-    method, known = method or Automatic(), known or Known()
+    method = method or Automatic()
     runs = hasattr(method, "run") and not isinstance(method, type)
     require(runs, "method", repr(method), "an object such as General() or Signed()")
-    known.check_inputs(domain.names)
     chosen("on_failure", on_failure, ("raise", "skip"))
-    real("budget", budget, positive=True, whole=True)
-    require_executor(executor, workers)
     call = Call(function, domain.names, tuple(shared), vectorised)
     key = b"" if store is None else model_key(identity or {})
     with (
         showing(progress) as tell,
-        nullcontext(executor) if executor else pool(workers) as running,
+        running(executor, workers) as each,
         nullcontext(store) if isinstance(store, Store | None) else Store(store) as shelf,
     ):
         skip = on_failure == "skip"
-        campaign = Campaign(call, known, budget, running, tell, shelf, key, skip)
+        campaign = Campaign(call, known or Known(), budget, each, tell, shelf, key, skip)
         bounds = method.run(campaign, domain)
         campaign.report(1.0)
     bounds = _without_failed(bounds, campaign.failed)

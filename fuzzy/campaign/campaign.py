@@ -14,7 +14,7 @@ from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_p
 from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.refused import FailedError, real
 from alphacut.fuzzy.samples.model import Layout, SpentError, Values
 
 _SHOWN = 3  # failed samples that a message quotes
@@ -69,6 +69,9 @@ class Campaign:
         calls: Calls of the function.
         failed: Samples left out.
         layout: Names and shapes of the outputs, as the first sample had them.
+
+    Raises:
+        RefusedError: The budget is no positive whole number, or a fact names no input.
     """
 
     call: Call
@@ -85,6 +88,10 @@ class Campaign:
     failed: int = 0
     layout: Layout = ()
     _share: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.known.check_inputs(self.call.names)
+        real("budget", self.budget, positive=True, whole=True)
 
     @property
     def left(self) -> int:

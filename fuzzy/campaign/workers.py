@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from itertools import islice
 from time import perf_counter, sleep
 from typing import ParamSpec, TypeVar
@@ -49,6 +49,18 @@ def pool(workers: int) -> Iterator[Executor | None]:
                 raise
 
 
+def running(executor: Executor | None, workers: int) -> AbstractContextManager[Executor | None]:
+    """The caller's executor, which stays open, or a pool of `workers` processes.
+
+    Raises:
+        RefusedError: There is an executor that is none, or one beside workers.
+    """
+    holds = executor is None or (isinstance(executor, Executor) and workers == 1)
+    allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
+    require(holds, "executor", executor, allowed)
+    return nullcontext(executor) if executor else pool(workers)
+
+
 def _processes(workers: int) -> Executor:
     """Processes of this machine that end with this one."""
     from joblib.externals.loky import ProcessPoolExecutor
@@ -78,13 +90,6 @@ def _end_with_parent(parent: int) -> None:
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
-
-
-def require_executor(executor: object, workers: int) -> None:
-    """Refuse what is no executor, or one beside workers."""
-    holds = executor is None or (isinstance(executor, Executor) and workers == 1)
-    allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
-    require(holds, "executor", executor, allowed)
 
 
 def submitted(

@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import LEVELS, Law, law_cuts
 from alphacut.fuzzy.knowledge.observations import Limits, Observations, Values
-from alphacut.fuzzy.knowledge.order_statistics import rank_cuts, values_needed
+from alphacut.fuzzy.knowledge.order_statistics import rank_cuts
 from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.stepwise import Stepwise
@@ -58,8 +58,7 @@ def from_data(
         chosen("law", law, get_args(Law))
     data = Observations.of(values, bounds, resolution)
     number, decided = _cuts(data, claim, quantile, law)
-    enough = _enough(quantile) if law is None and claim != "mean" and decided else ""
-    return Claimed(number, Claim(claim, _conditions(data, law, bounds)), decided, enough)
+    return Claimed(number, Claim(claim, _conditions(data, law, bounds)), decided)
 
 
 def _cuts(
@@ -88,13 +87,6 @@ def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> t
     drawn = f"{data.count} values drawn alike and independently"
     drawn += f" from a {law} law" if law else ""
     return (drawn, *(() if bounds is None else (f"bounds [{low:g}, {high:g}]",)))
-
-
-def _enough(quantile: float | None) -> str:
-    """Numbers of values that would decide low cuts, in words."""
-    levels = (0.1, 0.05, 0.01)
-    counts = (f"{values_needed(alpha, quantile)} values for α = {alpha:g}" for alpha in levels)
-    return f"; enough without bounds would be {', '.join(counts)}"
 
 
 def mean_cuts(data: Observations) -> Stepwise:

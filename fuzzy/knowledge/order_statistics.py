@@ -12,7 +12,6 @@ Statistics, section 7.1; Vovk, Gammerman and Shafer, Algorithmic Learning in a R
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -122,18 +121,3 @@ def _centre(data: Observations, quantile: float) -> float:
     rows = (row[np.isfinite(row)] for row in (data.lower, data.upper))
     ends = [np.quantile(row, quantile) for row in rows if len(row)]
     return float(np.mean(ends)) if ends else np.nan
-
-
-def least_alpha(n: int, quantile: float | None = None) -> float:
-    """Least α at which n values decide the cut without physical bounds."""
-    return 2 / (n + 1) if quantile is None else quantile**n + (1 - quantile) ** n
-
-
-def values_needed(alpha: float, quantile: float | None = None) -> int:
-    """Least number of values that decide the cut at `alpha` in (0, 1] without physical bounds."""
-    require(0 < alpha <= 1, "alpha", alpha, "levels in (0, 1]: no values decide the cut at 0")
-    n = 1
-    while least_alpha(n, quantile) > alpha:
-        n *= 2
-    counts = range(n // 2 + 1, n + 1)
-    return counts[bisect_left(counts, True, key=lambda n: least_alpha(n, quantile) <= alpha)]

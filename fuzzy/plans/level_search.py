@@ -150,23 +150,12 @@ class LevelSearch:
             worth = np.nan_to_num(sign / scale * values.array[:, values.column(output)], nan=1e6)
             return float(worth[0]), (worth[1:] - worth[0]) / steps
 
-        bounds = [(0.0, 1.0)] * len(start)
-        options = {"maxiter": rounds}
+        cube = [(0.0, 1.0)] * len(start)
+        settings = {"jac": True, "bounds": cube, "options": {"maxiter": rounds}}
         if not self.domain.interactions:
-            end = minimize(
-                objective, start, jac=True, bounds=bounds, method="L-BFGS-B", options=options
-            )
-            return np.asarray(end.x)
+            return np.asarray(minimize(objective, start, method="L-BFGS-B", **settings).x)
         room = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
-        end = minimize(
-            objective,
-            start,
-            jac=True,
-            bounds=bounds,
-            constraints=[room],
-            method="SLSQP",
-            options=options,
-        )
+        end = minimize(objective, start, method="SLSQP", constraints=[room], **settings)
         place = pulled(np.clip(end.x, 0, 1), start, self.slack)
         self.memo(self.points(place[None]))
         return place

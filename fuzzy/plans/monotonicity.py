@@ -14,33 +14,13 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.knowledge.known import Known, Signs
-from alphacut.fuzzy.refused import chosen, real, require
+from alphacut.fuzzy.refused import chosen
 from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
 
-
-@dataclass(frozen=True)
-class Verification:
-    """Settings of the search for signs that are neither stated nor proved.
-
-    Args:
-        probes: Points per box at which differences are taken, besides its two extreme corners and
-            its modal point.
-        margin: The least slope must exceed this share of the spread of the slopes over the probes.
-        step: Step of a difference, as a share of the width of the box.
-
-    Raises:
-        RefusedError: A value is out of range.
-    """
-
-    probes: int = 4
-    margin: float = 0.05
-    step: float = 1e-3
-
-    def __post_init__(self) -> None:
-        real("probes", self.probes, whole=True)
-        holds = real("margin", self.margin) >= 0 and 0 < real("step", self.step) <= 0.5
-        require(holds, "margin, step", (self.margin, self.step), "margin >= 0, step in (0, 0.5]")
+_PROBES = 4  # of a box, besides its extreme corners and the modal point
+_MARGIN = 0.05  # of the spread of the slopes over the probes, which the least slope must exceed
+_STEP = 1e-3  # of a difference, as a share of the width of the box
 
 
 @dataclass(frozen=True)
@@ -69,15 +49,12 @@ class Effects:
         )
 
 
-def verify(
-    model: Memo, domain: Domain, rule: Verification, outputs: tuple[str, ...] = ()
-) -> Effects:
+def verify(model: Memo, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
     """Find the sign of every effect on every level, from the widest box up.
 
     Args:
         model: The model with what is known of it.
         domain: Inputs and levels.
-        rule: How signs are looked for.
         outputs: Outputs that matter; all if none is named.
     """
     columns = model(domain.modal[None]).columns
@@ -96,7 +73,7 @@ def verify(
         signs[:, upper == lower], proved[:, upper == lower] = 1, True
         _prove(signs, proved, model.known, outputs, lower, upper)
         if (signs == 0).any():
-            seen = _Box(model, outputs, lower, upper, rule).seen(domain.modal[None], signs)
+            seen = _Box(model, outputs, lower, upper).seen(domain.modal[None], signs)
             signs = np.where(signs == 0, seen, signs)
         rows.append((signs, proved))
     return Effects(outputs, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
@@ -133,7 +110,6 @@ class _Box:
     outputs: tuple[str, ...]
     lower: Array
     upper: Array
-    rule: Verification
 
     def seen(self, modal: Array, stated: Signs) -> Signs:
         """Signs of the slopes at all probes, with the margin, shape (outputs, inputs), else 0."""
@@ -142,7 +118,7 @@ class _Box:
         corners = self._corners(np.where(stated != 0, stated, first))
         slopes = self._slopes(np.concatenate([modal, corners, self._spread()]), free)
         least, most = slopes.min(axis=0), slopes.max(axis=0)
-        room = self.rule.margin * (most - least)
+        room = _MARGIN * (most - least)
         rises, falls = (least > 0) & (least >= room), (most < 0) & (-most >= room)
         idle = (least == 0) & (most == 0)  # no effect at any probe: either end will do
         return np.asarray((rises | idle).astype(np.int8) - falls.astype(np.int8))
@@ -157,7 +133,7 @@ class _Box:
         """Even points of the box, without the first, which is a corner."""
         from scipy.stats import qmc
 
-        unit: Array = qmc.Halton(len(self.lower), scramble=False).random(self.rule.probes + 1)[1:]
+        unit: Array = qmc.Halton(len(self.lower), scramble=False).random(_PROBES + 1)[1:]
         return self.lower + unit * (self.upper - self.lower)
 
     def _slopes(self, points: Array, inputs: Rows) -> Array:
@@ -168,7 +144,7 @@ class _Box:
         values = self._values(points)
         slopes = np.zeros((*values.shape, points.shape[1]))
         for column in inputs:
-            step = self.rule.step * (self.upper[column] - self.lower[column])
+            step = _STEP * (self.upper[column] - self.lower[column])
             steps = np.where(points[:, column] + step > self.upper[column], -step, step)
             moved = points.copy()
             moved[:, column] += steps

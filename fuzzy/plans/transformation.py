@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import prod
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.known import Known, Signs
-from alphacut.fuzzy.plans.monotonicity import Effects, Verification, verify
+from alphacut.fuzzy.plans.monotonicity import Effects, verify
 from alphacut.fuzzy.refused import RefusedError, chosen
 from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.samples.design import Design, proving
@@ -151,12 +151,10 @@ class Extended(_Transformation):
     Args:
         monotone: Inputs in which the model rises or falls throughout. If not given, what the caller
             knows of the model, and for the other inputs a verification at probes.
-        verification: How monotonicity is looked for.
         outputs: Outputs whose bounds matter; all if none is named.
     """
 
     monotone: tuple[str, ...] | None = None
-    verification: Verification = field(default_factory=Verification)
     outputs: tuple[str, ...] = ()
 
     def _refined(self, names: Sequence[str]) -> set[str]:
@@ -170,7 +168,7 @@ class Extended(_Transformation):
             return super().run(model, domain)
         domain.require_free(self.name)
         memo = Memo(model)
-        effects = verify(memo, domain, self.verification, self.outputs)
+        effects = verify(memo, domain, self.outputs)
         classes = (effects.signs[0] != 0) | model.known.monotone_in(domain.names, effects.outputs)
         pairs = zip(domain.names, classes.all(axis=0), strict=True)
         plan = replace(self, monotone=tuple(name for name, holds in pairs if holds))
@@ -187,12 +185,10 @@ class Signed:
     probes. The bounds are guaranteed where all signs are stated or verified, else attained.
 
     Args:
-        verification: How signs are looked for where they are not stated.
         outputs: Outputs whose bounds matter; all if none is named. The others are as the samples
             happen to bound them.
     """
 
-    verification: Verification = field(default_factory=Verification)
     outputs: tuple[str, ...] = ()
 
     name = "signed"
@@ -201,7 +197,7 @@ class Signed:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
         domain.require_free(self.name)
         memo = Memo(model)
-        effects = verify(memo, domain, self.verification, self.outputs)
+        effects = verify(memo, domain, self.outputs)
         afford(_size(effects, domain), memo, self.name)
         design = Design.from_levels(domain, self._points(effects, domain))
         return _verified(design, memo, effects, self.name)

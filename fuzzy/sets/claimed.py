@@ -75,7 +75,6 @@ class Claimed(FuzzyNumber):
         claim: What the cuts hold, how often, and given what.
         decided: Least α at which the values decide both ends of the cut; 0 where they do
             everywhere, or physical bounds fill in.
-        enough: Number of values that would decide the cut at a level, in words, for messages.
         joint: Rule by which its cuts were widened to hold together with others; None where they
             hold by themselves.
 
@@ -86,7 +85,6 @@ class Claimed(FuzzyNumber):
     number: Stepwise
     claim: Claim
     decided: float = 0.0
-    enough: str = ""
     joint: Joint | None = None
 
     def __post_init__(self) -> None:
@@ -110,7 +108,7 @@ class Claimed(FuzzyNumber):
         """
         if level(alpha) < self.decided:
             allowed = f"levels from {self.decided:.4g} on, which the values decide"
-            cure = f"give bounds=(lower, upper), what is physically possible{self.enough}"
+            cure = "give bounds=(lower, upper), what is physically possible, or measure more"
             raise RefusedError(f"alpha of the {self.claim.about}", alpha, allowed, cure)
         return self.number.cut(alpha)
 

@@ -28,7 +28,6 @@ from alphacut.fuzzy import (
     width_shares,
 )
 from alphacut.fuzzy.campaign.store import model_key
-from alphacut.fuzzy.plans.monotonicity import Verification
 
 X = {"x": Triangular(0, 1, 2)}
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
@@ -72,7 +71,6 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: Known({"x": 2}), "sign of x"),
         (lambda: run(lambda x: x, X, Extended(("e",))), "monotone input"),
         (lambda: run(lambda x: x, X, Signed(outputs=("z",))), "output"),
-        (lambda: Verification(step=0.6), "margin, step"),
         (lambda: Automatic(tolerance=2), "tolerance"),
         (lambda: Optimisation("newton"), "optimiser"),
         (lambda: Optimisation(starts=0), "starts"),

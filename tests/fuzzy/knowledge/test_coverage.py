@@ -9,7 +9,7 @@ from scipy import stats
 import alphacut.fuzzy.knowledge.from_data as own
 from alphacut.fuzzy import RefusedError, from_data
 from alphacut.fuzzy.knowledge.named_law import from_scatter
-from alphacut.fuzzy.knowledge.order_statistics import least_alpha, values_needed, windows
+from alphacut.fuzzy.knowledge.order_statistics import windows
 from benchmarks.fuzzy.coverage import FREE, NAMED, held
 
 SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
@@ -65,12 +65,6 @@ def test_the_least_level_that_values_decide(claim, level):
         number.cut(0.0)
     assert f"levels from {level:.4g} on" in refused.value.allowed
     assert "give bounds=" in refused.value.cure
-
-
-@pytest.mark.parametrize(("quantile", "needed"), [(None, 39), (0.5, 6), (0.95, 59)])
-def test_the_number_of_values_that_would_do(quantile, needed):
-    assert values_needed(0.05, quantile) == needed
-    assert least_alpha(needed, quantile) <= 0.05 < least_alpha(needed - 1, quantile)
 
 
 def test_bounds_fill_in_what_the_values_do_not_decide():
