@@ -13,7 +13,6 @@ from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
-from alphacut.frame.dynamics.spectral import LARGE, NearlyCriticalError, spectral_trajectory
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, relative_to_ground
 from alphacut.fuzzy.refused import FailedError, RefusedError
@@ -176,11 +175,6 @@ class LinearFlow(March):
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         exact, ground = isinstance(self.integrator, Exact), self.system.ground
         h, steps = self.step, len(self.time) - 1
-        if exact and rows.value.shape[-1] >= LARGE:
-            try:
-                return spectral_trajectory(matrices, rows, ground=ground, step=h, steps=steps)
-            except NearlyCriticalError:
-                pass  # powers of the transfer matrix need no eigenvectors
         start = concatenate([matrices.q0, matrices.v0], -2)
         if ground is None:
             step_map, load = self.integrator.step_map(matrices, h), None

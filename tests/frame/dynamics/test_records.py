@@ -95,9 +95,7 @@ def deviation(frame: StoreyFrame, step: float) -> float:
     return max(float((np.abs(v - truth).max(0) / np.abs(truth).max(0)).max()) for v in ways)
 
 
-@pytest.mark.parametrize("large", [40, 1], ids=["powers", "eigenvalues"])
-def test_motions_under_any_record_are_exact(large: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("alphacut.frame.dynamics.flow.LARGE", large)
+def test_motions_under_any_record_are_exact() -> None:
     rng = np.random.default_rng(0)
     for _ in range(12):
         frame = random_structure(rng)
