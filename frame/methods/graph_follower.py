@@ -191,7 +191,7 @@ class GraphFollower:
     ) -> None:
         """Sets what the Taylor models of the best graphs promise at places, and at which points."""
         side = 2.0 * places[2] - 1
-        _, first, second = storage.held.models(0, places)
+        _, first, second = storage.held.models(places)
         g, H = side[:, None] * first, side[:, None, None] * second
         at = storage.points[storage.best[places]]
         low, high = box[0] - at, box[1] - at

@@ -43,7 +43,7 @@ class Storage:
         d, shape = len(self.flow.boxes.names), (len(self.flow.time), len(self.flow.outputs), 2)
         self.points, self.top = np.empty((0, d)), np.full(shape, -np.inf)
         self.steepest = np.zeros(shape[1])
-        self.best, self.held = np.zeros(shape, np.int64), HeldModels.empty((0,), shape, d)
+        self.best, self.held = np.zeros(shape, np.int64), HeldModels.empty(shape, d)
 
     def __len__(self) -> int:
         return len(self.points)

@@ -1,4 +1,4 @@
-"""Taylor models of the trajectories that attain bounds, at their nodes and at those beside."""
+"""Taylor models of the trajectories that attain bounds, at their nodes."""
 
 from __future__ import annotations
 
@@ -14,25 +14,19 @@ Models = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class HeldModels:
-    """Kept parts of jets; of each place (node, output, side) for the one that holds its bound.
+    """Model of the trajectory that holds the bound of each place (node, output, side).
 
     Args:
-        kept: By the number of nodes from a place: value (T, m, 2), and derivatives behind.
+        parts: Values (T, m, 2), and derivatives by d parameters behind.
     """
 
-    kept: dict[int, Models]
+    parts: Models
 
     @classmethod
-    def empty(cls, shifts: tuple[int, ...], shape: tuple[int, ...], d: int) -> HeldModels:
-        """Room for models `shifts` nodes from each place.
-
-        Args:
-            shifts: 0 is the place itself, 1 the next node, −1 the one before.
-            shape: (T, m, 2).
-            d: Number of parameters.
-        """
-        sizes = (shape, (*shape, d), (*shape, d, d))
-        return cls({k: tuple(np.zeros(size) for size in sizes) for k in shifts})  # type: ignore[misc]
+    def empty(cls, shape: tuple[int, ...], d: int) -> HeldModels:
+        """Room for models at places (T, m, 2) with derivatives by d parameters."""
+        value, first, second = map(np.zeros, (shape, (*shape, d), (*shape, d, d)))
+        return cls((value, first, second))
 
     def keep(self, jet: Jet, holder: Array) -> None:
         """Take in the models of trajectories that have become the holders of places.
@@ -41,18 +35,15 @@ class HeldModels:
             jet: Trajectories, V = (S, T, m).
             holder: Which of them holds a place now, shape (T, m, 2); −1 for none.
         """
-        t, o, side = np.unravel_index(np.flatnonzero(holder >= 0), holder.shape)
-        for shift, parts in self.kept.items():
-            near = np.clip(t + shift, 0, len(holder) - 1)
-            for part, model in zip(
-                parts, models_at(jet, (holder[t, o, side], near, o)), strict=True
-            ):
-                part[t, o, side] = model
+        places = np.nonzero(holder >= 0)
+        models = models_at(jet, (holder[places], *places[:2]))
+        for part, model in zip(self.parts, models, strict=True):
+            part[places] = model
 
-    def models(self, shift: int, places: tuple[Array, ...]) -> Models:
-        """Models of the holders of places (t, output, side), `shift` nodes from there."""
-        value, first, second = (part[places] for part in self.kept[shift])
-        return value, first, second
+    def models(self, places: tuple[Array, ...]) -> Models:
+        """Models of the holders of places (node, output, side)."""
+        value, first, second = self.parts
+        return value[places], first[places], second[places]
 
 
 def models_at(jet: Jet, where: tuple[Array, ...]) -> Models:

@@ -41,8 +41,6 @@ class ImprovedFollower:
         spread: Graphs on a spread of points per level that start the search.
         batch: Graphs computed together.
         reach: Trust region of a Taylor model, as a share of the half width of the box.
-        contests: How often, when no model promises more, those of neighbouring nodes are asked
-            where the optimum jumps in between.
         seed: Which points are spread.
 
     Raises:
@@ -55,7 +53,6 @@ class ImprovedFollower:
     spread: int = 64
     batch: int = 32
     reach: float = 0.6
-    contests: int = 1
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -102,7 +99,7 @@ class ImprovedFollower:
     def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
         """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
         levels = len(flow.boxes.alpha)
-        out = Pursuit.empty(flow, self.tolerance, self.reach, beside=self.contests > 0)
+        out = Pursuit.empty(flow, self.tolerance, self.reach)
         d, places = len(flow.boxes.names), len(flow.time) * len(flow.outputs)
         at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, self.batch))
         for done, level in enumerate(reversed(range(levels))):
@@ -110,17 +107,12 @@ class ImprovedFollower:
             out.enter(lower, upper)
             limit = self.budget * (done + 1) // levels
             points = self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))]
-            contests = self.contests
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // at_once)):
                     out.take(chunk)
                 if progress:
                     progress(min(1.0, len(out.points) / self.budget))
                 points = out.proposals(min(self.batch, limit - len(out.points)))
-                while not len(points) and contests and len(out.points) < limit:
-                    out.contest()
-                    contests -= 1
-                    points = out.proposals(min(self.batch, limit - len(out.points)))
             out.leave(level)
         return out
 

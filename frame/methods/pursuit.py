@@ -12,8 +12,6 @@ from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.methods.held_models import HeldModels, models_at
 from alphacut.fuzzy.arrays import Array
 
-JUMP = 0.05
-"""Share of the box's width from which on optima of neighbouring nodes lie in different basins."""
 TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
@@ -59,14 +57,14 @@ class Pursuit:
     reach: float = 0.6
 
     @classmethod
-    def empty(cls, flow: UnitFlow, tolerance: float, reach: float, *, beside: bool) -> Pursuit:
-        """Nothing known yet; `beside` keeps models for contests."""
+    def empty(cls, flow: UnitFlow, tolerance: float, reach: float) -> Pursuit:
+        """Nothing known yet."""
         d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
         levels = len(flow.boxes.alpha)
         low, at = np.full(shape, -np.inf), np.zeros((*shape, d))
         many, where = np.zeros((levels, *shape)), np.zeros((levels, *shape, d))
         grids = (low, at, low.copy(), at.copy(), many, where, many.copy(), many.copy())
-        held = HeldModels.empty((0,) * (levels > 1) + (-1, 1) * beside, shape, d)
+        held = HeldModels.empty(shape, d)
         made = cls(flow, np.zeros((0, d)), *grids, held)
         made.tolerance, made.reach = tolerance, reach
         return made
@@ -77,7 +75,7 @@ class Pursuit:
         self.promise[:] = self.value
         if len(self.points) and (upper > lower).any():
             places = np.nonzero(np.isfinite(self.value))
-            optima = self._optima(self.at[places], self.held.models(0, places), places[-1])
+            optima = self._optima(self.at[places], self.held.models(places), places[-1])
             self.promise[places], self.target[places] = optima
 
     def leave(self, level: int) -> None:
@@ -108,18 +106,6 @@ class Pursuit:
             models = models_at(jet, (holder[places], *places[:2]))
             optima = self._optima(self.at[places], models, places[2])
             self.promise[places], self.target[places] = optima
-
-    def contest(self) -> None:
-        """Ask the models that hold a bound at one node about the next node."""
-        width = JUMP * (self.upper - self.lower).max()
-        jumps = np.argwhere(np.abs(np.diff(self.at, axis=0)).max(-1) > width)
-        for shift in (1, -1):  # of the node asked about from that of the rival
-            t, o, side = np.add(jumps, [shift < 0, 0, 0]).T
-            rivals, places = (t, o, side), (t + shift, o, side)
-            optima = self._optima(self.at[rivals], self.held.models(shift, rivals), side)
-            more = optima[0] > self.promise[places]
-            places = tuple(x[more] for x in places)
-            self.promise[places], self.target[places] = (x[more] for x in optima)
 
     def _optima(
         self, points: Array, models: tuple[Array, Array, Array], side: Array
