@@ -17,11 +17,11 @@ from alphacut.frame.certificate.kernel import stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
 from alphacut.frame.certificate.wave_bounds import _convolved, _largest, parts
 from alphacut.frame.checks.step_error import MARGIN, deviations, step_error
+from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, problems
 from alphacut.fuzzy import Interval
-from tests.frame.mode_responses import responses
 
 PULSE = Accelerogram(0.37, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
 

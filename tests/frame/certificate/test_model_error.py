@@ -27,6 +27,7 @@ from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.ground_response import left_out
 from alphacut.frame.modal.model import ModalModel
@@ -37,7 +38,6 @@ from alphacut.frame.structures.polynomial_dependence import (
     inverse_cube_degree,
 )
 from alphacut.fuzzy import Interval, Triangular
-from tests.frame.mode_responses import responses
 
 FRAME = StoreyFrame(
     (20e3, 15e3, 10e3),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
 from alphacut.frame.structures.linear import Accelerogram
@@ -35,5 +34,7 @@ def responses(
 
 def _recursion(decay: Array, added: Array) -> Array:
     """x[j + 1] = decay x[j] + added[j] from rest, shape (steps, K)."""
+    from scipy.signal import lfilter  # which takes time to import
+
     columns = [lfilter([1.0], [1.0, -d], x) for d, x in zip(decay, added.T, strict=True)]
     return np.stack(columns, 1)
