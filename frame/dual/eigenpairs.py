@@ -31,18 +31,22 @@ import numpy as np
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, symmetric
 from alphacut.frame.dual.homogeneous import Series, packed, product, tensor
 from alphacut.frame.dual.structure import Classical, UncoveredError
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 MOST_MONOMIALS = 33_000
 """Monomials of the series' highest degree, at most."""
 DEGREES = (4, 10)
 """Least and greatest degree of the series."""
+FINE = 3e-4
+"""Doubt of λ and of x·M x, as a share of each, at which no higher degree is tried."""
 ROUGH = 0.05
-"""Doubt of λ or of x·M x, as a share of it, above which a mode is better left in the group."""
+"""Doubt above which a mode is better left in the group."""
 ROUNDS = 60
 """Most rounds in which the bounds of an eigenpair are widened until they hold."""
 REFINED = 8
 """Rounds that improve bounds of single entries by those of the others."""
+CORNERS = 12
+"""Inputs whose signs are all tried together."""
 CLOSE = 1e-9
 """Distance of two λ, as a share of the greatest, below which both modes are left in the group."""
 
@@ -64,9 +68,9 @@ class Mode:
     norm: Series
 
     @property
-    def sharp(self) -> bool:
-        """Whether the mode's own bounds say more than what it adds to a group."""
-        return all(x.rest[0] < ROUGH * x.parts[0][0, 0] for x in (self.squared, self.norm))
+    def doubt(self) -> float:
+        """Greatest doubt of λ and x·M x, as a share of each."""
+        return max(float(x.rest[0] / x.parts[0][0, 0]) for x in (self.squared, self.norm))
 
     def cut(self, degree: int) -> Mode:
         """The same to a lower degree."""
@@ -108,10 +112,10 @@ def modes(structure: Classical) -> Modes:
         raise UncoveredError("dual: the structure may lose its stiffness", "take narrower inputs")
     used = np.union1d(mass.present(), stiffness.present())
     of_mass, of_stiffness = (x.on(used) for x in (mass, stiffness))
-    enclosed = {k: _enclosed(k, of_mass, of_stiffness, used) for k in range(len(middle))}
-    single = {k: mode for k, mode in enclosed.items() if mode is not None and mode.sharp}
+    enclosed = {k: _sharpest(k, of_mass, of_stiffness, used) for k in range(len(middle))}
+    single = {k: mode for k, mode in enclosed.items() if mode is not None}
     low, high = middle * (1 - stiff) / (1 + heavy), middle * (1 + stiff) / (1 - heavy)
-    return Modes(single, basis, mass, low, high)
+    return Modes(single, basis, mass, np.asarray(low, float), np.asarray(high, float))
 
 
 def _seen(matrix: Expansion, basis: Array) -> Expansion:
@@ -123,21 +127,45 @@ def _seen(matrix: Expansion, basis: Array) -> Expansion:
 
 
 def _form(matrix: Expansion, scale: Array) -> float:
-    """Bound of the norm of a form's variation over the box: that of Σ_α |V_α|, as forms."""
+    """Bound of the norm of a form's variation over the box."""
     weight = scale[:, None] * scale
-    low = sum(_form_norm(part, weight) for part in matrix.parts[1:3])
+    low = _lowering(matrix.parts[1], weight)
+    low += max(_lowering(matrix.parts[2], sign * weight) for sign in (1.0, -1.0))
     return low + float(np.linalg.norm(weight * (matrix.sizes()[3] + matrix.rest), 2))
 
 
-def _form_norm(part: Array, weight: Array) -> float:
-    """Bound of the norm of weight * Σ_α u^α V_α: that of Σ_α |V_α|, in the order of forms."""
-    each = np.moveaxis(part.reshape(*weight.shape, -1), -1, 0)
-    value, vector = np.linalg.eigh(each[np.abs(each).any((1, 2))] * weight)
-    total = np.einsum("aij,aj,akj->ik", vector, np.abs(value), vector, optimize=True)
+def _lowering(part: Array, weight: Array) -> float:
+    """Bound of how far weight * Σ_α u^α V_α, of first or second degree, lowers a form over the box.
+
+    Of the first degree, the largest V_α are taken at all corners of the box, where a norm is
+    greatest. Of the others the norm of Σ_α |V_α| in the order of forms counts; of squares only
+    what lowers.
+    """
+    each = np.moveaxis(part.reshape(*weight.shape, -1), -1, 0) * weight
+    if part.ndim == 4:
+        return _norm_of(each, np.eye(part.shape[-1], dtype=bool).ravel())
+    each = each[np.argsort(-np.linalg.norm(each, axis=(1, 2)))]
+    others = each[CORNERS:]
+    return _norm_at_corners(each[:CORNERS]) + _norm_of(others, np.zeros(len(others), bool))
+
+
+def _norm_at_corners(each: Array) -> float:
+    """Greatest norm of Σ_α ± V_α."""
+    if not len(each):
+        return 0.0
+    signs = 1 - 2 * (np.arange(2 ** (len(each) - 1))[:, None] >> np.arange(len(each)) & 1)
+    return float(np.abs(np.linalg.eigvalsh(np.tensordot(signs, each, 1))).max())
+
+
+def _norm_of(each: Array, squares: Mask) -> float:
+    """Norm of Σ_α |V_α|, of those of squares without what raises."""
+    value, vector = np.linalg.eigh(each)
+    lowers = np.where(squares[:, None], np.maximum(-value, 0.0), np.abs(value))
+    total = np.einsum("aij,aj,akj->ik", vector, lowers, vector, optimize=True)
     return float(np.linalg.norm(total, 2))
 
 
-def _series(k: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array], ...]:
+def _series(k: int, degree: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array], ...]:
     """Perturbation series of mode k: (Λ − λ₀) x_m = λ_m e_k − what lower degrees have put there.
 
     Returns:
@@ -151,7 +179,7 @@ def _series(k: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array],
     rate: list[Array] = [np.full((1, 1), middle[k])]
     shape: list[Array] = [unit]
     moved: list[Array] = [unit]
-    for m in range(1, _degree(d) + 1):
+    for m in range(1, degree + 1):
         of_mass, of_stiffness = (
             np.sum([product(x[b], shape[m - b], (b, m - b), d) for b in range(1, min(m, 3) + 1)], 0)
             for x in (heavy, stiff)
@@ -164,6 +192,15 @@ def _series(k: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array],
         shape.append(right / apart)
         moved.append(of_mass + shape[m])
     return rate, shape, moved
+
+
+def _sharpest(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode | None:
+    """Mode k by the least degree that is fine, or the greatest affordable; None if it is rough."""
+    for degree in range(DEGREES[0], _degree(len(used)) + 1):
+        mode = _enclosed(k, degree, mass, stiffness, used)
+        if mode is not None and mode.doubt < FINE:
+            break
+    return mode if mode is not None and mode.doubt < ROUGH else None
 
 
 def _degree(d: int) -> int:
@@ -179,14 +216,16 @@ def _sizes(part: Array) -> Array:
     return np.asarray(np.abs(part).sum(0))
 
 
-def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode | None:
+def _enclosed(
+    k: int, degree: int, mass: Expansion, stiffness: Expansion, used: Rows
+) -> Mode | None:
     """Mode k proved, or None where it is not enclosed."""
     n = len(mass.rest)
     middle = np.diag(stiffness.parts[0])
     if np.abs(np.delete(middle, k) - middle[k]).min(initial=np.inf) <= CLOSE * middle.max():
         return None
-    rate, shape, moved = _series(k, mass, stiffness)
-    N, o = len(rate) - 1, np.delete(np.arange(n), k)
+    rate, shape, moved = _series(k, degree, mass, stiffness)
+    N, o = degree, np.delete(np.arange(n), k)
     pencil, x = _Pencil.of(rate, mass, stiffness), [_sizes(part) for part in shape]
     t = pencil.sizes
     missed = t[-1] @ sum(x) + ROUND_OFF * stiffness.size().max(1)
@@ -201,7 +240,7 @@ def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode
     norm = (x_series * moved_series).through(np.ones((1, n)))
     side: Array = np.sum([_sizes(part) for part in moved], axis=0) + beyond
     heavy = mass.size()
-    comparison = _Comparison.of(pencil, np.abs(middle - middle[k]), o)
+    comparison = _Comparison.of(pencil, middle - middle[k], o)
     least, L = float(2 * norm.parts[0][0, 0] - np.sum(norm.sizes()) - norm.rest[0]), 0.0
     Y: Array = np.zeros(n - 1)
     for _ in range(ROUNDS):
@@ -229,31 +268,44 @@ def _enclosed(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode
 class _Comparison:
     """Bounds of solutions of T y = r by the larger diagonal, or in the norm √Σ D y²; the lesser.
 
+    With A = D^-½ T D^-½ and J = diag ±1, as λ_j is above or below λ_k, (J y)·A y has no part of the
+    blocks that join those above to those below. So |A y| ≥ left |y| where neither the block above
+    nor that below, with its sign turned, falls under `left`.
+
     Args:
         distance: D = |λ_j − λ_k| in the middle of the box, shape (n − 1,).
+        above: Which λ_j are above λ_k, shape (n − 1,).
         diagonal: Bound of |T_jj| from below.
         off: Bounds of |T_jl|, j ≠ l, from above, shape (n − 1, n − 1).
-        turned: Bound of the norm of D^-½ (T − T₀) D^-½.
+        left: Bound of both blocks of J A from below.
     """
 
     distance: Array
+    above: Mask
     diagonal: Array
     off: Array
-    turned: float
+    left: float
 
     @classmethod
-    def of(cls, pencil: _Pencil, distance: Array, o: Rows) -> _Comparison:
+    def of(cls, pencil: _Pencil, apart: Array, o: Rows) -> _Comparison:
+        """Bounds over the box; `apart` are the λ_j − λ_k in its middle, o all but k."""
         total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
-        diagonal = distance[o] - np.diag(total)
-        scale = distance[o] ** -0.5
-        turned = sum(pencil.norm(m, o, scale) for m in range(1, len(pencil.sizes)))
-        return cls(distance[o], diagonal, total - np.diag(np.diag(total)), turned)
+        distance, above = np.abs(apart[o]), apart[o] > 0
+        left = 1 - max(
+            sum(
+                pencil.loss(m, o[block], distance[block], sign) for m in range(1, len(pencil.sizes))
+            )
+            for block, sign in ((above, 1.0), (~above, -1.0))
+        )
+        off = total - np.diag(np.diag(total))
+        return cls(distance, above, distance - np.diag(total), off, left)
 
     def solved(self, right: Array, more: Array) -> Array | None:
         """Bounds of |y| where |r| ≤ right, T off by `more` besides; None if it may be singular."""
         scale = self.distance**-0.5
         y: Array = np.full(len(right), np.inf)
-        left = 1 - self.turned - float(np.linalg.norm(scale[:, None] * more * scale, 2))
+        moved = scale[:, None] * more * scale * (self.above[:, None] == self.above)
+        left = self.left - float(np.linalg.norm(moved, 2))
         if left > 0:
             y = np.asarray(scale * np.linalg.norm(scale * right) / left)
         comparison = np.diag(self.diagonal) - self.off - more
@@ -305,8 +357,10 @@ class _Pencil:
             out[m] = np.minimum(out[m], np.abs(parts[m]).sum(tuple(range(2, 2 + m))))
         return cls(out, parts)
 
-    def norm(self, m: int, o: Rows, scale: Array) -> float:
-        """Bound of the norm of one part of the block o, scaled."""
-        block, weight = np.ix_(o, o), scale[:, None] * scale
+    def loss(self, m: int, o: Rows, distance: Array, sign: float) -> float:
+        """Bound of how far one part of the block o, scaled, lowers its sign × T."""
+        if not len(o):
+            return 0.0
+        block, weight = np.ix_(o, o), sign / np.sqrt(np.outer(distance, distance))
         least = float(np.linalg.norm(self.sizes[m][block] * weight, 2))
-        return min(least, _form_norm(self.parts[m][block], weight)) if m in self.parts else least
+        return min(least, _lowering(self.parts[m][block], weight)) if m in self.parts else least

@@ -21,9 +21,9 @@ from alphacut.frame.dual.eigenpairs import Mode, Modes
 from alphacut.frame.dual.expansion import Expansion, product, stacked
 from alphacut.frame.dual.homogeneous import Series
 from alphacut.frame.dual.structure import Classical, UncoveredError
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
-DEGREE = 5
+DEGREE = 6
 """Degree to which shares are expanded, before those above the third are left to the rest."""
 
 
@@ -80,7 +80,7 @@ def oscillators(
         excited, Expansion.constant(np.asarray(inverse.T, float), zero.inner), "si,ij->sj"
     )
     d = zero.inner
-    found, shares, read, driven = [], [], [], []
+    single, shares, read, driven = [], [], [], []
     for k, mode in modes.single.items():
         a, mode = mode.shape.through(rows).cut(DEGREE), mode.cut(DEGREE)
         shares.append(_shares(excited, mode, a))
@@ -88,10 +88,10 @@ def oscillators(
         b = _driven(excited, mode)
         driven.append(product(b * b, mode.norm.expansion(d)[0] ** -1.0, "s,->s"))
         seen = product(shares[-1], structure.factor, "so,o->so")
-        found.append(_oscillator(structure, modes, k, mode, seen))
+        single.append(_oscillator(structure, modes, k, mode, seen))
     left = sorted(set(range(n)) - set(modes.single))
     if not left:
-        return found, None
+        return single, None
     constant = Expansion.constant(rows, d)
     share = _minus(product(excited, constant, "sj,oj->so"), shares)
     of_rows = product(product(constant, _inverse(modes.mass), "oi,ij->oj"), constant, "oj,oj->o")
@@ -99,10 +99,10 @@ def oscillators(
     A, B = (
         np.maximum(_highest(_minus(x, y)), 0.0) for x, y in ((of_rows, read), (of_start, driven))
     )
-    omega, quotient = _group_range(structure, modes, left)
+    omega, quotient = _group_range(structure, modes, np.array(left))
     doubt = np.sqrt(np.outer(B, A)) * structure.factor.size()
     seen = product(share, structure.factor, "so,o->so")
-    return found, Group(seen, doubt, omega, quotient)
+    return single, Group(seen, doubt, omega, quotient)
 
 
 def _shares(excited: Expansion, mode: Mode, a: Series) -> Expansion:
@@ -146,7 +146,7 @@ def _oscillator(
 
 
 def _group_range(
-    structure: Classical, modes: Modes, left: list[int]
+    structure: Classical, modes: Modes, left: Rows
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Ranges of ω and g/ω of modes that are known by their least and greatest λ alone."""
     low, high = modes.low[left].min(), modes.high[left].max()

@@ -8,25 +8,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.dual import kernel
+from alphacut.frame.dual.dual_function import EXPECTED, Data
 from alphacut.frame.dual.eigenpairs import modes
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion
 from alphacut.frame.dual.homogeneous import monomials, packed
 from alphacut.frame.dual.intervening import Group, Oscillator, oscillators
+from alphacut.frame.dual.slabs import Effort, bounds
 from alphacut.frame.dual.structure import Classical, UncoveredError
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.fuzzy.arrays import Array, Rows
 
-FINE = 0.045
-"""Distance of the points of a mode's table along ω, as a share of its decay; a tenth of half of it
-along g."""
-POINTS = (8, 120), (3, 12)
+FINE = 0.07
+"""Distance of the points of a mode's table along ω and g, as a share of its decay."""
+POINTS = (8, 80), (3, 12)
 """Least and most of them along ω and along g/ω."""
 HUGE = 1e300
-"""Peak that is assumed before it is known: no gap is narrow enough to leave there."""
-FIRST = 40
-"""Most evaluations for a bound before the peaks are known."""
+"""Less than this is no value."""
+LOOSE = 0.1
+"""Gap that suffices far below the peak, as a share of how far."""
+AT_PEAKS = 20
+"""Multiple of the slabs that nodes are worth whose bounds lie above the peak."""
+FLOORS = 1.0, 0.25
+"""Multiples of the remainders' own part below which no effort is made: elsewhere, and there."""
+BLOCK = 40
+"""Nodes of a piece, about."""
 OF_GROUP = (160, 8)
 """The same of the group's, over its own range."""
 
@@ -97,7 +103,7 @@ def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
     for mode in single:
         (low, high), (least, top) = mode.omega_range, mode.quotient_range
         reach = FINE * (max(least, 0.0) * low + 2 / duration)
-        most = [max(most[0], (high - low) / reach), max(most[1], (top - least) * high / reach / 4)]
+        most = [max(most[0], (high - low) / reach), max(most[1], (top - least) * high / reach)]
     return (
         int(np.clip(most[0], *POINTS[0])) + 1,
         int(np.clip(most[1], *POINTS[1])) + 1,
@@ -110,7 +116,9 @@ def _grid(
     """Points that span a range; at least two along each axis."""
     q = quotient if quotient[1] > quotient[0] else (quotient[0], quotient[0] + 1e-12)
     w = omega if omega[1] > omega[0] * (1 + 1e-12) else (omega[0], omega[0] * (1 + 1e-9))
-    return Grid(np.linspace(*w, points[0]), np.linspace(*q, points[1]))
+    return Grid(
+        *(np.asarray(np.linspace(*x, n), float) for x, n in zip((w, q), points, strict=True))
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,14 +159,16 @@ class Level:
         made = tables(single, group, ground, time, sources, orders)
         return cls(structure, single, group, made, sources)
 
-    def bounds(self, enough: Array, effort: tuple[int, int], workers: int) -> tuple[Array, Array]:
+    def bounds(self, enough: Array, slabs: int, steps: int, workers: int) -> tuple[Array, Array]:
         """Upper bounds of (−output, output), shape (T, m, 2), and inputs that lead there.
 
-        A first pass takes few steps at all nodes; a second one halves ranges where gaps are wide.
+        A first pass at all nodes shows the peaks; a second one halves ranges where gaps are wide; a
+        third one halves them further where bounds lie above the peak.
 
         Args:
             enough: Gap of each output at which its bounds are left, shape (m,).
-            effort: Most slabs of a bound, and most evaluations for each.
+            slabs: Most slabs of a bound away from the peaks.
+            steps: Most evaluations of the dual function for each.
             workers: Threads.
 
         Returns:
@@ -167,25 +177,24 @@ class Level:
         problems = [
             Problem.of(self, o, s, float(enough[o])) for o in range(len(enough)) for s in (0, 1)
         ]
-        problems[0].run(np.arange(0), (1, 1))  # compiles before there are threads
-        nodes = np.arange(len(self.tables.time))
-
-        def run(job: tuple[Problem, Rows, tuple[int, int]]) -> None:
-            problem, own, most = job
-            problem.run(own, most)
-
-        for first in (True, False):
-            most = (1, FIRST) if first else effort
-            jobs = [
-                (problem, own, most)
-                for problem in problems
-                for own in _blocks(nodes if first else problem.left(), workers)
-            ]
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(run, jobs))
+        problems[0].run(np.arange(0), 1, 1, 0.0, 0.0)  # compiles before there are threads
+        passes = (
+            (1, 1, 0.0, 0.0),
+            (slabs, steps, LOOSE, FLOORS[0]),
+            (AT_PEAKS * slabs, steps, 1.0, FLOORS[1]),
+        )
+        with ThreadPoolExecutor(workers) as pool:
+            for effort in passes:
+                jobs = [
+                    pool.submit(problem.run, own, *effort)
+                    for problem in problems
+                    for own in _blocks(problem.left(effort[2]))
+                ]
+                for job in jobs:
+                    job.result()
         out = np.stack([problem.out[0] for problem in problems], -1)
         at = np.stack([problem.at for problem in problems], 1)
-        shape = (len(nodes), len(enough), 2)
+        shape = (len(out), len(enough), 2)
         return out.reshape(shape), at.reshape(*shape, -1)
 
     def stray(self) -> Array:
@@ -193,7 +202,8 @@ class Level:
         made = self.tables
         columns = []
         for o in range(len(self.structure.order)):
-            order, total = int(self.structure.order[o]), np.zeros(len(made.time))
+            order = int(self.structure.order[o])
+            total: Array = np.zeros(len(made.time))
             for k, mode in enumerate(self.single):
                 total = total + mode.share.size()[:, o] @ made.stray[order][k]
             if self.group is not None:
@@ -210,7 +220,7 @@ class Problem:
         side: −1 or 1.
         enough: Gap at which a bound is left.
         constant: What the motion has besides the model, and what a bound has besides, (2, T).
-        data: What the kernel reads.
+        data: Models and tables of the output.
         out: Bounds, the model's values, evaluations and slabs, shape (4, T).
         at: Inputs of the model's values, shape (T, d).
     """
@@ -218,41 +228,35 @@ class Problem:
     side: float
     enough: float
     constant: Array
-    data: kernel.Data
+    data: Data
     out: Array
     at: Array
 
     @classmethod
     def of(cls, level: Level, o: int, s: int, enough: float) -> Problem:
-        """Of one output of a level."""
-        order, side = int(level.structure.order[o]), (-1.0, 1.0)[s]
-        total, d = len(level.tables.time), level.structure.rayleigh.inner
-        scale, share, models = _models(level, o)
+        """Bounds of one output of a level, on one side."""
+        side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
-        grids = level.tables.grids
-        place, grid = _places(grids, scale), _grid_numbers(grids)
-        data = (level.tables.value[order], place, grid, scale, share, models, group)
+        data = Data(*_tables(level, o), *_models(level, o), *group)
         out = np.full((4, total), np.inf)
-        out[1] = -np.inf
-        return cls(side, enough, constant, data, out, np.zeros((total, d)))
+        out[1] = -HUGE
+        return cls(side, enough, constant, data, out, np.zeros((total, data.linear.shape[1])))
 
     @property
     def top(self) -> float:
         """The largest value so far, or 0."""
-        return float(max(self.out[1].max(initial=0.0), 0.0))
+        return float(max(self.out[1].max(), 0.0))
 
-    def left(self) -> Rows:
+    def left(self, loose: float) -> Rows:
         """Nodes whose gap is too wide."""
-        allowed = self.enough + kernel.LOOSE * np.maximum(self.top - self.out[1], 0.0)
+        allowed = self.enough + loose * np.maximum(self.top - self.out[1], 0.0)
         return np.flatnonzero(self.out[0] - self.out[1] > allowed)
 
-    def run(self, nodes: Rows, effort: tuple[int, int]) -> None:
-        """Improve the bounds at nodes, with at most so many slabs and evaluations."""
+    def run(self, nodes: Rows, slabs: int, steps: int, loose: float, floor: float) -> None:
+        """Improve the bounds at nodes, with an effort."""
         out, at = np.empty((4, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
-        mu, u = np.zeros(len(self.data[5][0])), np.zeros(self.at.shape[1])
-        top = self.top if effort[0] > 1 else HUGE
-        ends = self.enough, top
-        kernel.bounds(nodes, self.side, *effort, *ends, self.constant, self.data, mu, u, out, at)
+        effort = Effort(slabs, steps, self.enough, self.top, loose, floor)
+        bounds(nodes, self.side, effort, self.constant, self.data, out, at)
         better = out[1] > self.out[1, nodes]
         self.at[nodes[better]] = at[better]
         self.out[1, nodes] = np.maximum(self.out[1, nodes], out[1])
@@ -260,72 +264,76 @@ class Problem:
         self.out[2:, nodes] = out[2:]
 
 
-def _models(level: Level, o: int) -> tuple[kernel.Pair, kernel.Pair, kernel.Models]:
-    """Centres and radii of ω and g, of the shares, and scaled models of all of them."""
-    both = [[mode.omega, mode.decay] for mode in level.single]
-    shares = [[mode.share[s, o] for s in range(len(level.sources))] for mode in level.single]
-
-    def ends(of: list[list[Expansion]]) -> kernel.Pair:
-        return (
-            np.array([[float(x.parts[0]) for x in own] for own in of]),
-            np.array([[_spread(x) for x in own] for own in of]),
-        )
-
-    every = [x for own, share in zip(both, shares, strict=True) for x in [*own, *share]]
-    rows = [_scaled(x, _spread(x)) for x in every]
-    linear, quadratic, cubic, rest = (np.stack(column) for column in zip(*rows, strict=True))
-    size = np.abs(cubic).sum(1)
-    models = (linear, quadratic, rest + kernel.EXPECTED * size, cubic, size)
-    return ends(both), ends(shares), models
+def _ends(every: Sequence[Sequence[Expansion]]) -> tuple[Array, Array]:
+    """Centres and radii of variables, one row a mode."""
+    return (
+        np.array([[float(x.parts[0]) for x in row] for row in every]),
+        np.array([[_spread(x) for x in row] for row in every]),
+    )
 
 
-def _group(level: Level, o: int, side: float) -> tuple[kernel.Triple, Array]:
-    """The group's part of the dual function, and all constants at all nodes."""
+def _tables(level: Level, o: int) -> list[Array]:
+    """The first fields of `Data`: the table, its points, and the ranges of all variables."""
+    grids = level.tables.grids
+    centre, radius = _ends([[mode.omega, mode.decay] for mode in level.single])
+    shares = _ends([[mode.share[s, o] for s in range(len(level.sources))] for mode in level.single])
+    omega = np.stack([np.tile(g.omega, len(g.quotient)) for g in grids])
+    decay = np.stack([(g.quotient[:, None] * g.omega).ravel() for g in grids])
+    scaled = [(x - centre[:, [i]]) / radius[:, [i]] for i, x in enumerate((omega, decay))]
+    start = np.array([[g.omega[0], g.quotient[0]] for g in grids])
+    step = np.array([[g.omega[1], g.quotient[1]] for g in grids]) - start
+    points = np.array([len(grids[0].omega), len(grids[0].quotient)], float)
+    value = level.tables.value[int(level.structure.order[o])]
+    return [value, *scaled, start, step, points, centre, radius, *shares]
+
+
+def _models(level: Level, o: int) -> list[Array]:
+    """The next fields of `Data`: scaled models of all variables."""
+    every = [
+        x
+        for mode in level.single
+        for x in (mode.omega, mode.decay, *(mode.share[s, o] for s in range(len(level.sources))))
+    ]
+    linear, quadratic, cubic, rest = _stacked([_scaled(x, _spread(x)) for x in every])
+    size = np.asarray(np.abs(cubic).sum(1))
+    return [linear, quadratic, cubic, size, rest + EXPECTED * size]
+
+
+def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
+    """The last fields of `Data`, the group's, and all constants at all nodes, (2, T)."""
     made, d, order = level.tables, level.structure.rayleigh.inner, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(made.time)))
     for k, mode in enumerate(level.single):
         constant[1] += mode.share.size()[:, o] @ made.error[order][k]
     if level.group is None:
-        return (np.zeros((0, 1)), np.zeros((0, d)), np.zeros((0, d * (d + 1) // 2))), constant
+        return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
     share, middle = level.group.share[:, o], made.middle[order]
     rows = [_scaled(share[s], 1.0) for s in range(len(level.sources))]
-    linear, quadratic, cubic, rest = (np.stack(column) for column in zip(*rows, strict=True))
+    linear, quadratic, cubic, rest = _stacked(rows)
     rest = rest + np.abs(cubic).sum(1)
     constant[0] += side * share.parts[0] @ middle
     constant[1] += rest @ np.abs(middle) + level.group.doubt[:, o] @ made.half[order]
-    return (middle, linear, quadratic), constant
+    return [middle, linear, quadratic], constant
+
+
+def _stacked(rows: Sequence[tuple[Array, ...]]) -> list[Array]:
+    return [np.stack(column) for column in zip(*rows, strict=True)]
 
 
 def _spread(x: Expansion) -> float:
     return max(float(x.spread()), 1e-9 * abs(float(x.parts[0])), 1e-300)
 
 
-def _scaled(x: Expansion, radius: float) -> tuple[Array, Array, Array, float]:
+def _scaled(x: Expansion, radius: float) -> tuple[Array, ...]:
     """Linear, packed quadratic and cubic parts, and the bound of the rest, over radius."""
     bend, twist = (packed(x.parts[m], m) / radius for m in (2, 3))
     # pairs by rows, as the kernel has them
     lists = monomials(x.inner, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
-    rest = float((x.rest + ROUND_OFF * np.abs(x.parts[0])) / radius)
-    return x.parts[1] / radius, bend[order], twist, rest
+    rest = np.asarray((x.rest + ROUND_OFF * np.abs(x.parts[0])) / radius)
+    return np.asarray(x.parts[1] / radius), bend[order], np.asarray(twist), rest
 
 
-def _blocks(nodes: Rows, workers: int) -> list[Rows]:
-    """Nodes in pieces for the threads."""
-    return np.array_split(nodes, max(1, min(workers, len(nodes) // 40))) if len(nodes) else []
-
-
-def _places(grids: Sequence[Grid], scale: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Scaled ω and g of all points of the modes' tables, each shape (K, Q W)."""
-    centre, radius = scale
-    omega = np.stack([np.tile(g.omega, len(g.quotient)) for g in grids])
-    decay = np.stack([(g.quotient[:, None] * g.omega).ravel() for g in grids])
-    both = [(x - centre[:, [i]]) / radius[:, [i]] for i, x in enumerate((omega, decay))]
-    return both[0], both[1]
-
-
-def _grid_numbers(grids: Sequence[Grid]) -> tuple[Array, Array, tuple[int, int]]:
-    """Starts and steps along ω and q, each (K, 2), and how many points along q and ω."""
-    start = np.array([[g.omega[0], g.quotient[0]] for g in grids])
-    step = np.array([[g.omega[1] - g.omega[0], g.quotient[1] - g.quotient[0]] for g in grids])
-    return start, step, (len(grids[0].quotient), len(grids[0].omega))
+def _blocks(nodes: Rows) -> list[Rows]:
+    """Nodes in pieces for the threads, in order: each node begins where the one before ended."""
+    return np.array_split(nodes, -(-len(nodes) // BLOCK)) if len(nodes) else []

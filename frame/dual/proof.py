@@ -131,7 +131,7 @@ class DualProof:
         moved = sources(flow.system, structure)
         level = Level.of(structure, flow.system.ground, flow.time, moved)
         workers = self.workers or os.cpu_count() or 1
-        outer, unit = level.bounds(self.gap * peak, (self.slabs, self.steps), workers)
+        outer, unit = level.bounds(self.gap * peak, self.slabs, self.steps, workers)
         points = np.tile(centre, (*outer.shape, 1))
         points[..., active] += radius[active] * unit
         points = np.clip(points, low, high)
@@ -192,7 +192,7 @@ def over_box(
 
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
-    """What moves the structure: load, velocity, start."""
+    """Names of what moves the structure: load, velocity, start."""
     moved = np.asarray(structure.start.size().any(-1))
     present = {"load": system.ground is not None, "velocity": moved[1], "start": moved[0]}
     return tuple(name for name, is_there in present.items() if is_there)

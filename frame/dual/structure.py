@@ -174,9 +174,10 @@ def _total(terms: Terms, p: Inputs, n: int) -> Expansion:
     """Sum of arrays times factors, V = (n, n)."""
     out = spread(next(iter(p.values())) * 0.0, np.zeros((n, n)))
     for factor, array in terms:
-        value = p[factor] if isinstance(factor, str) else factor
         try:
-            value = factor(p) if callable(factor) else value
+            value = (
+                factor(p) if callable(factor) else p[factor] if isinstance(factor, str) else factor
+            )
         except (TypeError, AttributeError) as failure:
             raise UncoveredError(
                 f"dual: a factor is not arithmetic ({failure})", "write it with + − * and powers"
@@ -193,5 +194,5 @@ def spread(one: Expansion, array: Array) -> Expansion:
 
 def combined(values: Expansion, arrays: Array) -> Expansion:
     """Sum of functions V = (e,) times arrays of numbers (e, …)."""
-    parts = tuple(np.tensordot(arrays, part, (0, 0)) for part in values.parts)
+    parts = tuple(np.asarray(np.tensordot(arrays, part, (0, 0)), float) for part in values.parts)
     return Expansion(parts, np.tensordot(np.abs(arrays), values.rest, (0, 0)))

@@ -1,4 +1,4 @@
-"""What one oscillator does, over tables of frequency and damping, with the tables' proved error.
+"""Responses of one oscillator over tables of frequency and damping, with the tables' proved error.
 
 An oscillator with decay g and frequency ω (σ = −g + iω) answers a unit of its share by
 
@@ -100,7 +100,7 @@ class Oscillators:
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool
     ) -> tuple[Array, Array]:
-        """What responses stray from bilinear interpolation at most, and sup |G|, each (T,).
+        """Bounds of how far responses stray from bilinear interpolation, and sup |G|, each (T,).
 
         Along ω at constant q, dσ = (−q + i) dω; along q, dσ = −ω dq.
         """
@@ -125,7 +125,7 @@ class Oscillators:
         return np.asarray((h**2 * along + k**2 * across) / 8), np.asarray(zero)
 
     def _stray(self, size: Array, source: str, order: int) -> Array:
-        """What responses stray from straight lines in the step to each node at most, (T,).
+        """Bounds of how far responses stray from straight lines in the step to each node, (T,).
 
         It is h²/8 sup |ë|; ρ̇ = σ ρ + a, so that under a load ë has a and its slope besides; where
         the record ends on another value than zero, e has a kink.
@@ -165,7 +165,8 @@ def absolute_moments(decay: float, ground: Accelerogram, time: Array) -> Array:
     a, h = np.abs(np.asarray(ground.acceleration)), ground.step
     largest = np.append(np.maximum(a[1:], a[:-1]), 0.0)
     last = np.minimum((time / h * (1 + 1e-12)).astype(int), 10**9)
-    out, state = np.zeros((5, len(time))), np.zeros(5)
+    out: Array = np.zeros((5, len(time)))
+    state: Array = np.zeros(5)
     node = 0
     for i in range(int(last.max()) + 1):
         size = largest[i] if i < len(largest) else 0.0
@@ -186,7 +187,7 @@ def _moved(state: Array, decay: float, h: float, size: float) -> Array:
     return np.array(turned)
 
 
-def phases_of(ground: Accelerogram, time: Array) -> tuple[Array, ...]:
+def phases_of(ground: Accelerogram, time: Array) -> tuple[Array, Array, Rows, Array, Rows]:
     """The record and the nodes within it.
 
     Returns:
@@ -196,12 +197,13 @@ def phases_of(ground: Accelerogram, time: Array) -> tuple[Array, ...]:
     a, h = np.asarray(ground.acceleration, float), ground.step
     last = (time / h * (1 + 1e-12)).astype(np.int64)
     count = int(last.max()) + 1
-    left, right = np.zeros(count), np.zeros(count)
+    left: Array = np.zeros(count)
+    right: Array = np.zeros(count)
     left[: len(a) - 1], right[: len(a) - 1] = a[:-1][:count], a[1:][:count]
-    since = np.maximum(time - last * h, 0.0)
+    since: Array = np.maximum(time - last * h, 0.0)
     since[since < 1e-9 * h] = 0.0
     phases, which = np.unique(np.round(since / h, 9), return_inverse=True)
-    return left, right, last, phases * h, which
+    return left, right, last, np.asarray(phases * h), which
 
 
 def loaded(sigma: Array, ground: Accelerogram, time: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope
-from alphacut.frame.dual import kernel
+from alphacut.frame.dual import dual_function as kernel
 from alphacut.frame.dual.level import Level, Problem
 from alphacut.frame.dual.proof import DualProof, over_box, sources
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -202,15 +202,15 @@ def test_any_multipliers_bound_any_motion():
     for o in range(len(level.structure.order)):
         for s, side in enumerate((-1.0, 1.0)):
             problem = Problem.of(level, o, s, 1.0)
-            rows, columns = problem.data[2][2]
+            columns, rows = problem.data.points.astype(int)
             whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.single), 1))
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
-                mu = size * rng.normal(size=len(problem.data[5][0]))
+                mu = size * rng.normal(size=len(problem.data.linear))
                 bound = kernel.dual(
                     mu, whole, node, side, problem.data, np.empty(len(mu)), np.empty(7)
                 )
-                bound += problem.constant[:, node].sum() + kernel.cancelled(mu, problem.data[5])
+                bound += problem.constant[:, node].sum() + kernel.cancelled(mu, problem.data)
                 assert (side * values[:, node, o] <= bound).all()
 
 

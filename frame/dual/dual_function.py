@@ -1,0 +1,297 @@
+"""The dual function of one bound and its minimisation.
+
+Scaled variables are used: ẑ = (z − z₀)/s for each intervening variable, within [−1, 1] over the
+box, so that ẑ(u) = a·u + u·Q u ± R with a, Q and R of order one. For a node, an output and a
+side,
+
+    D(μ) = Σ_k max over the grid of [ Σ_s c₀ e + |s e − μ_s| − μ_ω ω̂ − μ_g ĝ ]
+         + max over u of [ Σ μ (a·u + u·Q u) + the group's share ] + Σ |μ| R
+
+is convex, and a bound for any μ. Its second line is bounded, not solved: inputs whose linear
+part outweighs all that couples them are at an end of the box, one after the other; products of
+the rest count by magnitude.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from alphacut.fuzzy.arrays import Array, Rows
+
+PATIENCE = 12
+"""Steps without half the expected gain after which less is expected."""
+EXPECTED = 0.5
+"""Share of the cubic parts' sizes that is expected of their sum, in which they partly cancel."""
+
+
+class Data(NamedTuple):
+    """Models and tables of K modes for one output: L inputs, Z = K (2 + sources) variables.
+
+    Args:
+        table: Responses, shape (K, sources, T, Q W).
+        omega: Scaled ω of the tables' points, shape (K, Q W).
+        decay: Scaled g of them, the same.
+        start: Least ω and q of each table, shape (K, 2).
+        step: Distances of its points, shape (K, 2).
+        points: Number of points along ω and along q, shape (2,).
+        centre: Centres of ω and g, shape (K, 2).
+        radius: Their radii.
+        share: Centres of the shares, shape (K, sources).
+        reach: Their radii.
+        linear: Linear parts of all scaled variables, shape (Z, L).
+        quadratic: Quadratic parts, packed by rows, shape (Z, L (L + 1)/2).
+        cubic: Cubic parts, packed, shape (Z, monomials).
+        size: Their sizes over the box, shape (Z,).
+        rest: Remainders with `EXPECTED` of `size`, shape (Z,).
+        group_wave: Response of the group, shape (sources, T), or (0, 1).
+        group_linear: Linear parts of its shares, shape (sources, L).
+        group_quadratic: Quadratic parts.
+    """
+
+    table: Array
+    omega: Array
+    decay: Array
+    start: Array
+    step: Array
+    points: Array
+    centre: Array
+    radius: Array
+    share: Array
+    reach: Array
+    linear: Array
+    quadratic: Array
+    cubic: Array
+    size: Array
+    rest: Array
+    group_wave: Array
+    group_linear: Array
+    group_quadratic: Array
+
+
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+loops = njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+
+
+@loops
+def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
+    """Bound of max over the box of linear·u + Σ_{i ≤ j} q_ij u_i u_j, and where about.
+
+    The q_ij are packed by rows, i ≤ j; `u` is written.
+    """
+    d = len(u)
+    full, slack, slope = np.empty((d, d)), np.empty(d), linear.copy()
+    at = 0
+    for i in range(d):
+        for j in range(i, d):
+            full[i, j] = full[j, i] = quadratic[at]
+            at += 1
+    for i in range(d):
+        slack[i] = -abs(full[i, i])
+        for j in range(d):
+            slack[i] += abs(full[i, j])
+    free = np.ones(d, np.bool_)
+    total, moved = 0.0, True
+    while moved:
+        moved = False
+        for i in range(d):
+            if free[i] and abs(slope[i]) >= slack[i] + 2 * max(-full[i, i], 0.0):
+                free[i], moved = False, True
+                u[i] = 1.0 if slope[i] >= 0 else -1.0
+                total += abs(slope[i]) + full[i, i]
+                for j in range(d):
+                    slope[j] += full[i, j] * u[i]
+                    slack[j] -= abs(full[i, j])
+    for i in range(d):
+        if not free[i]:
+            continue
+        size, bend = abs(slope[i]), full[i, i]
+        u[i] = 1.0 if slope[i] >= 0 else -1.0
+        if bend >= 0 or size >= -2 * bend:
+            total += size + bend
+        else:
+            total -= size * size / (4 * bend)
+            u[i] *= size / (-2 * bend)
+        for j in range(i + 1, d):
+            if free[j]:
+                total += abs(full[i, j])
+    return total
+
+
+@loops
+def products(u: Array, out: Array) -> None:
+    """u_i u_j, packed by rows, i ≤ j."""
+    at = 0
+    for i in range(len(u)):
+        for j in range(i, len(u)):
+            out[at] = u[i] * u[j]
+            at += 1
+
+
+@loops
+def add(out: Array, factor: float, row: Array) -> None:
+    """Adds factor × row."""
+    for i in range(len(out)):
+        out[i] += factor * row[i]
+
+
+@loops
+def dot(a: Array, b: Array) -> float:
+    """a·b."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@loops
+def dual(
+    mu: Array, slab: Rows, node: int, side: float, data: Data, gradient: Array, u: Array
+) -> float:
+    """D(μ) without its constants, a subgradient, and the inputs u at which its second line is met.
+
+    `slab` holds, for each mode, the first and last place along ω and along q that its table is read
+    at, shape (K, 4).
+    """
+    modes, sources = data.share.shape
+    gradient[:] = 0.0
+    total, values = 0.0, np.empty(data.omega.shape[1])
+    for k in range(modes):
+        best, at = most_of_mode(mu, k, slab[k], node, side, data, values)
+        total += best
+        first = k * (2 + sources)
+        gradient[first] = -data.omega[k, at]
+        gradient[first + 1] = -data.decay[k, at]
+        for s in range(sources):
+            off = side * data.reach[k, s] * data.table[k, s, node, at] - mu[first + 2 + s]
+            gradient[first + 2 + s] = -1.0 if off >= 0 else 1.0
+    slope, bend = np.zeros(data.linear.shape[1]), np.zeros(data.quadratic.shape[1])
+    for s in range(len(data.group_linear)):
+        add(slope, side * data.group_wave[s, node], data.group_linear[s])
+        add(bend, side * data.group_wave[s, node], data.group_quadratic[s])
+    for z in range(len(mu)):
+        add(slope, mu[z], data.linear[z])
+        add(bend, mu[z], data.quadratic[z])
+    total += box_maximum(slope, bend, u)
+    products(u, bend)
+    for z in range(len(mu)):
+        total += abs(mu[z]) * data.rest[z]
+        gradient[z] += dot(data.linear[z], u) + dot(data.quadratic[z], bend)
+        gradient[z] += np.sign(mu[z]) * data.rest[z]
+    return total
+
+
+@loops
+def most_of_mode(
+    mu: Array, k: int, slab: Rows, node: int, side: float, data: Data, values: Array
+) -> tuple[float, int]:
+    """The first line of D for one mode, and the point of its table at which it is met."""
+    sources, count = data.share.shape[1], int(data.points[0])
+    first = k * (2 + sources)
+    w, g = data.omega[k], data.decay[k]
+    best, at = -1e300, 0
+    for row in range(slab[2], slab[3] + 1):
+        begin, end = row * count + slab[0], row * count + slab[1] + 1
+        for i in range(begin, end):
+            values[i] = -mu[first] * w[i] - mu[first + 1] * g[i]
+        for s in range(sources):
+            e, m = data.table[k, s, node], mu[first + 2 + s]
+            c, r = side * data.share[k, s], side * data.reach[k, s]
+            for i in range(begin, end):
+                values[i] += c * e[i] + abs(r * e[i] - m)
+        top = values[begin]
+        for i in range(begin, end):
+            top = max(top, values[i])
+        if top > best:
+            best, at = top, begin
+            while values[at] != top:
+                at += 1
+    return best, at
+
+
+@loops
+def cancelled(mu: Array, data: Data) -> float:
+    """Bound of Σ μ (cubic part) over the box, less what D(μ) has expected of it."""
+    total, expected = np.zeros(data.cubic.shape[1]), 0.0
+    for z in range(len(mu)):
+        add(total, mu[z], data.cubic[z])
+        expected += abs(mu[z]) * data.size[z]
+    return np.abs(total).sum() - EXPECTED * expected
+
+
+@compiled
+def minimise(
+    mu: Array,
+    slab: Rows,
+    node: int,
+    side: float,
+    data: Data,
+    steps: int,
+    target: float,
+    aim: float,
+    weight: Array,
+    u: Array,
+) -> tuple[float, int]:
+    """The least D(μ) that a deflected subgradient method meets in `steps`, and its μ in `mu`.
+
+    Args:
+        mu: Multipliers to begin with, and the best ones afterwards.
+        slab: As of `dual`.
+        node: Node.
+        side: +1 or −1.
+        data: Models and tables of the output.
+        steps: Most evaluations of D.
+        target: Value below which no effort is made.
+        aim: A value that D cannot fall below, the model's own somewhere.
+        weight: Written: by how much each variable's two sides still differ, in units of D, (Z,).
+        u: Written: inputs that the best multipliers name.
+    """
+    gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
+    here = np.empty(len(u))
+    least, drop, idle, used = np.inf, np.inf, 0, 0
+    weight[:] = 0.0
+    for _ in range(steps):
+        used += 1
+        value = dual(mu, slab, node, side, data, gradient, here)
+        for z in range(len(mu)):
+            weight[z] = 0.8 * weight[z] + abs(gradient[z] * mu[z])
+        if value < least:
+            if least - value > 0.3 * drop:
+                idle = 0
+            least = value
+            best[:], u[:] = mu, here
+        if least <= target:
+            break
+        if drop == np.inf:
+            drop = 0.7 * max(least - aim, 0.0)
+        idle += 1
+        if idle > PATIENCE:
+            drop, idle = 0.5 * drop, 0
+            mu[:], direction[:] = best, 0.0
+            if drop < 0.1 * (target - aim):
+                break
+        elif not deflected(mu, gradient, direction, value - least + drop):
+            break
+    mu[:] = best
+    return least + cancelled(mu, data), used
+
+
+@loops
+def deflected(mu: Array, gradient: Array, direction: Array, gain: float) -> bool:
+    """Move μ against the gradient and what is left of the last direction; False without one."""
+    length = along = 0.0
+    for z in range(len(mu)):
+        along += gradient[z] * direction[z]
+        length += direction[z] ** 2
+    kept = -1.5 * along / length if along < 0 and length > 0 else 0.0
+    length = 0.0
+    for z in range(len(mu)):
+        direction[z] = gradient[z] + kept * direction[z]
+        length += direction[z] ** 2
+    if length < 1e-24:
+        return False
+    for z in range(len(mu)):
+        mu[z] -= gain / length * direction[z]
+    return True
