@@ -1,5 +1,6 @@
 """One mechanism keeps every stage; the case reaches few files."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -93,29 +94,58 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
     assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
 
 
+SMALLER = {
+    "layers = 12": "layers = 3",
+    "size = 0.15": "size = 0.4",
+    'plan = "general"': 'plan = "reduced"',
+    "[0, 0.25, 0.5, 0.75, 1]": "[0, 0.5, 1]",
+    '"1 mm"': '"50 mm"',
+    '"30 s"': '"2 s"',
+    '"5 s"': '"1 s"',
+    '"0.01 s"': '"0.05 s"',
+}
+"""Changes of the paper's case that leave its whole chain, and make it quick."""
+
+
 def test_the_case_reaches_few_files(tmp_path):
-    """Files whose functions hold the case, or the run that holds it, in `run` of a cell."""
-    case, files, before = written(tmp_path, CELL), [], []
+    """Files whose functions hold the case, or the run that holds it, in the whole paper's case."""
+    text = (ROOT / "cases" / "paper.toml").read_text(encoding="utf-8")
+    for old, new in SMALLER.items():
+        assert old in text
+        text = text.replace(old, new)
+    case, files, before = written(tmp_path, text), [], []
 
-    def trace(frame, event, argument):
-        name = frame.f_code.co_filename
-        if event != "call" or not name.startswith(str(ROOT)):
-            return
-        if frame.f_code.co_qualname == "CellTask.__call__" and not before:
+    def started(code, offset):
+        name = code.co_filename
+        if not name.startswith(str(ROOT)) or name in files:
+            return sys.monitoring.DISABLE
+        if code.co_qualname == "CellTask.__call__" and not before:
             before.append(len(files))
-        holds = any(
-            isinstance(x, Case | Content | Chain | Results) for x in frame.f_locals.values()
-        )
-        if holds and name not in files:
+        held = sys._getframe(1).f_locals.values()
+        if any(isinstance(x, Case | Content | Chain | Results) for x in held):
             files.append(name)
+        return None
 
-    sys.setprofile(trace)
+    tool, start = sys.monitoring.PROFILER_ID, sys.monitoring.events.PY_START
+    sys.monitoring.use_tool_id(tool, "files that the case reaches")
+    sys.monitoring.register_callback(tool, start, started)
+    sys.monitoring.set_events(tool, start)
     try:
         assert main(["run", str(case), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     finally:
-        sys.setprofile(None)
-    assert before[0] <= 6, files
-    assert len(files) <= 18, files
+        sys.monitoring.free_tool_id(tool)
+    names = {path.stem for path in tmp_path.glob("out/*.nc")}
+    assert names >= {"modulus", "response", "envelope_E-5s", "envelope_E-m-30s", "shares"}
+    assert 1 <= before[0] <= 6, files
+    assert 6 < len(files) <= 18, files
+
+
+def test_few_files_import_the_case():
+    """Files that name the case or its sections as a whole, for types or to build them."""
+    pattern = re.compile(r"from alphacut\.case\.(case|content|load) import|Results\b.*import")
+    every = [path for path in ROOT.glob("alphacut/**/*.py") if path.parts[-2] != "case"]
+    names = [path for path in every if pattern.search(path.read_text(encoding="utf-8"))]
+    assert 1 <= len(names) <= 18, names
 
 
 def test_a_borrowed_folder_is_not_believed(tmp_path):
