@@ -46,6 +46,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     common.answer(options, document, out, run_text(document))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {document['seconds']:.0f} s")
+        if store.taken:
+            say(f"{len(dict.fromkeys(store.taken))} of the stages were up to date")
         say(f"next: {door('report', folder)}")
     return 0
 

@@ -112,17 +112,17 @@ NAMES = {"s11": "σ$_{11}$(ε$^{(1)}$)", "s12": "σ$_{12}$(ε$^{(2)}$)"}
 
 
 def response(dataset: xarray.Dataset) -> Figure:
-    """p-boxes to the left, membership functions of the quantiles to the right."""
+    """p-boxes above, membership functions of the quantiles below."""
     import matplotlib.pyplot as plt
 
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(1.5 * look.WIDTH, 3.6))
+    drawn, (above, below) = plt.subplots(2, 1, figsize=(look.WIDTH, 1.7 * look.HEIGHT))
     name = NAMES[str(dataset.attrs["quantity"])]
-    p_boxes(left, dataset)
-    left.set_xlabel(f"homogenised {name} (GPa)")
-    quantiles(right, dataset)
-    look.membership_axes(right, f"quantile of {name} (GPa)")
+    p_boxes(above, dataset)
+    above.set_xlabel(f"homogenised {name} (GPa)")
+    quantiles(below, dataset)
+    look.membership_axes(below, f"quantile of {name} (GPa)")
     small: look.Look = {"title": "probability", "fontsize": 8, "title_fontsize": 8}
-    right.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
+    below.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
     return drawn
 
 

@@ -46,6 +46,7 @@ def save(drawn: Figure, stem: Path) -> list[Path]:
     for path in paths:
         with whole_file(path) as partial:
             drawn.savefig(partial, metadata={"Date": None} if path.suffix == ".svg" else None)
+        drawn.set_layout_engine("none")  # laid out once, for both files
     plt.close(drawn)
     return paths
 

@@ -154,9 +154,9 @@ def natures(summary: Document) -> Iterator[str]:
     """A line on the nature of the peaks."""
     each = {name: nature_of(one["nature"]) for name, one in summary.get("envelopes", {}).items()}
     if len(set(each.values())) == 1:
-        yield f"all peaks are {next(iter(each.values()))}"
+        yield f"All peaks are {next(iter(each.values()))}"
     elif each:
-        yield "peaks are " + ", ".join(f"{nature} ({name})" for name, nature in each.items())
+        yield "Peaks are " + ", ".join(f"{nature} ({name})" for name, nature in each.items())
 
 
 def answers(summary: Document) -> list[Row]:
@@ -170,11 +170,10 @@ def answers(summary: Document) -> list[Row]:
 
 
 def drivers(summary: Document) -> Iterator[str]:
-    """A line on what drives the modulus, and the peak of the last output."""
+    """Lines on what drives the modulus, and the peak of the last output."""
     of = {name: one for name, one in summary.get("shares", {}).items() if name == "E"}
-    of |= {f"peak of {x}": one for x, one in [*summary.get("peak_shares", {}).items()][-1:]}
-    if of:
-        yield "driven by " + "; ".join(f"{name}: {_ranked(one)}" for name, one in of.items())
+    of |= {f"the peak of {x}": one for x, one in [*summary.get("peak_shares", {}).items()][-1:]}
+    yield from (f"The width of {name} comes from {_ranked(one)}" for name, one in of.items())
 
 
 def _ranked(shares: Document) -> str:

@@ -22,6 +22,7 @@ from alphacut.report.results import (
     material,
     motion,
     nature_of,
+    natures,
 )
 from alphacut.report.safe import figures
 
@@ -55,7 +56,8 @@ class Page:
         """All sections that the results allow, in reading order."""
         results = (material(self.summary), motion(self.summary), (ANSWERS, answers(self.summary)))
         tables = (table(head, rows) for head, rows in results)
-        yield section("Key results", *tables, paragraphs(*drivers(self.summary)))
+        remarks = [*natures(self.summary), *drivers(self.summary)]
+        yield section("Key results", *tables, paragraphs(*remarks))
         for name in ("microstructure", "modulus", "image", "response"):
             if name in self.summary:
                 yield getattr(self, f"_{name}")(self.summary[name])

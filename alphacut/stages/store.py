@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.io.files import say
 from alphacut.io.netcdf import fingerprint_of, read_dataset, write_dataset
 from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
@@ -74,6 +73,7 @@ class Store:
         fresh: Whether everything is computed anew.
         quiet: Whether nothing is shown.
         workers: Processes of a stage.
+        taken: Names of the stages whose files were up to date.
     """
 
     folder: Path
@@ -81,6 +81,7 @@ class Store:
     fresh: bool = False
     quiet: bool = False
     workers: int = 1
+    taken: list[str] = field(default_factory=list)
 
     def file(self, name: str) -> Path:
         """A file among the results."""
@@ -103,12 +104,11 @@ class Store:
         write_dataset(dataset, self.file(f"{stage.name}.nc"), facts)
 
     def current(self, stage: Stage) -> bool:
-        """True if the file of a stage may be taken, which is then said."""
+        """True if the file of a stage may be taken, which is then noted."""
         path = self.file(f"{stage.name}.nc")
         if self.fresh or not path.is_file() or fingerprint_of(path) != stage.key:
             return False
-        if not self.quiet:
-            say(f"{path} is up to date")
+        self.taken.append(stage.name)
         return True
 
     def stale(self, stages: Iterable[Stage]) -> list[Stage]:

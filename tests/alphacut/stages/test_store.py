@@ -18,7 +18,7 @@ from alphacut.stages import envelope, modulus
 from alphacut.stages.chain import Chain
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, Store
-from tests.alphacut.small import CELL, FRAME, written
+from tests.alphacut.small import CELL, FRAME, SMALLER, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
 
@@ -94,26 +94,10 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
     assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
 
 
-SMALLER = {
-    "layers = 12": "layers = 3",
-    "size = 0.15": "size = 0.4",
-    'plan = "general"': 'plan = "reduced"',
-    "[0, 0.25, 0.5, 0.75, 1]": "[0, 0.5, 1]",
-    '"1 mm"': '"50 mm"',
-    '"30 s"': '"2 s"',
-    '"5 s"': '"1 s"',
-    '"0.01 s"': '"0.05 s"',
-}
-"""Changes of the paper's case that leave its whole chain, and make it quick."""
-
-
 def test_the_case_reaches_few_files(tmp_path):
     """Files whose functions hold the case, or the run that holds it, in the whole paper's case."""
     text = (ROOT / "cases" / "paper.toml").read_text(encoding="utf-8")
-    for old, new in SMALLER.items():
-        assert old in text
-        text = text.replace(old, new)
-    case, files, before = written(tmp_path, text), [], []
+    case, files, before = written(tmp_path, text, **SMALLER), [], []
 
     def started(code, offset):
         name = code.co_filename

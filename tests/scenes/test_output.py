@@ -1,0 +1,117 @@
+"""Closing output of shipped cases, made smaller: few lines, narrow ones; and what they say."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lsim
+
+from tests.alphacut.small import SMALLER, written
+
+ROOT = Path(__file__).parents[2]
+SHORT = ("duration=4 s", "step=0.02 s", "envelope.alpha=[0, 0.5, 1]")
+COARSE = {  # case: most lines, changes of its text, changes of its keys
+    "paper": (20, SMALLER, ()),
+    "building": (25, {}, (*SHORT, "envelope.tolerance=2 mm", "samples=40")),
+    "composite": (25, {}, ("duration=1 s", "envelope.step=0.02 s", "modulus.alpha=[0, 0.5, 1]")),
+    "laboratory-frame": (25, {}, ("duration=2 s",)),
+}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Lines and summary of a run of each case, computed when it is first needed."""
+    done = {}
+
+    def of(name):
+        if name not in done:
+            done[name] = run(name, tmp_path_factory.mktemp(name))
+        return done[name]
+
+    return of
+
+
+def run(name, folder):
+    """Lines that a run prints at its end, and its summary."""
+    _, texts, keys = COARSE[name]
+    for file in (ROOT / "cases").iterdir():
+        (folder / file.name).symlink_to(file)
+    case = written(folder, (ROOT / "cases" / f"{name}.toml").read_text(encoding="utf-8"), **texts)
+    words = [sys.executable, "-m", "alphacut", "run", case.name, "--out", f"results/{name}"]
+    words += ["--no-figures", *(f"--set={key}" for key in keys)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((folder / "results" / name / "summary.json").read_text(encoding="utf-8"))
+    progress = re.compile(r"\d+% done after|^alphacut: warning: ")
+    lines = [x for x in (done.stdout + done.stderr).splitlines() if not progress.search(x)]
+    return lines, summary
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name == "composite")) for name in COARSE],
+)
+def test_the_closing_output_fits_on_a_screen(runs, name):
+    lines, _ = runs(name)
+    assert len(lines) <= COARSE[name][0], "\n".join(lines)
+    assert max(map(len, lines)) <= 80, "\n".join(lines)
+    assert any("peak of" in line for line in lines)
+    assert "next: " in lines[-1]
+
+
+def motion(young, roof, height, mass_damping, stiffness_damping):
+    """Roof displacement, drift and base shear of the building, by scipy, shape (T, 3), in SI."""
+    time = np.arange(0, 4 + 1e-9, 0.01)
+    text = (ROOT / "cases" / "building.record.csv").read_text(encoding="utf-8")
+    record = np.array([x.split(",") for x in text.splitlines() if x[:1].isdigit()], float)
+    masses = np.array([40e3] * 7 + [roof])
+    lengths = np.array([height] + [3.2] * 7)
+    stiff = 24 * young * 3.2e-3 / lengths**3
+    whole = (
+        np.diag(stiff + np.append(stiff[1:], 0)) - np.diag(stiff[1:], 1) - np.diag(stiff[1:], -1)
+    )
+    inverse = np.diag(1 / masses)
+    damping = mass_damping * np.eye(8) + stiffness_damping * inverse @ whole
+    system = np.block([[np.zeros((8, 8)), np.eye(8)], [-inverse @ whole, -damping]])
+    force = np.concatenate([np.zeros(8), -np.ones(8)])[:, None]
+    ground = np.interp(time, record[:, 0], record[:, 1])
+    states = lsim((system, force, np.eye(16), np.zeros((16, 1))), ground, time)[2]
+    q = states[:, :8]
+    return np.stack([q[:, 7], q[:, 0], stiff[0] * q[:, 0]], axis=1)
+
+
+def test_the_building_moves_as_another_program_computes_it(runs):
+    """The nominal peaks agree; random motions of the box stay inside, and corners come near."""
+    _, summary = runs("building")
+    peaks = summary["envelopes"]["all"]["peak"]
+    names = ("q8", "drift1", "base_shear")
+    modulus = summary["modulus"]["E_GPa"]
+    nominal = motion(1e9 * modulus["lower"][-1], 30e3, 4.0, 0.5, 2.5e-3)
+    lower, upper, error = (
+        np.array([peaks[x][k] for x in names]) for k in ("lower", "upper", "error")
+    )
+    top = np.abs(nominal).max(axis=0)
+    assert top == pytest.approx(upper[:, -1], rel=2e-2)
+    assert top == pytest.approx(lower[:, -1], rel=2e-2)
+    ends = [
+        (1e9 * modulus["lower"][0], 1e9 * modulus["upper"][0]),
+        (28e3, 34e3), (3.92, 4.08), (0.4, 0.6), (2e-3, 3e-3),
+    ]  # fmt: skip
+    rng, box = np.random.default_rng(), np.array(ends).T
+    inside = box[0] + rng.random((60, 5)) * (box[1] - box[0])
+    corners = np.array(np.meshgrid(*ends)).reshape(5, -1).T
+    tried = np.array([np.abs(motion(*x)).max(axis=0) for x in (*inside, *corners)])
+    slack = error[:, 0] + 2e-3 * top  # of the steps of this program
+    assert (tried <= upper[:, 0] + slack).all()
+    assert (tried >= lower[:, 0] - slack).all()
+    assert (tried.max(axis=0) >= 0.95 * upper[:, 0]).all()
+    share = summary["probability"]["events"]["drift1"]
+    assert share["limit"] == pytest.approx(0.04)
+    if upper[1, 0] + error[1, 0] < share["limit"]:
+        assert max(share["upper"]) == 0
