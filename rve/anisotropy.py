@@ -15,7 +15,6 @@ C11 is then (C11 + C22)/2.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
@@ -66,32 +65,3 @@ def shear_ratio(stiffness: Array) -> float:
     Of a plane stiffness, or of one in space, whose last entry is C44.
     """
     return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[-1, -1]))
-
-
-def rotated(stiffness: Array, angle: ArrayLike) -> Array:
-    """The stiffness seen in axes turned by `angle`.
-
-    Args:
-        stiffness: Voigt order (11, 22, 12 with 2 ε12), shape (3, 3), in Pa.
-        angle: Any shape, in radians.
-
-    Returns:
-        Shape (…, 3, 3), in Pa.
-    """
-    c, s = np.cos(angle), np.sin(angle)
-    # strain in the turned axes from strain in the old ones
-    turn = np.array(
-        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
-    )
-    back = np.linalg.inv(np.moveaxis(turn, (0, 1), (-2, -1)))
-    return np.asarray(np.swapaxes(back, -1, -2) @ stiffness @ back)
-
-
-def directional_young(stiffness: Array, angle: ArrayLike) -> Array:
-    """Plane-strain Young's modulus along `angle` (radians) of a bar with free sides, in Pa."""
-    return np.asarray(1 / np.linalg.inv(rotated(stiffness, angle))[..., 0, 0])
-
-
-def directional_shear(stiffness: Array, angle: ArrayLike) -> Array:
-    """Shear modulus in axes along `angle` (radians), in Pa: σ12 over 2 ε12."""
-    return np.asarray(1 / np.linalg.inv(rotated(stiffness, angle))[..., 2, 2])

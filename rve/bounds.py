@@ -34,22 +34,6 @@ def bulk_modulus(stiffness: Array) -> Array:
     return np.asarray((stiffness[..., 0, 0] + stiffness[..., 1, 1] + 2 * stiffness[..., 0, 1]) / 4)
 
 
-def hashin_shtrikman_bulk(
-    fraction: Array, matrix: AnyPhase, inclusion: AnyPhase
-) -> tuple[Array, Array]:
-    """Bounds of the in-plane bulk modulus, in Pa (Hashin & Rosen 1964; Hashin 1965)."""
-    bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
-    shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
-    share = np.asarray(fraction)
-
-    def around(k: int, other_share: Array) -> Array:
-        gap = 1.0 / (bulk[1 - k] - bulk[k]) if bulk[1 - k] != bulk[k] else np.inf
-        return np.asarray(bulk[k] + other_share / (gap + (1 - other_share) / (bulk[k] + shear[k])))
-
-    ends = around(0, share), around(1, 1 - share)
-    return np.minimum(*ends), np.maximum(*ends)
-
-
 def harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> Array:
     """Harmonic mean of matrix's and particle's moduli, each with `around` added, less that."""
     first, second = moduli

@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman_bulk, reuss, voigt
+from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman, reuss, voigt
 from alphacut.rve.cell import AnyPhase, Phase
 
 ROUND_OFF = 1e-9
@@ -81,7 +81,7 @@ def stiffness_checks(
         "voigt": _below(high - mean, mean),
     }
     if all(isinstance(phase, Phase) for phase in phases):
-        least, greatest = (weights @ bound for bound in hashin_shtrikman_bulk(fraction, *phases))
+        least, greatest = (weights @ bound for bound in hashin_shtrikman(fraction, *phases)[0])
         bulk = float(bulk_modulus(mean))
         checks["hashin_shtrikman"] = max(0.0, float(least) - bulk, bulk - float(greatest)) / bulk
     return checks

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, shear_modulus
-from alphacut.rve.cell import STRAIN, Cell, square_moduli, square_voigt, with_ratio_errors
+from alphacut.rve.cell import STRAIN, Cell, square_moduli, with_ratio_errors
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -274,24 +274,3 @@ def error_of_means(result: Homogenised) -> Array:
     """
     s11, _, s12 = np.abs([result.curve.mean[0], 0.0, result.curve.mean[1]]) * result.modulus_errors
     return np.array([result.estimated_error * result.modulus, result.poisson_error, s11, s12])
-
-
-def error_of_stiffness(result: Homogenised, function: Callable[[Array], Array | float]) -> Array:
-    """Absolute error of a function of the plane stiffness.
-
-    The exact stiffness has the symmetry of the square; what a mesh lacks of it is known and counts
-    besides the declared errors of the three moduli.
-
-    Args:
-        result: With its whole plane stiffness.
-        function: Takes a Voigt matrix, shape (3, 3), in Pa.
-
-    Returns:
-        Of the function's shape, nan where no error was made.
-    """
-
-    def of_moduli(values: Array) -> Array:
-        return np.asarray(function(square_voigt(*values)))
-
-    uneven = abs(np.asarray(function(np.asarray(result.stiffness))) - of_moduli(result.moduli))
-    return np.asarray(uneven + result.error_of(of_moduli))

@@ -33,6 +33,7 @@ _ROUND_OFF = 1e-13
 _CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
 _COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
+_ELONGATED = 1.5  # safety of particles that are not round, whose ends bend more
 _POINTWISE = 1.5  # safety of a single θ, where errors do not average
 _SHARED = np.array([0.03, 0.5, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
@@ -159,7 +160,7 @@ class Slice:
         """
         moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 4)
         own = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
-        gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2)
+        gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2) * (1 if square else _ELONGATED)
         return np.asarray((1 + own) * (1 + self._error_of_highest(gaps)) - 1)
 
     def _error_of_highest(self, gaps: Array) -> Array:
