@@ -115,6 +115,15 @@ def test_the_inverse_is_below_and_near():
     assert above > 50  # so that an inverse without the margin would not pass
 
 
+def test_an_inverse_that_is_off_all_over(monkeypatch):
+    """The error of a wrong inverse of a multiple of the unit matrix is its bound."""
+    exact, off = np.eye(3) / 2, 1e-3
+    monkeypatch.setattr(np.linalg, "inv", lambda matrix: exact + off * np.eye(3))
+    below = inverse_below(2 * np.eye(3))
+    assert np.linalg.eigvalsh(exact - below)[0] >= 0
+    assert np.linalg.eigvalsh(exact - (exact + off * np.eye(3) + below) / 2)[0] < 0
+
+
 def rational(stiffness, average):
     """K, G, E and ν of an average, exactly."""
     c = [[Fraction(x) for x in row] for row in stiffness.tolist()]
