@@ -92,7 +92,7 @@ class LagrangianFlow(March):
 
     @cached_property
     def _observation(self) -> Expressions:
-        """Outputs of (state, parameters)."""
+        """Outputs of (state, parameters) (eq. 18)."""
         import sympy
 
         eq, (own, rest) = self.system.symbols, self._symbols

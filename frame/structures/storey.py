@@ -208,7 +208,7 @@ class StoreyFrame:
         return above * self._of_floors("l{}", p) ** -1
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
-        """M, D, K and the initial state, at S parameter sets."""
+        """M, D, K and the initial state, at S parameter sets (eq. 23)."""
         mass, links = self._of_floors("m{}", p).map(diagonal), self.springs(p)
         elastic = links.map(chain)
         placed = chain if self.damper_placement == "storey" else diagonal

@@ -9,10 +9,10 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 39_050,
-    "files of the packages": 299,
-    "places of fmt: skip": 18,
-    "places that raise": 405,
+    "lines of the packages": 37_700,
+    "files of the packages": 288,
+    "places of fmt: skip": 17,
+    "places that raise": 398,
 }
 VAGUE_NAMES = 64  # reached; the bound is 0
 ODD_DOCSTRINGS = 29  # likewise
