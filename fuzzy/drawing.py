@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BLUE = "#0072B2"
-_DOTTED = {"color": "black", "linestyle": ":", "linewidth": 0.8}
 
 
 def new_axes(axes: Axes | None) -> Axes:
@@ -42,7 +41,7 @@ def draw_membership(axes: Axes, alpha: Array, lower: Array, upper: Array, error:
     axes.plot(x, y, color=_BLUE, linewidth=1.8)
     axes.fill(x, y, color=_BLUE, alpha=0.12, linewidth=0)
     for end in (lower - error, upper + error):
-        axes.plot(end, alpha, **_DOTTED)
+        axes.plot(end, alpha, color="black", linestyle=":", linewidth=0.8)
     axes.set(ylabel="membership μ", ylim=(0, 1.08))
 
 
@@ -60,9 +59,9 @@ def draw_bands(
         error: Of the widest band, drawn dotted, shape (A, T).
     """
     for grade, low, high in zip(alpha, lower, upper, strict=True):
-        look = {"color": _BLUE, "alpha": 0.15 + 0.45 * grade, "linewidth": 0.4}
-        axes.fill_between(time, low, high, label=f"α = {grade:g}", **look)
+        shade, name = 0.15 + 0.45 * float(grade), f"α = {grade:g}"
+        axes.fill_between(time, low, high, color=_BLUE, alpha=shade, linewidth=0.4, label=name)
     for end in (lower[0] - error[0], upper[0] + error[0]):
-        axes.plot(time, end, **_DOTTED)
+        axes.plot(time, end, color="black", linestyle=":", linewidth=0.8)
     axes.set(xlabel="time [s]")
     axes.legend(fontsize="small", frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
