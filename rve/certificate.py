@@ -118,7 +118,7 @@ def certify(
     share: tuple[Array, Array],
     phases: tuple[AnyPhase, AnyPhase],
 ) -> dict[str, float]:
-    """What the means of every right result have, measured.
+    """Measures of what the means of every right result have.
 
     Args:
         stress: As in `load_checks`.

@@ -104,7 +104,7 @@ class Homogenised:
 
     @property
     def convention(self) -> str:
-        """What E and ν are of, in words."""
+        """The average that E and ν are of, in words."""
         return AVERAGES[self.average]
 
     def __repr__(self) -> str:

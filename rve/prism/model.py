@@ -223,7 +223,7 @@ class PrismModel:
 
     @property
     def _roughly(self) -> float:
-        """What a mesh adds to the stiffness at most, where no error is declared."""
+        """Most that a mesh adds to the stiffness, where no error is declared."""
         return 0.1 * self.mesh_size ** (3 if self.interface == "conforming" else 1)
 
 

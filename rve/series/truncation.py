@@ -1,4 +1,4 @@
-"""Where a multipole series is cut off: for each cell as late as its declared error asks."""
+"""Truncation of a multipole series: for each cell as late as its declared error asks."""
 
 from __future__ import annotations
 

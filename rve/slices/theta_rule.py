@@ -43,7 +43,7 @@ class RuleError(FailedError):
 
 
 def breaks(radius_map: RadiusMap) -> Array:
-    """The θ at which the map jumps or its slope does, rising; found by sampling and bisection.
+    """The θ at which the map jumps or its slope does, rising; by sampling and bisection.
 
     What is narrower than a two-thousandth of the support falls between the samples and is not seen.
     """
@@ -60,8 +60,8 @@ def breaks(radius_map: RadiusMap) -> Array:
     bends = [_bisect_bend(radius_map, theta[k], theta[k + 2]) for k in bent]
     step = theta[1] - theta[0]
     kinks = [x for x in bends if all(abs(x - jump) > 3 * step for jump in jumps)]
-    found = np.sort(np.array(jumps + kinks))
-    return found[np.append(True, np.diff(found) > step)] if found.size else found
+    every = np.sort(np.array(jumps + kinks))
+    return every[np.append(True, np.diff(every) > step)] if every.size else every
 
 
 _kept_breaks = lru_cache(maxsize=64)(breaks)
@@ -126,7 +126,7 @@ def settle_rule(
         radius_map: The map.
         stiffness_at: Stiffness at n radii for m inclusions, shape (n, m, 3, 3) or (n, m, 6, 6);
             cheap.
-        points: Nodes, or None to have them found.
+        points: Nodes, or None for as many as settle.
         accuracy: Relative error of every mean modulus that counts as settled.
         moduli: The three moduli of a stiffness, and what else of it is to be judged.
 
