@@ -113,6 +113,7 @@ class MatrixStructure:
         for kind, array in pairs:
             if array.shape != (n, n):
                 raise RefusedError(f"array of {kind}", f"of shape {array.shape}", f"({n}, {n})")
+        vectors: list[tuple[str, Any, tuple[int, ...]]]
         vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
         vectors += [(f"observed: {k}", row, (n, 2 * n)) for k, row in self.observed.items()]
         for name, value, lengths in vectors:

@@ -96,7 +96,7 @@ class StoreyFrame:
         filled: dict[str, Sequence[float]] = {
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
         }
-        filled["damping_ratio"] = tuple(np.atleast_1d(self.damping_ratio).tolist())
+        filled["damping_ratio"] = tuple(map(float, np.atleast_1d(self.damping_ratio)))
         filled["stiffness"] = tuple(self.stiffness)
         if not filled["stiffness"]:
             filled["columns"] = tuple(self.columns) or (2.0,) * n
