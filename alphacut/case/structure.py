@@ -42,11 +42,6 @@ class Structure:
         """Names of the observed quantities."""
         return self.model.outputs
 
-    @property
-    def takes_modulus(self) -> bool:
-        """True if Young's modulus is a parameter of it."""
-        return "E" in self.numbers
-
     def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
         """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.
 

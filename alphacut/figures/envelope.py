@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from functools import partial
 from textwrap import fill
@@ -51,7 +52,7 @@ def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure
     linear = output.startswith(("q", "v", "a", "drift", "shear", "base", "roof"))
     fuzzy = (INPUTS.get(name, name) if linear else name for name in task.fuzzy)
     title = f"{Output(output).words}; fuzzy: {', '.join(fuzzy)}; {words}"
-    look.title(axes, fill(title, 80))
+    look.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     look.alpha_legend(axes, alpha)
     return drawn
 
@@ -71,7 +72,8 @@ def time_axes(axes: Axes, time: Array, output: str) -> None:
     """Axes of an output over time."""
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time t (s)")
-    look.prefix_axis(axes, output, Output(output).unit)
+    name = Output(output).words.removesuffix(f" ({output})")
+    look.prefix_axis(axes, name, Output(output).unit)
 
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:

@@ -56,7 +56,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
             loc="left",
             fontsize=9,
         )
-    panels[4].set_xlabel("time t, s")
+    panels[4].set_xlabel("time t (s)")
     for panel in panels[::2]:
         prefix_axis(panel, output, Output(output).unit)
     return drawn

@@ -138,24 +138,3 @@ def document(variables: xarray.Dataset) -> Document:
             **cuts("exceedance", 1.0),
         }
     return numbers
-
-
-def table(numbers: Document) -> list[tuple[str, ...]]:
-    """Each fuzzy quantity with its lowest and highest cut, in words."""
-    rows = [("mean", numbers["mean_GPa"], " GPa")]
-    rows += [
-        (f"quantile {entry['probability']:g}", entry["GPa"], " GPa")
-        for entry in numbers["quantiles"]
-    ]
-    if limit := numbers.get("exceedance"):
-        rows.append((f"probability of more than {limit['limit_GPa']:g} GPa", limit, ""))
-    return [
-        (
-            name,
-            *(
-                f"[{ends['lower'][level]:.4f}, {ends['upper'][level]:.4f}]{unit}"
-                for level in (0, -1)
-            ),
-        )
-        for name, ends, unit in rows
-    ]

@@ -10,9 +10,9 @@ from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
     "lines of the packages": 37_700,
-    "files of the packages": 288,
+    "files of the packages": 287,
     "places of fmt: skip": 17,
-    "places that raise": 398,
+    "places that raise": 396,
 }
 VAGUE_NAMES = 64  # reached; the bound is 0
 ODD_DOCSTRINGS = 29  # likewise
