@@ -160,7 +160,8 @@ class Bounds:
     def _check_proof(self) -> None:
         """Refuse bounds that contradict each other by more than their error and rounding."""
         near = self._near
-        if (self.lower > self.upper + near).any():
+        estimated = np.where(self._guaranteed, 0.0, np.nan_to_num(self.error))
+        if (self.lower > self.upper + near + estimated).any():
             raise FailedError("a lower bound lies above its upper bound")
         wide = near + np.nan_to_num(self.error)
         both = (wide[1:] + wide[:-1])[: len(wide) - 1]
