@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import DualProof, Nature, envelope
+from alphacut.frame import DualProof, envelope
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy import Nature
 from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached
 
