@@ -51,6 +51,7 @@ def answer(section: Tolerances, motion: Motion) -> Document:
     return {
         "limits": limits,
         "kept": scale.kept,
+        "clear": scale.clear,
         "passed": scale.passed if math.isfinite(scale.passed) else None,
         "most": section.most,
         "nature": str(scale.nature),
@@ -65,6 +66,8 @@ def rows(document: Document) -> list[Row]:
     kept, passed = document["kept"], document["passed"]
     scale = "none" if kept is None else f"up to {kept:.4g}"
     beyond = f"passed at {passed:.4g}" if passed is not None else "none passed"
+    if passed is not None and document["clear"] is not None:
+        beyond = f"none found to {document['clear']:.4g}, {beyond}"
     head = ("scale of all tolerances", scale, document["nature"], beyond)
     return [head, *(_row(name, one, document) for name, one in document["supports"].items())]
 

@@ -1,8 +1,9 @@
 """Tolerances: the largest scale of all supports at which every limit is kept.
 
 Supports are scaled about their modal values. The scale is halved between one whose envelope
-excludes that a limit is passed and one whose envelope shows that it may be. Each step is one call
-of `envelope` on the support alone, and as sure as its nature.
+excludes that a limit is passed and one whose envelope does not. Where these bounds leave a doubt,
+it is halved once more, between a scale at which no motion tried passes a limit and one at which a
+motion does. Each step is one call of `envelope` on the support alone, and as sure as its nature.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ class Tolerances:
     Args:
         kept: Largest scale tried at which passing a limit is excluded; None where it is at none,
             not even at scale 0.
+        clear: Largest scale tried at which no motion that was looked at passes a limit; None where
+            it is at none.
         passed: Least scale tried at which a limit is passed by a motion that is known; infinite
             where none was met.
         supports: Supports at the scale `kept`, by input, in SI units.
@@ -38,6 +41,7 @@ class Tolerances:
     """
 
     kept: float | None
+    clear: float | None
     passed: float
     supports: Mapping[str, tuple[float, float]]
     nature: Nature
@@ -108,13 +112,18 @@ def tolerances(
             progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
-    low = most if step_at(most).kept else 0.0
+    low, near = (most if step_at(most).kept else 0.0), precision * most
     if low == 0.0 and step_at(0.0).kept:
-        low = _halved(step_at, low, most, precision * most)
+        low = _halved(lambda scale: step_at(scale).kept, low, most, near)
     passed = min((scale for scale, one in tried.items() if one.passed), default=np.inf)
+    clear = max((scale for scale in tried if scale < passed), default=None)
+    if clear is not None and passed < np.inf:
+        clear = _halved(lambda scale: not step_at(scale).passed, clear, passed, near)
+        passed = min(scale for scale, one in tried.items() if one.passed)
     supports = {name: (x.support.lower, x.support.upper) for name, x in scaled(inputs, low).items()}
     best = tried[low]
-    return Tolerances(low if best.kept else None, passed, supports, best.nature, len(tried))
+    kept = low if best.kept else None
+    return Tolerances(kept, clear, passed, supports, best.nature, len(tried))
 
 
 class _Step(NamedTuple):
@@ -132,9 +141,9 @@ def _judged(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
     return _Step(kept, any(ends[x].lower[0] > limit for x, limit in limits.items()), nature)
 
 
-def _halved(step_at: Callable[[float], _Step], low: float, high: float, near: float) -> float:
-    """Largest scale kept, from one that is kept and one that is not."""
+def _halved(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
+    """Largest scale at which something holds, from one at which it does and one at which not."""
     while high - low > near:
         middle = (low + high) / 2
-        low, high = (middle, high) if step_at(middle).kept else (low, middle)
+        low, high = (middle, high) if holds(middle) else (low, middle)
     return low

@@ -114,6 +114,7 @@ def test_the_scale_of_tolerances_is_kept_and_a_greater_one_passed():
         ONE, inputs, {"q1": limit}, duration=6, step=0.01, most=3, precision=0.003, error=2e-4
     )
     assert answer.nature is Nature.GUARANTEED
+    assert answer.kept <= answer.clear < answer.passed
     assert answer.kept <= 1.4 <= answer.passed
     assert answer.passed - answer.kept <= 0.03
     assert answer.supports["m1"] == pytest.approx(
