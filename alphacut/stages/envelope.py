@@ -64,8 +64,10 @@ class EnvelopeTask:
         raise RefusedError("envelope.tolerance", value, f"a share, or {', '.join(sorted(units))}")
 
     def options(self, structure: Structure) -> dict[str, object]:
-        """Options of the method."""
+        """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
         method, own = self.section.method, self.tolerance(structure).value
+        if method == "auto" and not self.section.names("tolerance"):
+            return {}
         share = self.section.gain if method in FOLLOWERS else 1.0
         every: dict[str, object] = {"tolerance": own * share}
         return {name: every[name] for name in every if name in options_of(method)}

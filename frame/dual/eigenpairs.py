@@ -109,7 +109,7 @@ def modes(structure: Classical) -> Modes:
     mass, stiffness = (_seen(x, basis) for x in (structure.mass, structure.stiffness))
     heavy, stiff = _form(mass, np.ones(len(middle))), _form(stiffness, middle**-0.5)
     if not (heavy < 1 and stiff < 1):
-        raise UncoveredError("dual: the structure may lose its stiffness", "take narrower inputs")
+        raise UncoveredError("the structure may lose its stiffness", "take narrower inputs")
     used = np.union1d(mass.present(), stiffness.present())
     of_mass, of_stiffness = (x.on(used) for x in (mass, stiffness))
     enclosed = {k: _sharpest(k, of_mass, of_stiffness, used) for k in range(len(middle))}

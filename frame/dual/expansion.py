@@ -155,7 +155,7 @@ class Expansion:
         least = middle - spread
         if not (least > 0).all():
             raise UnprovedError(
-                "dual: a quantity that must be positive is not known to be so over the box",
+                "a quantity that must be positive is not known to be so over the box",
                 "take narrower inputs",
             )
         step = Expansion((np.zeros_like(middle), *self.parts[1:]), self.rest)

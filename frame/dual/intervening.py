@@ -161,7 +161,7 @@ def _group_range(
     most = max(damping(a, 0, zeta[0], low) + b * np.sqrt(high) / 2, 0.0)
     least = max(damping(below[0], 0, zeta[1], high) + below[1] * np.sqrt(low) / 2, 0.0)
     if most >= 1:
-        raise UncoveredError("dual: a mode may not oscillate", "take less damping")
+        raise UncoveredError("a mode may not oscillate", "take less damping")
     steep = np.sqrt(1 - most**2)
     return (float(np.sqrt(low) * steep), float(np.sqrt(high))), (least, float(most / steep))
 
@@ -190,5 +190,5 @@ def _inverse(mass: Expansion) -> Expansion:
     size = step.size()
     tail = np.linalg.matrix_power(size, 4) @ np.linalg.inv(one - size)
     if np.abs(np.linalg.eigvals(size)).max() >= 1:
-        raise UncoveredError("dual: masses vary too much", "take narrower inputs")
+        raise UncoveredError("masses vary too much", "take narrower inputs")
     return out.loosened(tail)

@@ -154,7 +154,7 @@ class Level:
         """
         single, group = oscillators(structure, modes(structure), sources)
         if not single:
-            raise UncoveredError("dual: no mode keeps clear of the others", "take narrower inputs")
+            raise UncoveredError("no mode keeps clear of the others", "take narrower inputs")
         orders = sorted({int(order) for order in structure.order})
         made = tables(single, group, ground, time, sources, orders)
         return cls(structure, single, group, made, sources)

@@ -173,7 +173,7 @@ def _exact(flow: UnitFlow) -> LinearFlow:
     linear = flow.flow
     if not isinstance(linear, LinearFlow) or not isinstance(linear.integrator, Exact):
         raise UncoveredError(
-            "dual: the motion is not the exact one of a linear structure",
+            "the motion is not the exact one of a linear structure",
             "take a linear structure and the integrator exact",
         )
     return linear

@@ -63,7 +63,7 @@ def classical(system: LinearSystem, p: Inputs) -> Classical:
     """
     del p
     raise UncoveredError(
-        f"dual: a {type(system).__name__} is not covered", "take a StoreyFrame or a MatrixStructure"
+        f"a {type(system).__name__} is not covered", "take a StoreyFrame or a MatrixStructure"
     )
 
 
@@ -101,16 +101,14 @@ def _(system: StoreyFrame, p: Inputs) -> Classical:
 def _(system: MatrixStructure, p: Inputs) -> Classical:
     if system.damping:
         raise UncoveredError(
-            "dual: a damping matrix couples the modes", "give damping ratios in its place"
+            "a damping matrix couples the modes", "give damping ratios in its place"
         )
     n = system.size
     nothing = next(iter(p.values())) * 0.0
     rows = [np.append(row, np.zeros(2 * n - len(row))) for row in system.observed.values()]
     of_speed = np.array([bool(row[n:].any()) for row in rows])
     if any(fast and row[:n].any() for fast, row in zip(of_speed, rows, strict=True)):
-        raise UncoveredError(
-            "dual: an output mixes displacements and velocities", "observe them apart"
-        )
+        raise UncoveredError("an output mixes displacements and velocities", "observe them apart")
     start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (system.q0, system.v0)]
     ratios = [nothing + p[x] if isinstance(x, str) else nothing + x for x in system.ratios]
     factors = stacked([nothing, nothing])
@@ -155,11 +153,11 @@ def _softening(system: StoreyFrame, p: Inputs) -> Expansion:
 def _refuse_dashpots(system: StoreyFrame, p: Inputs) -> None:
     if any(p[name].size() > 0 for name in system.group("d")):
         raise UncoveredError(
-            "dual: dashpots couple the modes", "give a damping ratio or Rayleigh's factors"
+            "dashpots couple the modes", "give a damping ratio or Rayleigh's factors"
         )
     if system.gravity and p["rayleigh_stiffness"].size() > 0:
         raise UncoveredError(
-            "dual: Rayleigh's damping by the springs without the weights couples the modes",
+            "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",
         )
 
@@ -180,7 +178,7 @@ def _total(terms: Terms, p: Inputs, n: int) -> Expansion:
             )
         except (TypeError, AttributeError) as failure:
             raise UncoveredError(
-                f"dual: a factor is not arithmetic ({failure})", "write it with + − * and powers"
+                f"a factor is not arithmetic ({failure})", "write it with + − * and powers"
             ) from None
         out = out + (spread(value, array) if isinstance(value, Expansion) else value * array)
     return out

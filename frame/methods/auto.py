@@ -1,6 +1,7 @@
-"""Auto: the proof; where there is none, the search; where there is none either, the follower.
+"""Auto: a proof; where there is none, the search; where there is none either, the follower.
 
-With more than six fuzzy inputs the proof is the dual bound, whose gap is what it states.
+Up to six fuzzy inputs the branch and bound is tried first. The dual bound follows, which takes any
+number of inputs. Its gap is what it states: a tolerance that it misses leads to the search.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, stage
 from alphacut.fuzzy.refused import RefusedError
 
@@ -53,16 +55,18 @@ class Auto:
         follower = ImprovedFollower(0.7 * flow.tolerance(self.tolerance), seed=self.seed)
         if not isinstance(flow.flow, LinearFlow):
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
-        stage(progress, "proof")
-        many = len(flow.boxes.names) > MOST_PARAMETERS
-        proof: Proof | DualProof = DualProof(workers=self.workers)
-        if not many:
-            proof = Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers)
-        try:
-            why = "dual: many inputs" if many else "proof: the structure is linear"
-            return _noted(proof.run(flow, progress), why)
-        except (UnprovedError, ModalError) as error:
-            why = f"unproved: {error}"
+        reasons: list[str] = []
+        for proof in self._proofs(len(flow.boxes.names)):
+            stage(progress, proof.name)
+            try:
+                proved = proof.run(flow, progress)
+            except (UnprovedError, ModalError) as error:
+                reasons.append(f"{proof.name}: {error}")
+                continue
+            if self.tolerance is None or (proved.error <= self._allowed(flow)).all():
+                return _noted(proved, "; ".join([f"{proof.name}: a proof", *reasons]))
+            reasons.append(f"{proof.name}: its gap is wider than the tolerance")
+        why = f"unproved: {'; '.join(reasons)}"
         stage(progress, f"search ({why})")
         try:
             search = Search(self.tolerance, seed=self.seed)
@@ -70,6 +74,17 @@ class Auto:
         except ModalError as error:
             why = f"{why}; no search: {error}"
         return _noted(follower.run(flow, progress), f"improved-graph-follower; {why}")
+
+    def _proofs(self, inputs: int) -> tuple[Proof | DualProof, ...]:
+        """Proofs to try, in order, for a number of fuzzy inputs."""
+        dual = DualProof(workers=self.workers)
+        if inputs > MOST_PARAMETERS:
+            return (dual,)
+        return Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers), dual
+
+    def _allowed(self, flow: UnitFlow) -> Array:
+        """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""
+        return (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:

@@ -71,7 +71,7 @@ WRONG = [  # text in the case, its replacement; key, and what the message says
     ('second_moment = "1e-5 m^4"', "", "frame.second_moment", "frame.stiffness"),
     ('stages = ["envelope"]', 'stages = ["modulus"]', "radius", "stage modulus needs"),
     ('stages = ["envelope"]', "stages = []", "stages", "one entry"),
-    ('masses = ["[9, 10, 11] t"]', "masses = []", "masses", "one value a floor"),
+    ('masses = ["[9, 10, 11] t"]', "masses = []", "masses", "one entry or more"),
     ('"[9, 10, 11] t"', '"9 t", "9 t"', "envelope.fuzzy", "fuzzy"),
     ("title", "tilte", "tilte", "did you mean title?"),
     ('"1e-5 m^4"', '"1e-5 m^4" "x"', "", "is not TOML"),

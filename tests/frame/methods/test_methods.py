@@ -143,13 +143,15 @@ def test_auto_takes_the_proof_else_the_search_else_the_follower_and_says_why():
     many = {name: Interval(0.995 * x, 1.005 * x) for name, x in [*FRAME.parameters.items()][:8]}
     swing = {"l": Interval(0.99, 1.01)}
     cases = (
-        (CHAIN, two, Nature.GUARANTEED, "proof"),
-        (each, two, Nature.ESTIMATED, "search; unproved: a damping ratio for each mode"),
-        (FRAME, many, Nature.ESTIMATED, "search; unproved: dual: dashpots couple the modes"),
-        (frame.pendulum(), swing, Nature.ESTIMATED, "improved-graph-follower: not linear"),
+        (CHAIN, two, 1e-3, Nature.GUARANTEED, "proof"),
+        (each, two, None, Nature.GUARANTEED, "dual: a proof; proof: a damping ratio for each"),
+        (each, two, 1e-9, Nature.ESTIMATED, "search; unproved: proof: a damping ratio for each"),
+        (FRAME, many, 1e-3, Nature.ESTIMATED, "search; unproved: dual: dashpots couple the modes"),
+        (frame.pendulum(), swing, 1e-3, Nature.ESTIMATED, "improved-graph-follower: not linear"),
     )
-    for system, inputs, nature, why in cases:
-        found = envelope(system, inputs, method="auto", tolerance=1e-3, **{**MOTION, "step": 0.02})
+    for system, inputs, tolerance, nature, why in cases:
+        method = frame.Auto(tolerance=tolerance)
+        found = envelope(system, inputs, method=method, **{**MOTION, "step": 0.02})
         assert found.nature is nature
         assert found.notes[0].startswith(why)
 
