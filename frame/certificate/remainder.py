@@ -14,23 +14,8 @@ from alphacut.frame.modal.model import ModalModel
 
 MOST_PARAMETERS = 6
 """Tensors of third derivatives grow with the cube of the number of parameters."""
-
-
 MOST_TERMS = 100
 """Terms of the series of a wave under a load, at most, as rounding counts them."""
-
-
-def require_certifiable(parameters: int) -> None:
-    """Refuse what the branch and bound does not cover.
-
-    Raises:
-        ValueError: Too many parameters.
-    """
-    if parameters > MOST_PARAMETERS:
-        raise ValueError(
-            f"certify: {parameters} uncertain parameters; branch and bound is affordable up to"
-            f" {MOST_PARAMETERS}; make some crisp, or leave the certificate out"
-        )
 
 
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
@@ -78,13 +63,8 @@ class Remainder:
 
     @classmethod
     def of(cls, model: ModalModel, lower: Array, upper: Array) -> Remainder:
-        """Bounds for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k).
-
-        Raises:
-            ValueError: Too many parameters.
-        """
+        """Bounds for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k)."""
         d, n, m = len(lower), model.count, len(model.outputs)
-        require_certifiable(d)
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
         rate, growth = suprema(model.eigenvalue, reach), largest_growth(model.eigenvalue, reach)
         third = np.zeros((len(model.time), m, d, d, d))

@@ -53,7 +53,7 @@ class ExactResponse:
             points = fit_points(len(cuts.names), 2)
             rate = fit(points, analyse(flow, cuts, points).eigenvalue, 2)
             nothing = Polynomial(rate.index, np.zeros_like(rate.coefficients))
-            load = LoadTables.build(flow.system.ground, flow.time, rate, nothing)
+            load = LoadTables(flow.system.ground, flow.time, rate, nothing)
         return cls(model.in_units(scale), scale, load, bent)
 
     @property

@@ -151,7 +151,7 @@ def _fitted(
     rate = fit(points, own.eigenvalue, degree)
     ground, load = flow.system.ground, None
     if ground is not None:
-        load = LoadTables.build(ground, flow.time, rate, fit(points, flat[1], degree))
+        load = LoadTables(ground, flow.time, rate, fit(points, flat[1], degree))
     share = fit(points, flat[0], degree)
     nothing = np.zeros((len(flow.time), len(flow.outputs)))
     return ModalModel(flow, boxes, rate, share, load, chosen, own.of, nothing, 0)

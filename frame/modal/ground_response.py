@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil, exp, lgamma, log
 
 import numpy as np
@@ -16,8 +17,6 @@ from alphacut.frame.structures.modes import ModalError
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
 MOST_STEPS = 40_000  # of a table
-FADED = 37.0
-"""Exponent at which what is left of a window has fallen below round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,36 +72,39 @@ class LoadTable:
         """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N), for eigenvalues (N,)."""
         from alphacut.frame.modal.window_series import window_series  # Numba takes time to import
 
-        fade = FADED / max(float(-rate.real.max(initial=-np.inf)), 1e-300)
-        where = (self.middle, self.scale, self.moment, self.ends, self.time, fade)
+        where = (self.middle, self.scale, self.moment, self.ends, self.time)
         waves: Array = window_series(np.ascontiguousarray(rate), self.every * node, *where)
         return waves
 
 
 @dataclass(frozen=True, eq=False)
 class LoadTables:
-    """Tables of all modes.
+    """Tables of all modes, made when they are first read.
 
     Args:
+        ground: The record.
+        time: Nodes, shape (T,), in s.
+        rate: λ_k over the unit box, n polynomials.
         share: What one unit of R_k puts into the outputs, n m polynomials.
-        tables: One of each mode.
     """
 
+    ground: Accelerogram
+    time: Array
+    rate: Polynomial
     share: Polynomial
-    tables: tuple[LoadTable, ...]
 
-    @classmethod
-    def build(
-        cls, ground: Accelerogram, time: Array, rate: Polynomial, share: Polynomial
-    ) -> LoadTables:
-        """The tables for modes whose eigenvalues are `rate` over the unit box."""
-        spread = np.abs(rate.coefficients[1:]).sum(0).tolist()
-        pairs = zip(rate.coefficients[0].tolist(), spread, strict=True)
-        return cls(share, tuple(LoadTable.build(ground, time, *pair) for pair in pairs))
+    @cached_property
+    def tables(self) -> list[LoadTable]:
+        """One of each mode."""
+        middle, rest = self.rate.coefficients[0], self.rate.coefficients[1:]
+        pairs = zip(middle.tolist(), np.abs(rest).sum(0).tolist(), strict=True)
+        return [LoadTable.build(self.ground, self.time, *pair) for pair in pairs]
 
     def in_units(self, scale: Array) -> LoadTables:
         """The same for outputs divided by their scale (m,)."""
-        return replace(self, share=self.share.divided(np.tile(scale, len(self.tables))))
+        return replace(
+            self, share=self.share.divided(np.tile(scale, self.rate.coefficients.shape[1]))
+        )
 
     @property
     def truncation(self) -> Array:

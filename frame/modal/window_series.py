@@ -20,9 +20,11 @@ def window_series(
     moment: Complex,
     ends: Rows,
     time: Array,
-    fade: float,
 ) -> Complex:
     """R, dR/dλ and d²R/dλ² of a mode at one node per point, shape (3, N), complex.
+
+    What windows leave behind is carried from one to the next, and from a point to the next one of
+    the same λ at a later node.
 
     Args:
         rate: λ, shape (N,), complex.
@@ -32,26 +34,28 @@ def window_series(
         moment: Coefficients at the nodes, shape (T, order), complex.
         ends: Last node of each window but the last, rising.
         time: Nodes, shape (T,), in s.
-        fade: Time after which nothing is left of a window, in s.
     """
     out = np.zeros((3, len(rate)), np.complex128)
+    R, slope, curve, here, w = 0j, 0j, 0j, 0, 0
     for p in range(len(rate)):
+        if p == 0 or rate[p] != rate[p - 1] or node[p] < node[p - 1]:
+            R, slope, curve, here, w = 0j, 0j, 0j, 0, 0
         x = (rate[p] - middle) / scale
-        for w in range(-1, len(ends)):
-            end = node[p] if w < 0 else ends[w]
-            tau = time[node[p]] - time[end]
-            if w >= 0 and tau <= 0:
-                break
-            if tau >= fade:
-                continue
+        while True:
+            last = w == len(ends) or ends[w] >= node[p]
+            end = node[p] if last else ends[w]
+            tau = time[end] - time[here]
             f, g, h = 0j, 0j, 0j  # Horner's scheme, twice differentiated
             for i in range(moment.shape[1] - 1, -1, -1):
                 h = h * x + g
                 g = g * x + f
                 f = f * x + moment[end, i]
-            g, h = g / scale, 2 * h / scale**2
             wave = np.exp(rate[p] * tau)
-            out[0, p] += wave * f
-            out[1, p] += wave * (g + tau * f)
-            out[2, p] += wave * (h + 2 * tau * g + tau * tau * f)
+            f += wave * R
+            g = g / scale + wave * (slope + tau * R)
+            h = 2 * h / scale**2 + wave * (curve + 2 * tau * slope + tau * tau * R)
+            if last:
+                out[0, p], out[1, p], out[2, p] = f, g, h
+                break
+            R, slope, curve, here, w = f, g, h, end, w + 1
     return out
