@@ -1,7 +1,8 @@
 """Auto: a proof; where there is none, the search; where there is none either, the follower.
 
-Up to six fuzzy inputs the branch and bound is tried first. The dual bound follows, which takes any
-number of inputs. Its gap is what it states: a tolerance that it misses leads to the search.
+Up to six fuzzy inputs the branch and bound is tried, up to four if no tolerance is named. The dual
+bound follows, which takes any number of inputs and states its gap. A gap above a named tolerance
+leads to the search.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from alphacut.fuzzy.refused import RefusedError
 
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
+FEW = 4
+"""Inputs up to which the branch and bound is worth its time where no tolerance is named."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class Auto:
     def _proofs(self, inputs: int) -> tuple[Proof | DualProof, ...]:
         """Proofs to try, in order, for a number of fuzzy inputs."""
         dual = DualProof(workers=self.workers)
-        if inputs > MOST_PARAMETERS:
+        if inputs > (MOST_PARAMETERS if self.tolerance else FEW):
             return (dual,)
         return Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers), dual
 
