@@ -114,7 +114,7 @@ def hatched(axes: Axes, across: tuple[float, float], up: tuple[float, float]) ->
 
 
 def places(slot: int) -> tuple[float, float, float]:
-    """Where the spring of a mass starts, and the mass's left and right edges."""
+    """Start of the spring of a mass, and the mass's left and right edges."""
     left = 1.6 * slot - 1.0
     return (0.0 if slot == 1 else left - 0.6), left, 1.6 * slot
 

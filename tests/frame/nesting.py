@@ -1,7 +1,5 @@
 """How far the cuts of an envelope are from lying in one another."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from alphacut.frame.envelope import Envelope

@@ -1,7 +1,5 @@
 """Polynomials on as many points as they have terms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.polynomial.chebyshev import chebvander

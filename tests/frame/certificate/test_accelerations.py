@@ -1,7 +1,5 @@
 """Proved bounds of floor accelerations, which are forces over fuzzy masses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.linalg import expm, sqrtm

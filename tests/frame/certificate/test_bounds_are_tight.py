@@ -1,7 +1,5 @@
 """Ingredients of a proof on cases where they nearly are the truth: halved, none would cover it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 enough to be of use.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

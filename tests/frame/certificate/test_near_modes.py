@@ -1,7 +1,5 @@
 """Proofs where frequencies of two modes come near each other within the box, and shapes turn."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

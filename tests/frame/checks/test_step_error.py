@@ -1,7 +1,5 @@
 """Errors of time stepping are estimated as they are, and declared in every bound."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """The one-step methods do what they declare: order, stability, energy, derivatives of the scheme."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -2,8 +2,6 @@
 written without the program's own.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

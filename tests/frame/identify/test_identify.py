@@ -1,7 +1,5 @@
 """Learning a frame's parameters from measured modes: coverage, enclosures, identifiability."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

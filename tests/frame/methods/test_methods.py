@@ -1,7 +1,5 @@
 """Every method keeps what its nature promises, on structures of all kinds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

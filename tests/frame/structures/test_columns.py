@@ -1,7 +1,5 @@
 """Storeys with other numbers of columns, or stiffer ones, than two alike."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

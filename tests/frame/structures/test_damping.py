@@ -2,8 +2,6 @@
 is a case of it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
