@@ -1,10 +1,10 @@
 """The finite elements of today beside those of an earlier commit, in one run.
 
-    ./enter python -m benchmarks.rve.against 999231a2
+    python3 -m benchmarks.rve.against 999231a2
 
-Checks the commit out into a temporary folder, runs both in turn and prints E, iterations, seconds
-and their ratio: the process of one sample, meshes of three sizes, and the maps of the paper's
-transformation method with nine moduli each.
+Checks the commit out into a temporary folder, runs both in turn, each in its own environment, and
+prints E, iterations, seconds and their ratio: the process of one sample, meshes of three sizes, and
+the maps of the paper's transformation method with nine moduli each.
 """
 
 from __future__ import annotations
@@ -66,12 +66,9 @@ def checked_out(commit: str) -> Iterator[Path]:
 
 def measured(tree: Path, size: float, maps: int, repeat: int) -> dict[str, Any]:
     """What a process of its own measures, and how long it takes."""
-    command = [sys.executable, "-c", SAMPLE, str(size), str(maps), str(repeat)]
+    command = [str(tree / "enter"), "python", "-c", SAMPLE, str(size), str(maps), str(repeat)]
     before = os.times()
-    run = subprocess.run(
-        command, cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)}, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
+    run = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
     after = os.times()
     if run.returncode:
         raise SystemExit(run.stderr)

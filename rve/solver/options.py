@@ -24,7 +24,7 @@ _CG = {
 SOLVERS: Mapping[str, Mapping[str, str]] = {
     "theta": {**_CG, "pc_type": "python"},
     # algebraic multigrid, told the translations of every level
-    "gamg": {**_CG, "pc_type": "gamg", "pc_gamg_threshold": "0.01"},
+    "gamg": {**_CG, "ksp_max_it": "5000", "pc_type": "gamg", "pc_gamg_threshold": "0.01"},
     # sparse direct
     "mumps": {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
 }
