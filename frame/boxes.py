@@ -156,13 +156,11 @@ class UnitFlow:
         flow: The flow in physical parameters.
         boxes: The boxes; its names must be those of `flow`.
         relative: Whether tolerances are shares of each output's modal peak instead of lengths.
-        called: Names of the outputs where they stand in for others; the flow's own if none.
     """
 
     flow: Flow
     boxes: Boxes
     relative: bool = False
-    called: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -172,7 +170,7 @@ class UnitFlow:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
-        return self.called or self.flow.outputs
+        return self.flow.outputs
 
     @property
     def units(self) -> tuple[str, ...]:

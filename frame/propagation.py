@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
 from alphacut.frame.checks.admissible import require_admissible
-from alphacut.frame.checks.between_nodes import ground_stray, with_stray
+from alphacut.frame.checks.between_nodes import with_stray
 from alphacut.frame.checks.step_error import (
     require_stable,
     step_error,
@@ -29,11 +28,10 @@ from alphacut.frame.methods.named import Method, named
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem, relative_to_ground
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.quantities import Output
-from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
@@ -99,7 +97,6 @@ def envelope(
     steps = step_error_at_bounds(bounds, over, steps)
     bounds = _judged(with_step_error(bounds, over, steps), over, way)
     bounds = with_stray(bounds, over)
-    bounds = _shifted(bounds, model) if isinstance(model, StoreyFrame) else bounds
     return _on_levels(bounds, boxes(inputs, alpha).alpha, which)
 
 
@@ -160,17 +157,16 @@ def _flow(
     integrator: str | Integrator | None,
     relative: bool,
 ) -> UnitFlow:
-    """The trajectories; accelerations relative to the ground are computed as absolute ones."""
-    cuts, called = boxes(inputs, alpha), model.outputs
+    """The trajectories over the boxes of the inputs."""
+    cuts = boxes(inputs, alpha)
     flow: LagrangianFlow | LinearFlow
     if isinstance(model, LagrangianSystem):
         flow = LagrangianFlow(model, cuts.names, *nodes, str(integrator or "midpoint"))
     else:
-        model = absolute(model) if isinstance(model, StoreyFrame) else model
         flow = LinearFlow(model, cuts.names, *nodes, _integrator(integrator, way))
     require_admissible(model, cuts)
     require_stable(flow, cuts)
-    return UnitFlow(flow, cuts, relative, called=called)
+    return UnitFlow(flow, cuts, relative)
 
 
 def _integrator(value: str | Integrator | None, way: Method) -> Integrator:
@@ -182,29 +178,6 @@ def _integrator(value: str | Integrator | None, way: Method) -> Integrator:
     if value not in INTEGRATORS:
         raise RefusedError("integrator", value, ", ".join(INTEGRATORS))
     return INTEGRATORS[value]
-
-
-def absolute(model: StoreyFrame) -> StoreyFrame:
-    """The frame with absolute accelerations in place of those relative to the ground."""
-    names = tuple(re.sub(r"^ar(?=\d)", "a", name) for name in model.outputs)
-    return replace(model, outputs=names)
-
-
-def _shifted(bounds: Envelope, model: LinearSystem) -> Envelope:
-    """An envelope whose accelerations are relative to the ground where those of `model` are.
-
-    The ground's acceleration is known, so that all bounds move alike and stay as proved.
-    """
-    if model.ground is None or not (moved := relative_to_ground(model)):
-        return bounds
-    taken = np.zeros((len(bounds.time), len(bounds.outputs)))
-    taken[:, moved] = model.ground.at(bounds.time)[:, None]
-    pairs = [x and Ends(x.lower - taken, x.upper - taken) for x in (bounds.inner, bounds.outer)]
-    between = None if bounds.between is None else bounds.between.copy()
-    if between is not None:
-        between[:, moved] += ground_stray(model.ground, bounds.time)[:, None]
-    ends = {"lower": bounds.lower - taken, "upper": bounds.upper - taken}
-    return replace(bounds, **ends, inner=pairs[0], outer=pairs[1], between=between)
 
 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:

@@ -90,7 +90,7 @@ class Frame(Section):
     )
     outputs: tuple[str, ...] = Field(
         default=(),
-        description="observed quantities: q1, v1, a1, ar1, drift1, shear1 …, base_shear",
+        description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear",
     )
 
     @property

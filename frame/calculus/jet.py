@@ -7,7 +7,7 @@ derivatives, whose array then has no entries, it computes gradients alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -168,23 +168,6 @@ def variables(
     for k, name in enumerate(selected):
         jets[name].first[k] = 1.0
     return jets
-
-
-def stack(rows: Sequence[Sequence[Jet | float]], like: Mapping[str, Jet]) -> Jet:
-    """Matrix of shape (S, n, m) from entries of shape (S,) or plain numbers."""
-    sample = next(iter(like.values()))
-    out = sample.like(np.zeros((sample.value.size, len(rows), len(rows[0]))))
-    for i, row in enumerate(rows):
-        for j, entry in enumerate(row):
-            if isinstance(entry, Jet):
-                out.value[:, i, j], out.first[..., i, j], out.second[..., i, j] = (
-                    entry.value,
-                    entry.first,
-                    entry.second,
-                )
-            else:
-                out.value[:, i, j] = entry
-    return out
 
 
 def inverse(a: Jet) -> Jet:

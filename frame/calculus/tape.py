@@ -24,10 +24,7 @@ An operation has a number and the places of two operands. Places hold arguments,
 result of each operation, in this order.
 """
 BINARY = ("add", "multiply", "power")
-UNARY = (
-    *("reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log", "sinh", "cosh", "tanh"),
-    *("asin", "acos", "atan", "erf"),
-)
+UNARY = ("reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log")
 OPERATIONS = (*BINARY, *UNARY)
 
 

@@ -20,7 +20,6 @@ from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import Part, parts
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence as dependence
@@ -36,15 +35,9 @@ def proved_error(model: ModalModel) -> Array:
     """Bound of |model − true motion| over the box, shape (T, m), in units of the outputs.
 
     Raises:
-        UnprovedError: The structure is not known to be a polynomial that loses energy, the scheme
-            is not the exact propagator, or the box is so wide or has so many parameters that the
-            bound cannot be computed.
+        UnprovedError: The structure is not known to be a polynomial that loses energy, or the
+            box is so wide or has so many parameters that the bound cannot be computed.
     """
-    if not isinstance(model.flow.integrator, Exact):
-        raise dependence.UnprovedError(
-            f"the motion is that of the scheme '{model.flow.integrator.name}'; only the exact"
-            " propagator is covered"
-        )
     reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
     ratio, growth = RatioDamping.of(model), largest_growth(model.eigenvalue, reach)
     samples = [

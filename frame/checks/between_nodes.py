@@ -13,7 +13,7 @@ from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.linear import Accelerogram, frequencies
+from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.arrays import Array
 
 PARTS, MOST = 4, 64
@@ -63,23 +63,6 @@ def _off(flow: Flow, points: Array) -> Array:
     inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
     straight = ends[:, :-1, None] * (1 - share) + ends[:, 1:, None] * share
     return np.asarray(np.abs(inner - straight).max((0, 2)))
-
-
-def ground_stray(ground: Accelerogram, time: Array) -> Array:
-    """How far the ground's acceleration strays from straight lines between nodes, shape (T,).
-
-    Row j is that of the step that ends at node j; the jump where the record ends counts.
-    """
-    samples = np.arange(len(ground.acceleration)) * ground.step
-    strays = np.zeros(len(time))
-    values = ground.at(time)
-    ends = (samples, np.asarray(ground.acceleration)), (samples[-1:], np.zeros(1))
-    for places, accelerations in ends:
-        step = np.searchsorted(time, places * (1 + 1e-12))
-        inside = (step > 0) & (step < len(time))
-        off = np.abs(accelerations - np.interp(places, time, values))[inside]
-        np.maximum.at(strays, step[inside], off)
-    return strays
 
 
 @singledispatch

@@ -14,7 +14,7 @@ from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
-from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, relative_to_ground
+from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate
 from alphacut.fuzzy.refused import FailedError, RefusedError
 
 
@@ -165,13 +165,6 @@ class LinearFlow(March):
         return self.system.outputs
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
-        motion = self._absolute(points, derivatives=derivatives)
-        if relative := relative_to_ground(self.system):
-            assert self.system.ground is not None
-            motion.value[..., relative] -= self.system.ground.at(self.time)[:, None]
-        return motion
-
-    def _absolute(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         exact, ground = isinstance(self.integrator, Exact), self.system.ground
         h, steps = self.step, len(self.time) - 1

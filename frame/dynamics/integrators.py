@@ -33,9 +33,6 @@ class StepMap:
     load: Jet
 
 
-Rational = tuple[tuple[float, ...], tuple[float, ...]]
-
-
 class Integrator(Protocol):
     """A one-step method for linear structures."""
 
@@ -50,10 +47,6 @@ class Integrator(Protocol):
     @property
     def stability_limit(self) -> float:
         """Largest stable ω h of an undamped oscillation; infinite when unconditional."""
-
-    @property
-    def amplification(self) -> Rational:
-        """R(z), z = hλ, of a step on exp(λt): numerator and denominator; both empty for exp."""
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step of length `step` in s; the load is linear within the step."""
@@ -70,7 +63,6 @@ class Midpoint:
     name: ClassVar[str] = "midpoint"
     order: ClassVar[float] = 2
     stability_limit: ClassVar[float] = inf
-    amplification: ClassVar[Rational] = ((1.0, 0.5), (1.0, -0.5))
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step; its velocity is M⁻¹ times the discrete momentum."""
@@ -93,7 +85,6 @@ class RungeKutta4:
     name: ClassVar[str] = "rk4"
     order: ClassVar[float] = 4
     stability_limit: ClassVar[float] = 2 * 2**0.5
-    amplification: ClassVar[Rational] = ((1.0, 1.0, 1 / 2, 1 / 6, 1 / 24), (1.0,))
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step: the exponential series up to h⁴."""
@@ -111,7 +102,6 @@ class Exact:
     name: ClassVar[str] = "exact"
     order: ClassVar[float] = inf
     stability_limit: ClassVar[float] = inf
-    amplification: ClassVar[Rational] = ((), ())
 
     def step_map(self, matrices: Matrices, step: float) -> StepMap:
         """The map of one step."""

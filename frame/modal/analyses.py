@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.frame.boxes import Boxes
-from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.jet import Array
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.structures.linear import Matrices, evaluate, relative_to_ground
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.structures.linear import Matrices, evaluate
 from alphacut.frame.structures.modes import (
     ModalError,
     Modes,
-    UnsuitedOutputError,
     eigenvectors,
     modes,
     state_matrix,
@@ -27,7 +27,7 @@ def analyse(
     states: bool = False,
     order: int = 2,
 ) -> Modes:
-    """Eigen-analyses with derivatives at unit coordinates (S, d), of the integrator.
+    """Eigen-analyses with derivatives at unit coordinates (S, d).
 
     Args:
         flow: The trajectories.
@@ -38,13 +38,10 @@ def analyse(
         order: Highest order of derivatives, 0, 1 or 2.
 
     Raises:
-        ModalError: The structure has no such modes, or the integrator mixes them.
+        ModalError: The structure has no such modes, or the motion is not the exact one.
     """
-    if relative_to_ground(flow.system):
-        raise UnsuitedOutputError(
-            "modal: accelerations relative to the ground, ar1 …, are followed by `envelope` alone;"
-            " take the absolute ones, a1 …"
-        )
+    if not isinstance(flow.integrator, Exact):
+        raise ModalError(f"modal: the motion is that of the scheme '{flow.integrator.name}'")
     points = boxes.to_physical(unit)
     depth = {"derivatives": order > 0, "bent": order > 1}
     matrices, rows = evaluate(flow.system, flow.names, points, **depth)
@@ -52,32 +49,9 @@ def analyse(
         size = rows.value.shape[-1]
         rows = rows.like(np.broadcast_to(np.eye(size), (len(unit), size, size)))
     own = modes(matrices, rows, chosen)
-    rate = _discrete(own.eigenvalue, flow)
     if not order:
-        return Modes(rate, own.coefficient, own.load, own.of)
-    return Modes(
-        boxes.in_unit(rate), boxes.in_unit(own.coefficient), boxes.in_unit(own.load), own.of
-    )
-
-
-def _discrete(rate: Jet, flow: LinearFlow) -> Jet:
-    """Log R(hλ)/h: the rate at which the integrator's modes advance."""
-    rational = flow.integrator.amplification
-    if flow.system.ground is not None and rational[0]:
-        raise ModalError(
-            f"modal: the integrator '{flow.integrator.name}' keeps no modes here; take exact, or"
-            " the method graph-follower"
-        )
-    if not rational[0]:
-        return rate
-    h, z = flow.step, flow.step * rate.value
-    parts = []
-    for coefficients in rational:
-        p = np.polynomial.Polynomial(coefficients)
-        value, slope, curve = p(z), p.deriv(1)(z), p.deriv(2)(z)
-        parts.append((np.log(value), slope / value, curve / value - (slope / value) ** 2))
-    f, df, ddf = (a - b for a, b in zip(*parts, strict=True))
-    return rate.chain(f / h, df, ddf * h)
+        return own
+    return Modes(*map(boxes.in_unit, (own.eigenvalue, own.coefficient, own.load)), own.of)
 
 
 def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:

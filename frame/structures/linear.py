@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -115,13 +114,6 @@ class LinearSystem(Protocol):
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
-
-
-def relative_to_ground(system: LinearSystem) -> list[int]:
-    """Outputs that the ground's acceleration must be taken off from: ar1 …, where it moves."""
-    if system.ground is None:
-        return []
-    return [place for place, name in enumerate(system.outputs) if re.fullmatch(r"ar\d+", name)]
 
 
 def evaluate(

@@ -28,10 +28,6 @@ class ModalError(FailedError):
     """The structure has no smooth set of oscillating modes over the box."""
 
 
-class UnsuitedOutputError(ModalError):
-    """An output is no linear function of the modes."""
-
-
 @dataclass(frozen=True, eq=False)
 class Modes:
     """Intervening variables of a structure (section 7), smooth in the parameters.

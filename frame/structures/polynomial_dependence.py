@@ -60,8 +60,6 @@ def _(system: StoreyFrame, box: Box) -> dict[str, int]:
     if accelerations(system):  # forces over masses; forces hold the masses too where weights press
         own = 1 if system.gravity else 0
         masses = {name: ends for name, ends in box.items() if name[0] == "m"}
-        if any(name[1] == "_" for name in masses):
-            raise UnprovedError("an acceleration is a force over masses that a field gives")
         degree |= {name: own + inverse_cube_degree(*ends) for name, ends in masses.items()}
     return degree
 
@@ -69,7 +67,7 @@ def _(system: StoreyFrame, box: Box) -> dict[str, int]:
 def accelerations(system: LinearSystem) -> dict[int, int]:
     """Outputs that are accelerations of a storey frame's floors, with the floors, from 0."""
     named = enumerate(system.outputs) if isinstance(system, StoreyFrame) else ()
-    return {place: int(name.lstrip("ar")) - 1 for place, name in named if name[0] == "a"}
+    return {place: int(name[1:]) - 1 for place, name in named if name[0] == "a"}
 
 
 @degrees.register

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 UNITS = {
-    **{"q": "m", "drift": "m", "roof": "m", "v": "m/s", "a": "m/s^2", "ar": "m/s^2"},
+    **{"q": "m", "drift": "m", "v": "m/s", "a": "m/s^2"},
     **{"shear": "N", "base_shear": "N", "force": "N", "phi": "rad"},
 }
 WORDS = {
     "q": "displacement of floor",
     "v": "velocity of floor",
     "a": "acceleration of floor",
-    "ar": "acceleration relative to the ground of floor",
     "drift": "drift of storey",
     "shear": "shear force of storey",
 }
@@ -55,8 +54,6 @@ class Output(str):
     def words(self) -> str:
         """In words, with its name: "displacement of floor 3 (q3)"; else the name."""
         kind, place = self._parts
-        if self == "drift":  # of a tower
-            return "drift of the lowest storey (drift)"
         known = WORDS.get(kind)
         return f"{known} {place} ({self})" if known and place else self.replace("_", " ")
 

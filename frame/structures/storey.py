@@ -39,8 +39,7 @@ class StoreyFrame:
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
     and "zeta", or "zeta1" … where each mode has its own ratio.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
-    m/s²), "ar1" … (acceleration relative to the ground, of trajectories and envelopes alone),
-    "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
+    m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
     Args:
         masses: Floors from below, in kg.
@@ -231,12 +230,12 @@ class StoreyFrame:
         kinds = [self.quantity(output) for output in self.outputs]
         names = {kind for kind, _ in kinds}
         links = self.springs(p) if "shear" in names else None
-        forces = self._accelerations(p) if names & {"a", "ar"} else None
+        forces = self._accelerations(p) if "a" in names else None
         like, places = next(iter(p.values())), np.eye(self.floors)
         drifts = places - np.eye(self.floors, k=-1)
         rows = []
         for kind, z in kinds:
-            if kind in ("a", "ar") and forces is not None:
+            if kind == "a" and forces is not None:
                 rows.append(forces[:, z : z + 1])
                 continue
             part = (drifts if kind in ("drift", "shear") else places)[z]
@@ -251,10 +250,10 @@ class StoreyFrame:
         Raises:
             RefusedError: There is no such output.
         """
-        pattern = r"(q|v|ar|a|drift|shear)([1-9]\d*)"
+        pattern = r"(q|v|a|drift|shear)([1-9]\d*)"
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
         if not match or int(match[2]) > self.floors:
-            kinds = "q, v, a, ar, drift or shear with a floor"
+            kinds = "q, v, a, drift or shear with a floor"
             raise RefusedError("output", name, f"{kinds} from 1 to {self.floors}, base_shear")
         return match[1], int(match[2]) - 1
 

@@ -35,7 +35,7 @@ SPRINGS = StoreyFrame((2e4, 1e4), (3.0, 2.5), stiffness=(1e6, 1e6))
         (COLUMNS, {"damping_ratio": 1.0}, "damping_ratio is 1; allowed: 0 or greater and below 1"),
         (COLUMNS, {"damping_ratio": (0.1,) * 3}, "damping_ratio is a list of 3"),
         (COLUMNS, {"q0": (0.1, np.nan)}, "q0 is nan; allowed: finite numbers"),
-        (COLUMNS, {"outputs": ("q3",)}, "output is q3; allowed: q, v, a, ar, drift or shear"),
+        (COLUMNS, {"outputs": ("q3",)}, "output is q3; allowed: q, v, a, drift or shear"),
         (COLUMNS, {"damper_placement": "roof"}, "damper_placement is roof; allowed: ground, storey"),
         (COLUMNS, {"stiffness": (1e6, 1e6)}, "modulus, second_moment.* either stiffness or what"),
         (SPRINGS, {"gravity": 500.0}, "storey 1 under P-Delta is 1e.06 N/m; .* it buckles"),
