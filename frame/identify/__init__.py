@@ -1,8 +1,7 @@
 """Stiffnesses from measured modes: boxes, samples, coverage and predictions."""
 
-from alphacut.frame.identify.identify import Identified, RefutedError, identify
+from alphacut.frame.identify.identify import Identified, Prediction, RefutedError, identify
 from alphacut.frame.identify.measured import MeasuredMode, Measurement, measured_mode
-from alphacut.frame.identify.predictions import Prediction
 
 __all__ = [
     "Identified", "MeasuredMode", "Measurement", "Prediction", "RefutedError", "identify",

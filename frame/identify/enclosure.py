@@ -17,17 +17,15 @@ SETTLED = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """A box of log parameters, and the solver's points at its faces.
+    """A box of log parameters.
 
     Args:
         lower: Lower ends, shape (d,).
         upper: Upper ends.
-        points: Points of the last relaxation where its ends are reached, shape (·, d).
     """
 
     lower: Array
     upper: Array
-    points: Array
 
 
 def enclosure(
@@ -47,13 +45,12 @@ def enclosure(
         passes: Most passes over all ends.
     """
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
-    points = np.zeros((0, len(lower)))
     for _ in range(passes):
         held = relaxation(chain, lower, upper, modes, amplitudes)
         if held is None:
             return None
         for key, expression in held.shapes.items():
-            low, high = _ends(held, expression)[:2]
+            low, high = _ends(held, expression)
             if low > high:
                 return None
             amplitudes[key] = (low, high)
@@ -61,37 +58,22 @@ def enclosure(
             held = relaxation(chain, lower, upper, modes, amplitudes)
             if held is None:
                 return None
-        before, rows = upper - lower, []
+        before = upper - lower
         ends = np.stack([lower, upper])
         for at, expression in enumerate(held.parameters):
             if lower[at] == upper[at]:
                 continue
-            low, high, reached = _ends(held, expression)
+            low, high = _ends(held, expression)
             if max(low, lower[at]) > min(high, upper[at]):
                 return None
             ends[:, at] = max(low, lower[at]), min(high, upper[at])
-            rows += [_point(held, x, lower) for x in reached if x is not None]
         lower, upper = ends
-        points = np.array(rows).reshape(-1, len(lower))
         with np.errstate(invalid="ignore", divide="ignore"):
             gained = 1 - np.where(before > 0, (upper - lower) / before, 1.0)
         if gained.max() < SETTLED:
             break
-    return Enclosure(lower, upper, points)
+    return Enclosure(lower, upper)
 
 
-def _ends(
-    held: Relaxation, expression: dict[int, float]
-) -> tuple[float, float, tuple[Array | None, Array | None]]:
-    low, first = held.least(expression)
-    high, last = held.least(expression, -1.0)
-    return low, -high, (first, last)
-
-
-def _point(held: Relaxation, x: Array, fixed: Array) -> Array:
-    """Log parameters of a point of the linear program."""
-    logs = [
-        sum(a * (1.0 if at < 0 else x[at]) for at, a in expression.items())
-        for expression in held.parameters
-    ]
-    return np.array(logs, float).reshape(fixed.shape)
+def _ends(held: Relaxation, expression: dict[int, float]) -> tuple[float, float]:
+    return held.least(expression), -held.least(expression, -1.0)

@@ -19,7 +19,6 @@ from alphacut.frame.identify.directions import Direction, directions
 from alphacut.frame.identify.enclosure import Enclosure, enclosure
 from alphacut.frame.identify.measured import Measurement
 from alphacut.frame.identify.possibility import Agreement, widest
-from alphacut.frame.identify.predictions import Prediction
 from alphacut.frame.identify.samples import walk
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
@@ -36,6 +35,27 @@ PASSES = 6
 
 class RefutedError(FailedError):
     """No parameters in the priors agree with the measurement at the lowest level."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Natural frequency of one mode over the identified parameters.
+
+    Args:
+        mode: Its number by rising frequency, from 1.
+        alpha: Levels, shape (A,), rising.
+        lower: Least frequency at each level, proved, shape (A,), in Hz.
+        upper: Greatest frequency.
+        sampled: Frequencies of samples of the lowest level's set, shape (S,), in Hz.
+        used: True if the mode was measured and served to identify.
+    """
+
+    mode: int
+    alpha: Array
+    lower: Array
+    upper: Array
+    sampled: Array
+    used: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,18 +35,15 @@ class LinearProgram:
     lower: Array
     upper: Array
 
-    def least(self, objective: Array) -> tuple[float, Array | None]:
-        """Proved lower bound of cᵀx over the set, and the solver's point; None where it has none.
-
-        The bound is infinite where the set is proved empty.
-        """
+    def least(self, objective: Array) -> float:
+        """Proved lower bound of cᵀx over the set; infinite where the set is proved empty."""
         ends = np.column_stack([self.lower, self.upper])
         result = linprog(objective, A_ub=self.rows, b_ub=self.right, bounds=ends, method="highs")
         if result.status == 2:
-            return (np.inf if self.empty() else self._box(objective)), None
+            return np.inf if self.empty() else self._box(objective)
         if result.status != 0:
-            return self._box(objective), None
-        return self._proved(objective, np.minimum(result.ineqlin.marginals, 0.0)), result.x
+            return self._box(objective)
+        return self._proved(objective, np.minimum(result.ineqlin.marginals, 0.0))
 
     def empty(self) -> bool:
         """True if it is proved that no point fulfils all rows."""
@@ -58,8 +55,7 @@ class LinearProgram:
             np.append(self.upper, 1e3),
         )
         cost = np.append(np.zeros(len(self.lower)), 1.0)
-        bound, _ = relaxed.least(cost)
-        return bound > 0
+        return relaxed.least(cost) > 0
 
     def _box(self, objective: Array) -> float:
         return self._proved(objective, np.zeros(len(self.right)))

@@ -121,8 +121,8 @@ class Relaxation:
     parameters: tuple[Linear, ...]
     shapes: Mapping[tuple[int, int], Linear]
 
-    def least(self, expression: Linear, sign: float = 1.0) -> tuple[float, Array | None]:
-        """Proved lower bound of sign · expression, without its constant, and a point."""
+    def least(self, expression: Linear, sign: float = 1.0) -> float:
+        """Proved lower bound of sign · expression, without its constant."""
         objective = np.zeros(len(self.program.lower))
         for at, a in expression.items():
             if at != CONSTANT:

@@ -51,7 +51,8 @@ def analyse(
     own = modes(matrices, rows, chosen)
     if not order:
         return own
-    return Modes(*map(boxes.in_unit, (own.eigenvalue, own.coefficient, own.load)), own.of)
+    rate, start, kick = map(boxes.in_unit, (own.eigenvalue, own.coefficient, own.load))
+    return Modes(rate, start, kick, own.of)
 
 
 def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:

@@ -84,12 +84,6 @@ class Accelerogram:
         ended = time > samples[-1] * (1 + 1e-12)
         return np.where(ended, 0.0, np.interp(close, samples, self.acceleration))
 
-    def band(self, share: float = 0.999) -> float:
-        """Angular frequency below which `share` of the record's power lies, in rad/s."""
-        power = np.cumsum(np.abs(np.fft.rfft(self.acceleration)) ** 2)
-        place = int(np.searchsorted(power, share * power[-1]))
-        return 2 * np.pi * place / (len(self.acceleration) * self.step)
-
 
 class LinearSystem(Protocol):
     """A linear structure whose matrices are smooth functions of named parameters."""

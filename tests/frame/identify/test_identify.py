@@ -91,14 +91,13 @@ def test_linear_bounds_hold_for_any_multipliers_and_tell_empty_sets() -> None:
     program: LinearProgram = rows.program()
     cost = np.zeros(3)
     cost[next(iter(z))] = 1.0
-    bound, point = program.least(cost)
-    assert point is not None
+    bound = program.least(cost)
     assert bound == pytest.approx(-2.0, abs=1e-9)  # x = 2, y = −1
     assert bound <= -2.0
     assert not program.empty()
     rows.at_most({next(iter(x)): -1.0, next(iter(y)): -1.0}, -1.5)  # x + y >= 1.5
     assert rows.program().empty()
-    assert rows.program().least(cost)[0] == np.inf
+    assert rows.program().least(cost) == np.inf
 
 
 @pytest.mark.parametrize("shown", [(1, 2, 3), (1, 3), ()])
@@ -125,9 +124,9 @@ def test_every_frame_of_the_box_with_such_modes_fulfils_the_relaxation(
         for at, expression in enumerate(held.parameters):
             log = np.log(truth[at] / chain.nominal[at])
             constant = expression.get(CONSTANT, 0.0)
-            assert held.least(expression)[0] + constant <= log + 1e-12
-            assert -held.least(expression, -1.0)[0] + constant >= log - 1e-12
-        amplitudes = {key: held.least(x)[0] for key, x in held.shapes.items()}
+            assert held.least(expression) + constant <= log + 1e-12
+            assert -held.least(expression, -1.0) + constant >= log - 1e-12
+        amplitudes = {key: held.least(x) for key, x in held.shapes.items()}
         for (mode, floor), low in amplitudes.items():
             shape = vectors[0, :, mode - 1] / vectors[0, 2, mode - 1]
             assert low <= shape[floor - 1] + 1e-12
@@ -387,7 +386,7 @@ def test_a_deviation_of_0_is_refused():
         measured_mode(1, [2.0, 2.01], {1: [0.5, 0.51], 2: [1, 1.02]}, shape_deviation=0.0)
 
 
-def test_every_mode_is_predicted_and_a_measurement_judged(rng: np.random.Generator) -> None:
+def test_every_mode_is_predicted(rng: np.random.Generator) -> None:
     truth = np.array([1.9, 2.1, 2.2])
     result = identify(FRAME, PRIOR, measured(truth, rng, records=5, modes=(1,)), alpha=(0.05, 0.5))
     hertz = np.sqrt(Chain.of(FRAME, NAMES).modes(truth[None])[0][0]) / (2 * np.pi)
@@ -395,15 +394,9 @@ def test_every_mode_is_predicted_and_a_measurement_judged(rng: np.random.Generat
     assert [one.mode for one in predictions] == [1, 2, 3]
     assert [one.used for one in predictions] == [True, False, False]
     for one, frequency in zip(predictions, hertz, strict=True):
-        assert one.inside(frequency)
+        assert one.lower[0] <= frequency <= one.upper[0]
         assert (one.lower[0] <= one.sampled).all()
         assert (one.sampled <= one.upper[0]).all()
-        assert not one.inside(1.5 * frequency)
-        near = Interval(0.99 * frequency, 1.01 * frequency)
-        assert one.possibility(near) == 0.5
-        assert one.possibility(Interval(2 * frequency, 3 * frequency)) == 0.0
-    assert predictions[1].rule.endswith("Hz refutes the frame")
-    assert predictions[0].rule.endswith("no prediction")
 
 
 def test_samples_fill_the_set_and_no_more() -> None:
