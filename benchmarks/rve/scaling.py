@@ -1,6 +1,7 @@
 """Growth of the product-space solve with size, layers, contrast, ranks; `make bench-scaling`.
 
     ./enter python -m benchmarks.rve.scaling
+    ./enter python -m benchmarks.rve.scaling --only-ranks --finest 0.04
 
 Ranks run under mpirun, each line a process of its own, and must give the E of one.
 """
@@ -70,8 +71,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--finest", type=float, default=0.04, help="mesh size on ranks")
     parser.add_argument("--ranks", type=int, nargs="*", default=[1, 2, 3])
+    parser.add_argument("--only-ranks", action="store_true", help="no tables of one rank")
     options = parser.parse_args(arguments)
-    changes = [(size, 12, 4.0) for size in (0.3, 0.15, 0.08, 0.04) if size >= options.finest]
+    if not options.only_ranks:
+        tabulate(options.finest)
+    return compare_ranks(options.ranks, options.finest)
+
+
+def tabulate(finest: float) -> None:
+    """Print a line for each size, number of layers and contrast; write them as CSV."""
+    changes = [(size, 12, 4.0) for size in (0.3, 0.15, 0.08, 0.04) if size >= finest]
     changes += [(0.15, layers, 4.0) for layers in (6, 24, 48)]
     changes += [(0.15, 12, contrast) for contrast in (1e-3, 1e3)]
     rows = []
@@ -79,9 +88,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows.append(grown(*change))
         print(" ".join(f"{name} {value:.4g}" for name, value in rows[-1].items()), flush=True)
     write(rows, Path(__file__).parents[1] / "results" / "cell_scaling.csv")
+
+
+def compare_ranks(counts: Sequence[int], size: float) -> int:
+    """Print the time and E of one cell on several ranks; 1 where E differs, else 0."""
     alone, faults = None, 0
-    for count in options.ranks:
-        numbers = on_ranks(count, options.finest)
+    for count in counts:
+        numbers = on_ranks(count, size)
         alone = alone or numbers
         apart = abs(numbers["E"] / alone["E"] - 1)
         faults += apart > SAME
