@@ -92,6 +92,10 @@ class Content(Section):
         spheres = self.round is not None and self.round.particles == "spheres"
         if spheres and self.modulus.method not in ("series", "auto"):
             raise RefusedError("modulus.method", self.modulus.method, "series or auto for spheres")
+        any_cell = self.round is not None and not self.round.square
+        if any_cell and self.modulus.method == "series":
+            allowed = "auto, slices or prism for ellipses or any stiffness"
+            raise RefusedError("modulus.method", self.modulus.method, allowed)
         return self
 
     @model_validator(mode="after")

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import itertools
 import re
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from alphacut.case.types import (
     ALPHA,
@@ -28,10 +31,15 @@ from alphacut.case.types import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.quantity import number
+from alphacut.rve.cell import VoigtPhase
+from alphacut.rve.mesh.outline import Ellipse
 from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
 from alphacut.stochastic.radius_map import Kind, MapFamily
 
 CELL_METHODS = ("prism", "slices", "series", "auto")
+ELLIPSES = re.compile(r"ellipses\(\s*([0-9.]+)\s*,\s*(-?[0-9.]+)\s*\)")
+SHAPES = 'cylinders, spheres or ellipses(ratio of axes, degrees), as "ellipses(2, 30)"'
 BETA = re.compile(r"beta\(\s*([0-9.]+)\s*,\s*([0-9.]+)\s*\)")
 LAWS = 'normal, uniform or beta(p, q), as "beta(2, 5)"'
 
@@ -107,22 +115,98 @@ class RadiusMap(Section):
         return self
 
 
+@dataclass(frozen=True)
+class ModulusOrStiffness(Quantity):
+    """Young's modulus, or three rows of the plane-strain stiffness (11, 22, 12 with 2 ε12)."""
+
+    def read(self, value: object) -> object:
+        """The modulus as a fuzzy number in Pa, or the material of the stiffness.
+
+        Raises:
+            RefusedError: It is neither.
+        """
+        if not isinstance(value, list):
+            return super().read(value)
+        try:
+            return VoigtPhase(tuple(tuple(number(x, "Pa") for x in row) for row in value))
+        except ValueError:
+            allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
+            raise RefusedError("", value, allowed) from None
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The JSON Schema: text, or rows of text."""
+        text = super().__get_pydantic_json_schema__(schema, handler)
+        row = {"type": "array", "items": {"type": "string"}}
+        return {**text, "anyOf": [*text["anyOf"], {"type": "array", "items": row}]}
+
+
 class RoundCell(Section):
     """The two elastic phases of the periodic cell, and the shape of its particle."""
 
-    particles: Literal["cylinders", "spheres"] = Field(
-        default="cylinders", description="cylinders in plane strain, or spheres in a cubic array"
+    particles: str = Field(
+        default="cylinders",
+        description=f"{SHAPES}; cylinders and ellipses in plane strain, spheres in a cubic array",
     )
     matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
     matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
-    inclusion_modulus: Modulus = Field(description="Young's modulus of the particle")
-    inclusion_poisson: Ratio = Field(description="Poisson's ratio of the particle")
+    inclusion_modulus: Annotated[
+        FuzzyNumber | VoigtPhase, ModulusOrStiffness("Pa", above=0, fuzzy=True)
+    ] = Field(
+        description="Young's modulus of the particle, or three rows of its plane-strain stiffness"
+        " (11, 22, 12 with 2 ε12)"
+    )
+    inclusion_poisson: Ratio | None = Field(
+        default=None, description="Poisson's ratio of the particle, beside its modulus"
+    )
 
     @property
     def phases(self) -> dict[str, FuzzyNumber]:
         """The elastic constants by name."""
         names = [f"{x}_{y}" for x in ("matrix", "inclusion") for y in ("modulus", "poisson")]
-        return {name: getattr(self, name) for name in names}
+        every = ((name, getattr(self, name)) for name in names)
+        return {name: number for name, number in every if isinstance(number, FuzzyNumber)}
+
+    @property
+    def outline(self) -> Ellipse | None:
+        """Outline of the particle, None for round ones.
+
+        Raises:
+            RefusedError: There is no such shape.
+        """
+        if self.particles in ("cylinders", "spheres"):
+            return None
+        if (shape := ELLIPSES.fullmatch(self.particles)) is None:
+            raise RefusedError("cell.particles", self.particles, SHAPES)
+        return Ellipse(float(shape[1]), float(shape[2]))
+
+    @property
+    def stiffness(self) -> VoigtPhase | None:
+        """The particle where it is not isotropic."""
+        of = self.inclusion_modulus
+        return of if isinstance(of, VoigtPhase) else None
+
+    @property
+    def square(self) -> bool:
+        """True for round particles of an isotropic material."""
+        return self.outline is None and self.stiffness is None
+
+    @model_validator(mode="after")
+    def _one_material(self) -> Self:
+        """Refuses a material that is none, or that is none of spheres.
+
+        Raises:
+            RefusedError: It is none, or the shape is.
+        """
+        if (self.stiffness is None) == (self.inclusion_poisson is None):
+            allowed = "a number beside Young's modulus, none beside a stiffness"
+            value = "missing" if self.stiffness is None else "beside a stiffness"
+            raise RefusedError("cell.inclusion_poisson", value, allowed)
+        if self.outline is None and self.stiffness and self.particles == "spheres":
+            allowed = "Young's modulus of spheres"
+            raise RefusedError("cell.inclusion_modulus", "a plane stiffness", allowed)
+        return self
 
 
 class ImageCell(Section):

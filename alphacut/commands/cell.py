@@ -98,7 +98,7 @@ def export(radius: RadiusMap, phases: RoundCell, choice: cell.CellChoice, path: 
     from alphacut.export.fields import cell_fields, check_ending, write_mesh
 
     check_ending(path)
-    mesh = cell_fields(cell.modal_parts(radius, phases), choice.size, choice.layers)
+    mesh = cell_fields(cell.modal_cell(radius, phases), choice.size, choice.layers)
     write_mesh(mesh, path)
     return {"file": str(path), "nodes": len(mesh.points)}
 
@@ -117,8 +117,8 @@ def summary(result: Homogenised, document: Document) -> str:
         rows.append(
             (key.replace("_GPa", ", GPa"), f"{number['value']:.6g}", f"{number['error']:.1e}")
         )
-    low, high = document["references"]["hashin_shtrikman_E_GPa"]
-    rows.append(("Hashin–Shtrikman bounds of E, GPa", f"{low:.4f} … {high:.4f}", ""))
+    if ends := document["references"].get("hashin_shtrikman_E_GPa"):
+        rows.append(("Hashin–Shtrikman bounds of E, GPa", f"{ends[0]:.4f} … {ends[1]:.4f}", ""))
     if "difference" in document:
         rows.append(("difference of both methods", f"{document['difference']:.1e}", ""))
     iterations = ", ".join(map(str, result.iterations)) or "none"

@@ -116,13 +116,15 @@ def summary(document: Document) -> str:
         for alpha, *ends in zip(document["alpha"], *columns, strict=True)
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")
-    low, high = document["references"]["hashin_shtrikman_E_GPa"]
+    ends = document["references"].get("hashin_shtrikman_E_GPa")
+    words = "Hashin–Shtrikman bounds of E at the modal values"
+    bounds = f"{words}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else ""
     error = sum(document["error"].values())
     return (
         text_table(head, rows)
         + fibres(document)
         + f"E is {document['nature']}; error of the cell's model {error:.1e} of E\n"
-        f"Hashin–Shtrikman bounds of E at the modal values: {low:.4f} … {high:.4f} GPa\n"
-        f"{document['samples']} samples, {document['solves']} linear systems,"
+        + bounds
+        + f"{document['samples']} samples, {document['solves']} linear systems,"
         f" {document['seconds']:.1f} s, {document['method']}\n"
     )

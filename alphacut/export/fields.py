@@ -10,16 +10,14 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import whole_file
-from alphacut.rve.cell import LOADS, Phase
-from alphacut.stochastic import RadiusMap
+from alphacut.rve.cell import LOADS, Cell
+from alphacut.rve.mesh.outline import circle
 
 if TYPE_CHECKING:
     import meshio
 
     from alphacut.rve.prism.fields import CellFields
 
-Cell = tuple[RadiusMap, Phase, Phase]
-"""Radius map, matrix and inclusion."""
 # From Basix's order of a wedge's edges to meshio's, Abaqus's and Gmsh's reader's: lower triangle,
 # upper triangle, vertical edges.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
@@ -88,10 +86,12 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     from alphacut.rve.mesh.prism_grid import PrismGrid
     from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 
-    plane = triangulate(size=size, radius=reference_radius(cell[0]))
+    outline = cell.outline or circle
+    radius = reference_radius(cell.radius, outline)
+    plane = triangulate(size=size, radius=radius, outline=outline)
     grid = PrismGrid(plane, layers)
     phase = np.tile(plane.inside.astype(np.int64), grid.layers)
-    return wedges(grid.positions(cell[0]), grid.cells, phase)
+    return wedges(grid.positions(cell.radius), grid.cells, phase)
 
 
 def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:
@@ -105,7 +105,8 @@ def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     from alphacut.rve.prism import fields as prism
     from alphacut.rve.prism.model import PrismModel
 
-    fields = prism.cell_fields(PrismModel(size, layers), *cell)
+    model = PrismModel(size, layers, outline=cell.outline or circle)
+    fields = prism.cell_fields(model, cell.radius, cell.matrix, cell.inclusion)
     return wedges(fields.points, fields.cells, fields.phase, point_data(fields))
 
 

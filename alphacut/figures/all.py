@@ -19,7 +19,7 @@ from alphacut.io.progress import progress
 from alphacut.io.provenance import NESTED, fingerprint, version_of
 from alphacut.questions.table import QUESTIONS
 from alphacut.stages import microstructure
-from alphacut.stages.cell import modal_parts
+from alphacut.stages.cell import modal_cell
 from alphacut.stages.results import Results
 
 if TYPE_CHECKING:
@@ -189,5 +189,5 @@ def _mesh(results: Results, executor: Executor | None, name: str, kind: str) -> 
     content = results.content
     assert content.radius is not None
     assert content.round is not None
-    cell = modal_parts(content.radius, content.round)
+    cell = modal_cell(content.radius, content.round)
     return submitted(executor, draw_mesh, cell, content.mesh, results.folder / name, kind)

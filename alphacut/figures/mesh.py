@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.material import Mesh
-from alphacut.export.fields import Cell, cell_fields, prism_mesh, write_mesh
+from alphacut.export.fields import cell_fields, prism_mesh, write_mesh
 from alphacut.io.files import say, whole_file
+from alphacut.rve.cell import Cell
 
 if TYPE_CHECKING:
     from pyvista import Plotter, PolyData, UnstructuredGrid

@@ -13,8 +13,9 @@ from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import versions
 from alphacut.rve import bounds as plane
-from alphacut.rve.cell import STRAIN, Phase
+from alphacut.rve.cell import STRAIN, AnyPhase, Cell, Phase, VoigtPhase
 from alphacut.rve.fibre_constants import fibre_constants
+from alphacut.rve.mesh.outline import Ellipse, circle
 from alphacut.rve.result import Homogenised, effective_modulus, error_of_means
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
@@ -39,7 +40,7 @@ class CellModel(Protocol):
     """A model of the cell as the front door needs it."""
 
     def solve(
-        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Phase]
+        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[AnyPhase]
     ) -> Sequence[Homogenised]:
         """One result for each inclusion material; mesh and assembly are shared."""
 
@@ -49,7 +50,7 @@ class CellChoice:
     """A cell model and its resolution, small enough for workers.
 
     Args:
-        method: prism, slices, series, or auto, which is the series.
+        method: prism, slices, series, or auto: the series, or slices where it has no formula.
         layers: Element layers in θ.
         size: Element size over half the cell's side.
         tolerance: Relative error of E; None for the model's own accuracy.
@@ -57,7 +58,9 @@ class CellChoice:
         parallel: Whether all MPI ranks work on one cell together.
         moduli: Moduli of the particle that all samples together span, in Pa.
         estimate: Whether elements estimate their error at an extra cost.
-        particles: cylinders or spheres.
+        particles: cylinders, spheres or ellipses.
+        outline: Of ellipses.
+        stiffness: Of a particle that is not isotropic.
         average: "axes", eq. 16, or "isotropic": the average over all directions of the plane.
     """
 
@@ -70,6 +73,8 @@ class CellChoice:
     moduli: tuple[float, float] | None = None
     estimate: bool = False
     particles: str = "cylinders"
+    outline: Ellipse | None = None
+    stiffness: VoigtPhase | None = None
     average: str = "isotropic"
 
     @classmethod
@@ -84,18 +89,25 @@ class CellChoice:
             modulus.tolerance,
             petsc,
             particles=cell.particles,
+            outline=cell.outline,
+            stiffness=cell.stiffness,
             average=modulus.average,
         )
 
     @property
     def averages(self) -> bool:
         """True if E and ν are those of the isotropic average of a plane stiffness."""
-        return self.average == "isotropic" and self.particles == "cylinders"
+        return self.average == "isotropic" and self.particles != "spheres"
 
     @property
     def meaning(self) -> str:
         """Average that E and ν are of: cylinders (eq. 16), isotropic or spheres."""
         return "isotropic" if self.averages else self.particles
+
+    @property
+    def square(self) -> bool:
+        """True for round particles of an isotropic material."""
+        return self.outline is None and self.stiffness is None
 
     def model(self) -> CellModel:
         """The model.
@@ -113,13 +125,14 @@ class CellChoice:
         tolerance = self.tolerance
         if self.particles == "spheres":
             return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11))
-        if self.method in ("auto", "series"):
+        outline = self.outline or circle
+        if self.square and self.method in ("auto", "series"):
             own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
             return SeriesModel(accuracy=own)
-        if self.method == "slices":
+        if self.method in ("auto", "slices"):
             from alphacut.rve.slices.model import SlicesModel
 
-            return SlicesModel(mesh_size=self.size)
+            return SlicesModel(mesh_size=self.size, outline=outline)
         from alphacut.rve.prism.model import PrismModel
 
         return PrismModel(
@@ -130,6 +143,7 @@ class CellChoice:
             stiffness=self.averages,
             estimate=self.estimate,
             moduli=self.moduli,
+            outline=outline,
         )
 
 
@@ -144,7 +158,7 @@ class Averaged:
     model: CellModel
 
     def solve(
-        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Phase]
+        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[AnyPhase]
     ) -> list[Homogenised]:
         """One result for each inclusion material."""
         results = self.model.solve(radius_map, matrix, inclusions)
@@ -156,33 +170,40 @@ def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
     return radius.numbers | cell.phases
 
 
-def parts(values: Mapping[str, float], family: MapFamily) -> tuple[CaseMap, Phase, Phase]:
+def parts(
+    values: Mapping[str, float], family: MapFamily, stiffness: VoigtPhase | None = None
+) -> tuple[CaseMap, Phase, AnyPhase]:
     """Radius map, matrix and inclusion from crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
-    return family(values), matrix, Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+    inclusion = stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+    return family(values), matrix, inclusion
 
 
-def modal_parts(radius: RadiusMap, cell: RoundCell) -> tuple[CaseMap, Phase, Phase]:
-    """Radius map, matrix and inclusion at the modal values."""
+def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
+    """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    return parts(values, radius.family)
+    map_of, matrix, inclusion = parts(values, radius.family, cell.stiffness)
+    return Cell(matrix, inclusion, map_of, cell.outline)
 
 
 def solve(radius: RadiusMap, cell: RoundCell, choice: CellChoice) -> Homogenised:
     """The cell's result at the modal values of its inputs."""
-    map_of, matrix, inclusion = modal_parts(radius, cell)
-    return choice.model().solve(map_of, matrix, [inclusion])[0]
+    modal = modal_cell(radius, cell)
+    return choice.model().solve(modal.radius, modal.matrix, [modal.inclusion])[0]
 
 
 def references(radius: RadiusMap, cell: RoundCell) -> Document:
     """Fraction of the particles, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E in GPa.
 
-    They are of the modal inputs.
+    They are of the modal inputs; the fraction alone of particles that are not round and isotropic.
     """
-    map_of, matrix, inclusion = modal_parts(radius, cell)
+    modal = modal_cell(radius, cell)
+    map_of, matrix, inclusion = modal.radius, modal.matrix, modal.inclusion
     rule, spheres = gauss_rule(map_of.distribution, points=40), cell.particles == "spheres"
     radii = map_of(rule.nodes)
     share = np.asarray(rule.mean(volume_fraction(radii) if spheres else np.pi / 4 * radii**2))
+    if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or not modal.square:
+        return {"fraction": float(share)}
     if spheres:
         ends = space.hashin_shtrikman(share, matrix, inclusion).T
         moduli = [_young(*k) for k in (*ends, space.mori_tanaka(share, matrix, inclusion))]
@@ -235,8 +256,8 @@ def document(result: Homogenised) -> Document:
 
 
 def fibres(result: Homogenised) -> Document:
-    """Constants of fibres with their declared errors, moduli in GPa; none of spheres."""
-    if isinstance(result, HomogenisedSpheres):
+    """Constants of fibres with their declared errors, moduli in GPa; none of other particles."""
+    if isinstance(result, HomogenisedSpheres) or result.cell is None or not result.cell.square:
         return {}
     constants = fibre_constants(result)
     return {

@@ -81,7 +81,8 @@ class CellTask:
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
-        every = [parts({**self.crisp, **point}, self.family) for point in points]
+        family, stiffness = self.family, self.choice.stiffness
+        every = [parts({**self.crisp, **point}, family, stiffness) for point in points]
         radius, matrix, _ = every[0]
         results = self.choice.model().solve(radius, matrix, [inclusion for *_, inclusion in every])
         return [
@@ -99,10 +100,15 @@ class CellTask:
         ]
 
     def _fibres(self, result: Homogenised) -> dict[str, float]:
-        if self.choice.particles == "spheres":
+        if not self.has_fibres:
             return {}
         values = fibre_constants(result).values
         return {name: values[name] for name in FIBRES}
+
+    @property
+    def has_fibres(self) -> bool:
+        """True for particles that are round fibres of an isotropic material."""
+        return self.choice.square and self.choice.particles == "cylinders"
 
     def _shown(self, nodes: Array, stress: Array) -> Array:
         return between_nodes(nodes, stress, self.theta)
@@ -171,8 +177,9 @@ class Campaign:
         if largest or self.task.choice.method != "prism":
             return largest
         modal = {name: number.modal for name, number in self.inputs.items()}
-        radius, matrix, inclusion = parts({**self.task.crisp, **modal}, self.task.family)
-        model = replace(self.task.choice, estimate=True).model()
+        values, choice = {**self.task.crisp, **modal}, self.task.choice
+        radius, matrix, inclusion = parts(values, self.task.family, choice.stiffness)
+        model = replace(choice, estimate=True).model()
         return dict(model.solve(radius, matrix, [inclusion])[0].error)
 
 
@@ -197,11 +204,12 @@ def campaign(
     """
     numbers = inputs_of(radius, cell)
     fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
-    fuzzy = fuzzy or {"inclusion_modulus": numbers["inclusion_modulus"]}
+    material = "inclusion_modulus" if cell.stiffness is None else "matrix_modulus"
+    fuzzy = fuzzy or {material: numbers[material]}
     crisp = {name: number.modal for name, number in numbers.items() if name not in fuzzy}
     choice = CellChoice.of(cell, mesh, modulus, petsc or {})
-    support = cell.inclusion_modulus.support
-    if choice.method == "prism" and support.width > 0:
+    if choice.method == "prism" and cell.stiffness is None:
+        support = numbers["inclusion_modulus"].support
         choice = replace(choice, moduli=(support.lower, support.upper))
     if curves and choice.method in ("auto", "series"):
         choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
@@ -230,8 +238,11 @@ def _known(cell: RoundCell, inputs: Mapping[str, FuzzyNumber]) -> Known:
     averages of the shear modulus. The radius rises with a1, a2, a3 and falls with a4, since h1, h2,
     h3 >= 0 >= h4 (eq. 12).
     """
-    matrix, inclusion = cell.matrix_modulus.support, cell.inclusion_modulus.support
-    poisson = {cell.matrix_poisson.support, cell.inclusion_poisson.support}
+    if not cell.square:
+        return Known()
+    of = {name: number.support for name, number in cell.phases.items()}
+    matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]
+    poisson = {of["matrix_poisson"], of["inclusion_poisson"]}
     stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
     one = next(iter(poisson))
     if len(poisson) > 1 or one.width or one.lower < 0 or not (stiffer or softer):
@@ -254,7 +265,7 @@ def dataset(result: Cuts, task: CellTask, error: Mapping[str, float]) -> xarray.
     import xarray
 
     variables: dict[str, Any] = {}
-    fibres = FIBRES if task.choice.particles == "cylinders" else {}
+    fibres = FIBRES if task.has_fibres else {}
     for name, (unit, about) in (BOUNDS | fibres).items():
         variables |= _cuts(result, name, {"units": unit, "long_name": about})
     variables["point"] = (

@@ -80,10 +80,10 @@ def of_cell(campaign: Campaign) -> Shares:
 
 
 def _cell_range(campaign: Campaign, inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-    """Ends of E and ν on each level, (A, 2), by the series."""
+    """Ends of E and ν on each level, (A, 2), by the series where it has a formula."""
     fuzzy = {name: number for name, number in inputs.items() if not isinstance(number, Crisp)}
     modal = {name: number.modal for name, number in inputs.items() if name not in fuzzy}
-    choice = replace(campaign.task.choice, method="series", moduli=None)
+    choice = replace(campaign.task.choice, method="auto", moduli=None)
     task = replace(campaign.task, choice=choice, crisp={**campaign.task.crisp, **modal})
     if not fuzzy:
         one = task([{}])[0]

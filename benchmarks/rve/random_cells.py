@@ -15,7 +15,7 @@ import argparse
 import sys
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Cell, Phase, VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse, circle
+from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.model import SeriesModel
@@ -132,11 +133,20 @@ def judged_curve(own: Homogenised) -> Iterator[Judgement]:
             yield Judgement(name, float(declared), float(one))
 
 
+def solved(model: PrismModel, cell: Cell) -> Homogenised:
+    """The cell by prisms, on a finer mesh where the one drawn folds over."""
+    try:
+        return model.solve(cell.radius, cell.matrix, [cell.inclusion])[0]
+    except FoldedMeshError:
+        return solved(replace(model, mesh_size=model.mesh_size / 2), cell)
+
+
 def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
     """All numbers of one cell by prisms and slices; empty where a model refuses."""
     parts = cell.radius, cell.matrix, [cell.inclusion]
     try:
-        results = [draw(rng, cell).solve(*parts)[0] for draw in (draw_prism, draw_slices)]
+        prism, slices = draw_prism(rng, cell), draw_slices(rng, cell)
+        results = [solved(prism, cell), slices.solve(*parts)[0]]
     except (FailedError, RefusedError) as refusal:
         print(f"refused: {refusal}", flush=True)
         return []

@@ -26,13 +26,15 @@ class Ellipse:
     """An ellipse of the area of the circle, π ρ².
 
     Args:
-        aspect: Semi-axis along x1 over that along x2, in [1/4, 4].
+        aspect: One semi-axis over the other, in [1/4, 4].
+        turn: Angle from x1 to the first, counterclockwise, in degrees.
 
     Raises:
         RefusedError: The aspect is out of range.
     """
 
     aspect: float
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.25 <= self.aspect <= 4:
@@ -40,8 +42,9 @@ class Ellipse:
 
     def __call__(self, angle: Array) -> Array:
         """Distances over ρ at angles."""
+        own = angle - np.radians(self.turn)
         return np.asarray(
-            1 / np.sqrt(np.cos(angle) ** 2 / self.aspect + np.sin(angle) ** 2 * self.aspect)
+            1 / np.sqrt(np.cos(own) ** 2 / self.aspect + np.sin(own) ** 2 * self.aspect)
         )
 
 
