@@ -57,11 +57,3 @@ def plane_constants(moduli: Array, average: str) -> Array:
     shear = shear_modulus(moduli, average)
     poisson = (1 - 2 * shear / moduli[..., 0]) / 2  # eq. 16: ν = (1 − A/B)/2 with A = 2 G
     return np.stack([2 * shear * (1 + poisson), poisson], axis=-1)  # E = A (1 + ν)
-
-
-def shear_ratio(stiffness: Array) -> float:
-    """Shear modulus along the diagonals over that along the axes, (C11 − C12)/(2 C33).
-
-    Of a plane stiffness, or of one in space, whose last entry is C44.
-    """
-    return float((stiffness[0, 0] - stiffness[0, 1]) / (2 * stiffness[-1, -1]))

@@ -135,17 +135,8 @@ def square_moduli(stiffness: Array) -> Array:
     return np.stack([mean + lateral, mean - lateral, stiffness[..., 2, 2]], axis=-1)
 
 
-def with_ratio(moduli: Array) -> Array:
-    """C11 + C12, C11 − C12, C33 and the ratio of the last two, shape (…, 4), from the first three.
-
-    Both moduli of the ratio come from one discretisation and err alike, so that its error is judged
-    by itself.
-    """
-    return np.concatenate([moduli, moduli[..., 1:2] / moduli[..., 2:3]], axis=-1)
-
-
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """The three moduli and their ratio, shape (…, axes, 4).
+    """The three moduli, shape (…, axes, 3).
 
     Of the square-symmetric part where that is all there is, else besides with C11 and with C22
     alone.
@@ -154,13 +145,4 @@ def axial_moduli(stiffness: Array, *, square: bool) -> Array:
     for k in () if square else (0, 1):
         axial, lateral = stiffness[..., k, k], stiffness[..., 0, 1]
         readings.append(np.stack([axial + lateral, axial - lateral, stiffness[..., 2, 2]], -1))
-    return np.stack([with_ratio(one) for one in readings], axis=-2)
-
-
-def with_ratio_errors(errors: Array) -> Array:
-    """Relative errors of the three moduli and of the ratio, shape (…, 4), from the first three.
-
-    For errors that know nothing of one another.
-    """
-    apart = (1 + errors[..., 1:2]) * (1 + errors[..., 2:3]) - 1
-    return np.concatenate([errors, apart], axis=-1)
+    return np.stack(readings, axis=-2)

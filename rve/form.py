@@ -68,4 +68,5 @@ class CellForm:
     def load(self, uniform: Array, parts: slice = WHOLE) -> Array:
         """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
         self._uniform.value[:] = uniform
-        return np.sum([fem.assemble_vector(form).array for form in self._load[parts]], axis=0)
+        every = [fem.assemble_vector(form).array for form in self._load[parts]]
+        return np.asarray(np.sum(every, axis=0))

@@ -7,7 +7,6 @@ from importlib import import_module
 from typing import Any, Protocol
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.rve.cell import AnyPhase, Phase
 from alphacut.rve.result import Homogenised
 from alphacut.stochastic import RadiusMap
 
@@ -50,17 +49,6 @@ def named(name: str, **options: object) -> Model:
         raise RefusedError(f"option of {name}", unknown[0], ", ".join(maker.__dataclass_fields__))
     model: Model = maker(**options)
     return model
-
-
-def automatic(*phases: AnyPhase, **options: object) -> Model:
-    """The series, exact for circles of isotropic phases, or slices, for any other cell.
-
-    Args:
-        phases: All phases of the cell.
-        options: `outline` of the particle, if it is no circle, and others of slices.
-    """
-    plain = all(isinstance(phase, Phase) for phase in phases)
-    return named("series") if plain and not options else named("slices", **options)
 
 
 def cross_check(

@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, shear_modulus
-from alphacut.rve.cell import STRAIN, Cell, square_moduli, with_ratio_errors
+from alphacut.rve.cell import STRAIN, Cell, square_moduli
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,8 +69,8 @@ class Homogenised:
         iterations: Iterations of the linear solver, one number per load.
         seconds: Wall time by stage: mesh, assemble, setup, solve, total, jit.
         errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
-            C11 − C12, C33 and, where it is known by itself, the ratio of the last two, shape (3,)
-            or (4,), nan for a modulus that was not computed; empty where none were estimated.
+            C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty where none
+            were estimated.
         reason: Why this model and resolution were taken.
         checks: Certificate: name of each property to its measured violation, within its bound.
         cell: What was homogenised.
@@ -172,21 +172,9 @@ class Homogenised:
 
         All sources together; nan where unknown.
         """
-        return self._all_errors[:3]
-
-    @property
-    def ratio_error(self) -> float:
-        """Declared relative error of (C11 − C12)/C33, all sources together; nan where unknown."""
-        return float(self._all_errors[3])
-
-    @property
-    def _all_errors(self) -> Array:
-        """Declared relative errors of the three moduli and of the ratio, shape (4,)."""
         if not self.errors:
-            return np.full(4, np.nan)
-        errors = np.prod([1 + error for error in self.errors.values()], axis=0) - 1
-        propagated = with_ratio_errors(errors[:3])
-        return np.minimum(errors, propagated) if errors.size == 4 else propagated
+            return np.full(3, np.nan)
+        return np.asarray(np.prod([1 + error for error in self.errors.values()], axis=0) - 1)
 
     def error_of(self, function: Callable[[Array], Array | float]) -> Array:
         """Declared absolute error of a function of the three moduli, of its shape.
@@ -206,7 +194,7 @@ class Homogenised:
     @property
     def error(self) -> dict[str, float]:
         """Declared relative error of E by source; their sum is `estimated_error`."""
-        shares = {name: self._error_of_modulus(part[:3]) for name, part in self.errors.items()}
+        shares = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
         scale = self.estimated_error / (sum(shares.values()) or 1.0)
         return {name: scale * share for name, share in shares.items()}
 
@@ -224,16 +212,6 @@ class Homogenised:
         if not self.errors:
             return float("nan")
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
-
-    @property
-    def shear_ratio(self) -> tuple[float, float]:
-        """Shear modulus along the diagonals over that along the axes, and its declared error.
-
-        Both moduli come from one discretisation and err alike, so that the ratio is surer than
-        they.
-        """
-        ratio = float(self.moduli[1] / (2 * self.moduli[2]))
-        return ratio, abs(ratio) * self.ratio_error
 
     def _error_of_modulus(self, errors: Array) -> float:
         """Relative error of E from those of the moduli."""

@@ -12,16 +12,6 @@ STIFFEST = 0.45
 """Poisson's ratio above which quadratic elements lock."""
 
 
-def require_radius(radius: float) -> None:
-    """Refuse a radius outside (0, 1).
-
-    Raises:
-        RefusedError: It lies outside.
-    """
-    if not 0 < radius < 1:
-        raise RefusedError("the radius", f"{radius:g}", f"values in (0, 1), {HALVES}")
-
-
 def require_mesh_size(size: float) -> None:
     """Refuse an edge length outside (0, 1].
 

@@ -15,7 +15,6 @@ from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.outline import Outline, circle, reach, require_fit
 from alphacut.rve.mesh.square import Triangles
-from alphacut.rve.settings import require_mesh_size
 from alphacut.stochastic import RadiusMap, require_map
 
 
@@ -68,13 +67,7 @@ def triangulate(*, size: float, radius: float, outline: Outline = circle) -> Tri
         radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
             it.
         outline: Of the particle.
-
-    Raises:
-        ValueError: `size` or `radius` out of range.
     """
-    require_mesh_size(size)
-    if not 0 <= radius < 1:
-        raise ValueError(f"the reference radius is {radius:g}; it must lie in [0, 1)")
     points, triangles, inside = _kept_triangles(size, radius, outline)
     return _add_midpoints(*_neighbours_near(points, triangles, inside), radius, outline)
 

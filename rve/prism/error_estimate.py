@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.bounds import reuss, voigt
-from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli, with_ratio, with_ratio_errors
+from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
 from alphacut.rve.mesh.outline import area, circle
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.series.model import SeriesModel
@@ -45,7 +45,7 @@ def judged(result: Homogenised) -> Homogenised:
 
 
 def _by_series(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
-    """Errors of means, (4,), and of stresses at the nodes, (n, 2), by the multipole series."""
+    """Errors of means, (3,), and of stresses at the nodes, (n, 2), by the multipole series."""
     matrix, inclusion = cell.matrix, cell.inclusion
     assert isinstance(matrix, Phase)
     assert isinstance(inclusion, Phase)
@@ -77,24 +77,23 @@ def _polynomial(x: Array, y: Array, at: Array, degree: int) -> Array:
 
 
 def _of_means(curve: StressCurve, exact: Homogenised) -> Array:
-    """Relative errors of the mean moduli and the ratio of the last two, shape (4,)."""
+    """Relative errors of the mean moduli, shape (3,)."""
     own, truth = _readings(curve), _readings(exact.curve)
     # where one load is lacking, s11 is along x1
     truth = truth[1:] if len(own) == 1 else truth
     pairs = [_apart(*pair) for pair in zip(own, truth, strict=False)]
     apart = np.max(pairs, axis=0)  # nan where a modulus is not known
-    left = np.append(exact.modulus_errors, exact.ratio_error)
-    return np.asarray((1 + apart) * (1 + left) - 1)
+    return np.asarray((1 + apart) * (1 + exact.modulus_errors) - 1)
 
 
 def _readings(curve: StressCurve) -> Sequence[Array]:
-    """The mean moduli with their ratio, (4,), along either axis and, at last, of both.
+    """The mean moduli, (3,), along either axis and, at last, of both.
 
     Where no third load was solved, C11 − C12 is not known, and only those printed are.
     """
     s11, s12 = curve.mean
     if curve.stiffness is None:
-        return [with_ratio(np.array([s11 / STRAIN, np.nan, s12 / (2 * STRAIN)]))]
+        return [np.array([s11 / STRAIN, np.nan, s12 / (2 * STRAIN)])]
     mean = np.asarray(np.tensordot(curve.weights, curve.stiffness, axes=1), float)
     both, first, second = axial_moduli(mean, square=False)
     return [second, first, both]
@@ -113,10 +112,10 @@ def _by_bounds(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
         replace(curve, stiffness=c, s11=stresses(c)[0], s12=stresses(c)[1])
         for c in (bound(share, cell.matrix, cell.inclusion) for bound in (reuss, voigt))
     ]
-    own = _readings(curve)[-1][:3]
-    mean = np.max([_apart(own, _readings(end)[-1][:3]) for end in ends], axis=0)
+    own = _readings(curve)[-1]
+    mean = np.max([_apart(own, _readings(end)[-1]) for end in ends], axis=0)
     nodes = [_of_nodes(curve, np.stack([e.s11, e.s12], axis=-1), np.zeros(2)) for e in ends]
-    return with_ratio_errors(mean), np.max(nodes, axis=0)
+    return np.asarray(mean), np.max(nodes, axis=0)
 
 
 def _apart(first: Array, second: Array) -> Array:

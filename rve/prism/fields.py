@@ -16,8 +16,6 @@ from alphacut.rve.prism.problem import PrismProblem
 from alphacut.stochastic import RadiusMap
 
 NODES = 15
-VTK = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
-"""Nodes of VTK's quadratic wedge (its cell type 26) by their place in Basix's order."""
 
 
 @dataclass(frozen=True)

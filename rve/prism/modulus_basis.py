@@ -83,7 +83,9 @@ def modulus_basis(
         systems[0].copy(problem.matrix, _SAME)
         problem.matrix.axpy(part, systems[1], _SAME)
         solver = solver or problem.solver(_LOOSE)  # its factors serve both
-        solved.append(solver.solve([_sum(*pair, part) for pair in zip(*forces, strict=True)]))
+        solved.append(
+            solver.solve([_sum(first, second, part) for first, second in zip(*forces, strict=True)])
+        )
     assert solver is not None
     vectors = _orthonormal([v for solutions in solved for v in solutions.vectors])
     images = [[system * v for v in vectors] for system in systems]

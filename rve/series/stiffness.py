@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import Phase, square_voigt, with_ratio
+from alphacut.rve.cell import Phase, square_voigt
 from alphacut.rve.series.multipoles import LOADS, MOST_HARMONICS, Contrast, modulus, multipoles
 from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
 
@@ -18,7 +18,6 @@ _SAFETY = 1.6
 _TRUNCATION = Truncation(
     lambda harmonics: harmonics * 4 // 3 + 2, MOST_HARMONICS, "harmonics", "particles"
 )
-_SHARED_BY_RATIO = 0.1  # of the errors of two moduli, by the error of their ratio
 
 
 @dataclass(frozen=True)
@@ -29,8 +28,7 @@ class SquareStiffness:
         bulk: C11 + C12, from ε11 = ε22.
         deviator: C11 − C12, from ε11 = −ε22.
         shear: C33, σ12 over 2 ε12.
-        errors: Declared relative truncation errors of the three and of deviator over shear, shape
-            (…, 4).
+        errors: Declared relative truncation errors of the three, shape (…, 3).
         harmonics: Harmonics per potential that reached it.
     """
 
@@ -86,7 +84,6 @@ def square_stiffness(
         _first_guess(radius, tolerance),
         solve,
         tolerance=max(tolerance, _ROUND_OFF),
-        errors=4,
     )
     bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
     return SquareStiffness(bulk, deviator, shear, errors, used)
@@ -104,11 +101,10 @@ def _first_guess(radius: Array, tolerance: float) -> Array:
 def _solve_batch(
     radius: Array, contrast: Contrast, count: int, loads: Sequence[str]
 ) -> tuple[Array, Array]:
-    """Moduli, shape (rows, m, 3), and their declared relative errors and the ratio's, (rows, m, 4).
+    """Moduli and their declared relative errors, shape (rows, m, 3) each.
 
     They are nan and zero of other loads. A quarter and a half more harmonics tell the error of
-    `count`, with a margin. The ratio may change little by chance: it counts a share of what
-    deviator and shear do.
+    `count`, with a margin.
     """
     counts = count, count + max(2, count // 4), count + max(4, count // 2)
     moduli = np.full((len(counts), radius.size, contrast.kappa_i.size, len(LOADS)), np.nan)
@@ -117,6 +113,5 @@ def _solve_batch(
             modulus(load, multipoles(load, radius, contrast, harmonics=n), radius, contrast)
             for n in counts
         ]
-    gap = np.nan_to_num(error_by_more_terms(*with_ratio(moduli)))
-    gap[..., 3] = np.maximum(gap[..., 3], _SHARED_BY_RATIO * gap[..., 1:3].max(axis=-1))
+    gap = np.nan_to_num(error_by_more_terms(*moduli))
     return moduli[0], _ROUND_OFF / 10 + _SAFETY * gap

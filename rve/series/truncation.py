@@ -41,7 +41,6 @@ class Truncation:
         solve: Solve,
         *,
         tolerance: float,
-        errors: int = 3,
     ) -> tuple[Array, Array, Array]:
         """Moduli of n cells times m inclusions, each with as many terms as it needs.
 
@@ -49,33 +48,31 @@ class Truncation:
             radius: Radii over half the cell's side, shape (n,).
             inclusions: m.
             first: Numbers of terms to begin with, shape (n,).
-            solve: Three moduli of k cells and their declared relative errors, shape (k, m, 3) and
-                (k, m, errors), from the cells' rows and the number of terms.
+            solve: Three moduli of k cells and their declared relative errors, shape (k, m, 3)
+                each, from the cells' rows and the number of terms.
             tolerance: Relative error allowed, of the moduli.
-            errors: 3, or more where numbers made of the moduli declare one of their own.
 
         Returns:
-            Moduli and declared relative errors, shape (n, m, 3) and (n, m, errors), and terms used,
-            (n, m).
+            Moduli and declared relative errors, shape (n, m, 3) each, and terms used, (n, m).
 
         Raises:
             SeriesError: `most` terms do not suffice.
         """
         shape = (radius.size, inclusions)
-        moduli, error = np.zeros((*shape, 3)), np.full((*shape, errors), np.inf)
+        moduli, error = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
         used, todo = np.zeros(shape, int), np.arange(radius.size)
         terms = np.minimum(first, self.most)
         while todo.size:
             for count in np.unique(terms[todo]):
                 rows = todo[terms[todo] == count]
                 # what is settled stays, whatever its companions need
-                open_ = error[rows, :, :3].max(axis=2) > tolerance
+                open_ = error[rows].max(axis=2) > tolerance
                 values, left = solve(rows, int(count))
                 moduli[rows] = np.where(open_[..., None], values, moduli[rows])
                 error[rows] = np.where(open_[..., None], left, error[rows])
                 used[rows] = np.where(open_, count, used[rows])
-            todo = todo[error[todo, :, :3].max(axis=(1, 2)) > tolerance]
-            self._refuse(radius[todo], terms[todo], error[todo, :, :3], tolerance)
+            todo = todo[error[todo].max(axis=(1, 2)) > tolerance]
+            self._refuse(radius[todo], terms[todo], error[todo], tolerance)
             terms[todo] = np.minimum(self.following(terms[todo]), self.most)
         return moduli, error, used
 

@@ -31,8 +31,7 @@ def with_errors(curve: StressCurve, error: Array, *, square: bool = True) -> Str
 
     Args:
         curve: With its stiffness.
-        error: Relative errors of C11 + C12, C11 − C12, C33 and their ratio at the nodes, shape
-            (n, 4).
+        error: Relative errors of C11 + C12, C11 − C12 and C33 at the nodes, shape (n, 3).
         square: Whether x1 and x2 differ by the mesh alone.
     """
     moduli = square_moduli(np.asarray(curve.stiffness))
@@ -41,7 +40,7 @@ def with_errors(curve: StressCurve, error: Array, *, square: bool = True) -> Str
 
 
 def mean_errors(curve: StressCurve, error: Array, *, square: bool = True) -> Array:
-    """Relative errors of the mean moduli and their ratio from those at the nodes, shape (n, 4).
+    """Relative errors of the mean moduli from those at the nodes, shape (n, 3).
 
     Args:
         curve: With its stiffness.
@@ -49,30 +48,13 @@ def mean_errors(curve: StressCurve, error: Array, *, square: bool = True) -> Arr
         square: Whether x1 and x2 differ by the mesh alone.
 
     Returns:
-        Of C11 + C12, C11 − C12, C33 and the ratio of the last two means, shape (4,).
+        Of C11 + C12, C11 − C12 and C33, shape (3,).
     """
     moduli = square_moduli(np.asarray(curve.stiffness))
     mean = curve.weights @ moduli
-    own = curve.weights @ (moduli * error[:, :3]) / mean
-    errors = np.append(own, ratio_error(curve.weights, moduli, error))
+    errors = np.asarray(curve.weights @ (moduli * error) / mean)
     errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1) * square
     return errors
-
-
-def ratio_error(weights: Array, moduli: Array, error: Array) -> float:
-    """Relative error of the ratio of the mean C11 − C12 and C33 from those at n nodes.
-
-    With shares p and q of the nodes in either mean and errors d of C11 − C12, s of C33 and ρ of
-    their ratio, it is Σ p d − Σ q s = Σ p ρ + Σ (p − q) s = Σ q ρ + Σ (p − q) d.
-
-    Args:
-        weights: Shape (n,).
-        moduli: C11 + C12, C11 − C12 and C33 at the nodes, shape (n, 3).
-        error: Relative, of the three moduli and the ratio, shape (n, 4).
-    """
-    p, q = (weights[:, None] * moduli / (weights @ moduli))[:, 1:].T
-    _, d, s, ratio = error.T
-    return float(min(p @ ratio + abs(p - q) @ s, q @ ratio + abs(p - q) @ d))
 
 
 def certified(result: Homogenised, cell: Cell) -> Homogenised:

@@ -35,7 +35,7 @@ _SAFETY = 3.3
 _COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
 _ELONGATED = 1.5  # safety of particles that are not round, whose ends bend more
 _POINTWISE = 1.5  # safety of a single θ, where errors do not average
-_SHARED = np.array([0.03, 0.5, 0.5, 0.5])  # C11 + C12 is the easiest by far
+_SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ class Slice:
         return np.asarray(self.by_order[_ORDERS.index(order)])
 
     def error(self, order: int, *, square: bool) -> Array:
-        """Declared relative errors of C11 + C12, C11 − C12, C33 and the ratio, shape (m, 4).
+        """Declared relative errors of C11 + C12, C11 − C12, C33, shape (m, 3).
 
         The distance from order 4, and the declared error of that one.
 
@@ -158,13 +158,13 @@ class Slice:
             square: Whether the stiffness has the symmetry of the square; else errors along either
                 axis count.
         """
-        moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 4)
+        moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 3)
         own = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
         gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2) * (1 if square else _ELONGATED)
         return np.asarray((1 + own) * (1 + self._error_of_highest(gaps)) - 1)
 
     def _error_of_highest(self, gaps: Array) -> Array:
-        """Declared errors by order 4, shape (m, 4), from changes by each rise of order, (2, m, 4).
+        """Declared errors by order 4, shape (m, 3), from changes by each rise of order, (2, m, 3).
 
         The geometric series of further orders, times a safety factor. What one order more leaves
         of the last change is what the last rise left of the one before. One modulus may change
@@ -173,7 +173,7 @@ class Slice:
         fade = np.clip(gaps[1] / np.maximum(gaps[0], 1e-300), _FADE, 0.5)
         safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
         error = safety * gaps[1] * fade / (1 - fade)
-        shared = _SHARED * error[:, :3].max(axis=1, keepdims=True)
+        shared = _SHARED * error.max(axis=1, keepdims=True)
         return np.asarray(np.maximum(error, shared) + _ROUND_OFF + self.cancelled)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.fenicsx import MPI, PETSc, basix, factors, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
@@ -29,14 +29,9 @@ class PlaneCell:
 
     Attributes:
         unknowns: Unknowns after elimination.
-
-    Raises:
-        RefusedError: `order` out of range.
     """
 
     def __init__(self, mesh: PlaneMesh, order: int) -> None:
-        if order not in range(1, 5):
-            raise RefusedError("order of the elements", order, "1, 2, 3, 4")
         nodes, cells = curved_nodes(mesh, order)
         variant = basix.LagrangeVariant.gll_warped
         element = basix.ufl.element("P", "triangle", order, variant, shape=(2,))

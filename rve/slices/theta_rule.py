@@ -13,7 +13,7 @@ from numpy.polynomial.chebyshev import chebvander
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.bounds import mori_tanaka
-from alphacut.rve.cell import AnyPhase, square_moduli, with_ratio
+from alphacut.rve.cell import AnyPhase, square_moduli
 from alphacut.rve.result import StressCurve
 from alphacut.rve.slices.curve import curve_of
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule, require_map
@@ -116,7 +116,7 @@ def settle_rule(
     *,
     points: int | None,
     accuracy: float,
-    moduli: Callable[[Array], Array] = lambda stiffness: with_ratio(square_moduli(stiffness)),
+    moduli: Callable[[Array], Array] = square_moduli,
 ) -> tuple[list[StressCurve], list[Array], list[StressCurve]]:
     """Curves whose nodes are added until the mean moduli settle, and their declared errors.
 
@@ -128,7 +128,7 @@ def settle_rule(
             cheap.
         points: Nodes, or None for as many as settle.
         accuracy: Relative error of every mean modulus that counts as settled.
-        moduli: The three moduli of a stiffness, and what else of it is to be judged.
+        moduli: The three moduli of a stiffness.
 
     Returns:
         For each inclusion its curve, the errors of `moduli` of the mean stiffness, and the finest
@@ -150,7 +150,7 @@ def settle_rule(
             for three in zip(*(known[n] for n in counts), strict=True)
         ]
         for k, (curve, gap) in enumerate(zip(known[count], gaps, strict=True)):
-            if k not in settled and (points or gap[:3].max() <= accuracy):
+            if k not in settled and (points or gap.max() <= accuracy):
                 # each inclusion by itself, whatever its companions need
                 settled[k] = curve, gap, known[counts[-1]][k]
         if len(settled) == len(gaps):
@@ -218,9 +218,9 @@ def theta_error(
     moduli: Array,
     phases: tuple[AnyPhase, AnyPhase],
 ) -> Array:
-    """Declared relative errors by `rule`, shape (4,), from slices solved.
+    """Declared relative errors by `rule`, shape (3,), from slices solved.
 
-    Of the mean C11 + C12, C11 − C12, C33 and of the ratio of the last two.
+    Of the mean C11 + C12, C11 − C12 and C33.
 
     The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
     particles or an incompressible matrix make the modulus itself steep: polynomials through the
@@ -244,12 +244,12 @@ def theta_error(
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
     touch, target = np.sqrt(1 - radii**2), np.sqrt(1 - between**2)
     ends, width = touch.min() + touch.max(), max(np.ptp(touch), 1e-12)
-    own, gaps = with_ratio(rule.weights @ moduli[places]), []
+    own, gaps = rule.weights @ moduli[places], []
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
         basis, carried = (chebvander((2 * x - ends) / width, degree) for x in (touch, target))
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
         refined = scale * np.exp(np.clip(carried @ coefficients, low - span, high + span))
-        gaps.append(with_ratio(fine.weights @ refined) / own - 1)
+        gaps.append(fine.weights @ refined / own - 1)
     return np.asarray(SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
 
 

@@ -47,12 +47,6 @@ class HomogenisedSpheres(Homogenised):
         """Shear modulus of Hill's average, in Pa."""
         return float(hill_shear(moduli))
 
-    @property
-    def shear_ratio(self) -> tuple[float, float]:
-        """Shear modulus along the diagonals of a face over C44, and its declared error."""
-        ratio = float(self.moduli[1] / self.moduli[2])
-        return ratio, float(self.error_of(lambda moduli: moduli[1] / moduli[2]))
-
 
 def volume_fraction(radius: Array) -> Array:
     """Share of the cell that a sphere takes, π r³/6, of radii over half the cell's side."""

@@ -19,7 +19,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Phase
 from alphacut.rve.fenicsx import MPI, PETSc, compiled, factors, fem, petsc, ufl
 from alphacut.rve.interruption import uninterrupted
-from alphacut.rve.settings import HALVES, require_mesh_size, require_radius
+from alphacut.rve.settings import HALVES, require_mesh_size
 from alphacut.rve.spheres.bounds import bulk_and_shear
 
 with uninterrupted():
@@ -66,9 +66,8 @@ class Octant:
     size: float
 
     def __post_init__(self) -> None:
-        require_radius(self.radius)
         require_mesh_size(self.size)
-        if self.radius > CLOSEST:
+        if not 0 < self.radius <= CLOSEST:
             raise RefusedError("radius of the sphere", self.radius, f"up to {CLOSEST}, {HALVES}")
 
     def moduli(self, matrix: Phase, inclusion: Phase) -> Array:
