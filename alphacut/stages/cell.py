@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class CellModel(Protocol):
     """A model of the cell as the front door needs it."""
 
     def solve(
-        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[AnyPhase]
+        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Any]
     ) -> Sequence[Homogenised]:
         """One result for each inclusion material; mesh and assembly are shared."""
 
@@ -158,7 +158,7 @@ class Averaged:
     model: CellModel
 
     def solve(
-        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[AnyPhase]
+        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Any]
     ) -> list[Homogenised]:
         """One result for each inclusion material."""
         results = self.model.solve(radius_map, matrix, inclusions)
