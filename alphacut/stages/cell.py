@@ -40,7 +40,7 @@ class CellModel(Protocol):
     """A model of the cell as the front door needs it."""
 
     def solve(
-        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Any]
+        self, radius_map: Radii, matrix: Any, inclusions: Sequence[Any]
     ) -> Sequence[Homogenised]:
         """One result for each inclusion material; mesh and assembly are shared."""
 
@@ -157,9 +157,7 @@ class Averaged:
 
     model: CellModel
 
-    def solve(
-        self, radius_map: Radii, matrix: Phase, inclusions: Sequence[Any]
-    ) -> list[Homogenised]:
+    def solve(self, radius_map: Radii, matrix: Any, inclusions: Sequence[Any]) -> list[Homogenised]:
         """One result for each inclusion material."""
         results = self.model.solve(radius_map, matrix, inclusions)
         return [result.averaged("isotropic") for result in results]
