@@ -90,12 +90,11 @@ class Content(Section):
         if "microstructure" in self.stages and self.radius is not None:
             raise RefusedError("radius", "beside stage microstructure", "one of them")
         spheres = self.round is not None and self.round.particles == "spheres"
-        if spheres and self.modulus.method not in ("series", "auto"):
-            raise RefusedError("modulus.method", self.modulus.method, "series or auto for spheres")
-        any_cell = self.round is not None and not self.round.square
-        if any_cell and self.modulus.method == "series":
-            allowed = "auto, slices or prism for ellipses or any stiffness"
-            raise RefusedError("modulus.method", self.modulus.method, allowed)
+        method, any_cell = self.modulus.method, self.round is not None and not self.round.square
+        if (spheres and method in ("prism", "slices")) or (any_cell and method == "series"):
+            other = "auto, slices or prism for ellipses or any stiffness"
+            allowed = "series or auto for spheres" if spheres else other
+            raise RefusedError("modulus.method", method, allowed)
         return self
 
     @model_validator(mode="after")
