@@ -102,8 +102,9 @@ def envelope(
 
 def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
     """The envelope of a follower with the proof beside it, where one is affordable."""
-    follows = isinstance(way, GraphFollower | ImprovedFollower)
-    if not (follows and isinstance(over.flow, LinearFlow) and len(over.boxes.names) <= JUDGED):
+    if not isinstance(way, GraphFollower | ImprovedFollower):
+        return of
+    if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > JUDGED:
         return of
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
