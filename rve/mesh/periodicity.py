@@ -42,6 +42,8 @@ def identify(plane: Triangulation) -> Periodicity:
     folded = np.where(keys == 10**7, -(10**7), keys)
     _, first, label = np.unique(folded, axis=0, return_index=True, return_inverse=True)
     label = label.ravel()
+    sides = (abs(keys) == 10**7).sum(axis=1)
+    assert (np.bincount(label)[label] == 2**sides).all(), "a node of a side has no partner"
     # the corner first, then as numbered
     order = np.argsort(np.where((abs(keys[first]) == 10**7).all(axis=1), -1, first))
     rank = np.empty_like(order)
