@@ -7,7 +7,6 @@ from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
-from alphacut.fuzzy.plans.metamodel import Metamodel
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.random_response import RandomResponse
@@ -27,7 +26,7 @@ from alphacut.fuzzy.width_contributions import width_shares
 
 __all__ = [
     "Automatic", "Bounds", "Crisp", "Ellipsoidal", "Extended", "FailedError", "FuzzyNumber",
-    "General", "Interval", "IntervalQuasiMonteCarlo", "Known", "Linear", "Metamodel", "Nature",
+    "General", "Interval", "IntervalQuasiMonteCarlo", "Known", "Linear", "Nature",
     "Optimisation", "PiecewiseLinear", "RandomInput", "RandomResponse", "Reduced", "RefusedError",
     "Signed", "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels",
     "propagate", "width_shares",

@@ -19,7 +19,6 @@ from alphacut.fuzzy import (
     Extended,
     FuzzyNumber,
     General,
-    Metamodel,
     Optimisation,
     Reduced,
     Signed,
@@ -41,7 +40,6 @@ METHODS: dict[str, list[Method]] = {
     "signed": [Signed()],
     "optimisation": [*SEARCHES],
     "differential evolution": [Optimisation("differential_evolution", starts=k) for k in (1, 3)],
-    "metamodel": [Metamodel(boxes, boxes // 4) for boxes in (20, 80, 320)],
     "automatic": [Automatic(passes=k) for k in (1, 4)],
 }
 

@@ -6,9 +6,7 @@ import pytest
 from alphacut.fuzzy import (
     Automatic,
     Known,
-    Metamodel,
     Nature,
-    Optimisation,
     Reduced,
     RefusedError,
     Signed,
@@ -20,8 +18,6 @@ from tests.calibration.declared import Calibration, free_seed
 ALPHA = (0.0, 0.5)
 PLANS = {
     "automatic": (Automatic(), 100),
-    "surface of corners": (Metamodel(60, 20), 25),
-    "surface of a search": (Metamodel(40, 20, Optimisation(starts=1, look=4)), 5),
 }
 
 

@@ -6,9 +6,7 @@ import pytest
 from alphacut.fuzzy import (
     Automatic,
     Interval,
-    Metamodel,
     Nature,
-    Triangular,
     propagate,
 )
 from alphacut.fuzzy.campaign.call import Call
@@ -17,7 +15,7 @@ from alphacut.fuzzy.plans.alpha_cut_optimisation import attained
 from alphacut.fuzzy.plans.automatic import _Passes
 from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
-from tests.calibration.functions import FAMILIES, jump, named, numbers, true_ends
+from tests.calibration.functions import FAMILIES, named, numbers, true_ends
 
 
 def shortfalls(method, family, seed):
@@ -60,33 +58,6 @@ def test_errors_of_the_default_cover_in_every_family():
     assert covered >= 0.98 * total, table
     assert table["smooth"][0] >= 4, table  # most smooth functions are worth an estimate
     assert max(row[3] for row in table.values()) < 0.05, table
-
-
-def test_a_surface_over_a_jump_states_no_error_that_it_does_not_keep():
-    rows = []
-    for seed in range(8):
-        nature, own = shortfalls(Metamodel(60, 20), jump, seed)
-        rows += [own] if nature is Nature.ESTIMATED else []
-    table = np.concatenate(rows) if rows else np.zeros((0, 3))
-    assert (table[:, 0] <= table[:, 1] + 1e-12).all()
-
-
-@pytest.mark.parametrize("boxes", [20, 40])
-def test_the_error_of_a_metamodel_is_tight(boxes):
-    inputs = {"x": Triangular(0, 0.4, 1), "y": Triangular(0, 0.5, 1)}
-
-    def function(x, y):
-        return np.exp(2 * x) * (1 + y) ** 2
-
-    method = Metamodel(boxes=boxes, held_out=10, seed=1)
-    result = propagate(function, inputs, method, alpha=np.linspace(0, 1, 11), vectorised=True)
-    cuts = [np.array([x.cut(a) for a in result.alpha]) for x in inputs.values()]
-    exact = function(*cuts)
-    lack = max(
-        np.abs(result.lower[:, 0] - exact[:, 0]).max(),
-        np.abs(result.upper[:, 0] - exact[:, 1]).max(),
-    )
-    assert lack <= result.error.min() <= 6 * lack
 
 
 def judged(gain, *lacks):

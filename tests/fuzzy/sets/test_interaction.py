@@ -9,8 +9,8 @@ from alphacut.fuzzy import (
     General,
     Interval,
     Linear,
-    Metamodel,
     Optimisation,
+    Reduced,
     RefusedError,
     Triangular,
     levels,
@@ -60,7 +60,7 @@ def test_an_ellipsoid_leaves_inputs_that_it_does_not_name_their_whole_cuts():
         np.testing.assert_allclose(result.bounds(name).upper, [widest, widest / 2], rtol=1e-5)
 
 
-@pytest.mark.parametrize("method", [General(), Metamodel(4, 1)])
+@pytest.mark.parametrize("method", [General(), Reduced()])
 def test_methods_that_cannot_respect_interactions_refuse(method):
     with pytest.raises(RefusedError) as refused:
         propagate(lambda a, b: a, SQUARE, method, interactions=[Linear({"a": 1}, 0.5)])
