@@ -18,10 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from alphacut.export.fields import ORDER
 from alphacut.rve import Phase
 from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
-from alphacut.rve.prism.fields import VTK, cell_fields
+from alphacut.rve.prism.fields import cell_fields
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap
@@ -101,7 +102,7 @@ def picture(folder: Path) -> None:
     """Draw the particle and the shear stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, VTK]])
+    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, ORDER]])
     wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
     wedges.point_data["stress 12 in MPa"] = drawn.stress[:, 2, 1] / 1e6
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=(1300, 900))

@@ -22,11 +22,12 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+from alphacut.export.fields import ORDER
 from alphacut.rve import LOADS, Phase, effective_modulus
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.rve.mesh.wedge import slab_rule
-from alphacut.rve.prism.fields import VTK, cell_fields
+from alphacut.rve.prism.fields import cell_fields
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.options import SolverOptions
@@ -147,7 +148,7 @@ def picture(folder: Path) -> None:
     """Write the fields, and draw the particle and the stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, VTK]])
+    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, ORDER]])
     wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
     wedges.cell_data["phase"] = drawn.phase
     wedges.point_data["stress 11 in MPa"] = drawn.stress[:, 0, 0] / 1e6

@@ -41,7 +41,8 @@ def analyse(
         ModalError: The structure has no such modes, or the motion is not the exact one.
     """
     if not isinstance(flow.integrator, Exact):
-        raise ModalError(f"modal: the motion is that of the scheme '{flow.integrator.name}'")
+        name = flow.integrator.name
+        raise ModalError(f"modal: the integrator is {name}; take exact, or a graph follower")
     points = boxes.to_physical(unit)
     depth = {"derivatives": order > 0, "bent": order > 1}
     matrices, rows = evaluate(flow.system, flow.names, points, **depth)

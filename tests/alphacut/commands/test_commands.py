@@ -149,9 +149,13 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, 
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
 
 
-@pytest.mark.parametrize(("method", "status"), [("search", 1), ("graph-follower", 0)])
-def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(tmp_path, capfd, method, status):
-    changes = {'"0.1 mm"': '"1e-9 mm"', '"exact"': '"midpoint"', "graph-follower": method}
+@pytest.mark.parametrize(
+    ("method", "integrator", "status"), [("search", "exact", 1), ("graph-follower", "midpoint", 0)]
+)
+def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
+    tmp_path, capfd, method, integrator, status
+):
+    changes = {'"0.1 mm"': '"1e-9 mm"', "exact": integrator, "graph-follower": method}
     case = written(tmp_path, **changes)
     code, _, err = spoken(capfd, "envelope", case)
     assert code == status
