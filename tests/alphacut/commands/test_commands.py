@@ -155,7 +155,7 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, 
 def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
     tmp_path, capfd, method, integrator, status
 ):
-    changes = {'"0.1 mm"': '"1e-9 mm"', "exact": integrator, "graph-follower": method}
+    changes = {'"0.1 mm"': '"1e-20 mm"', '"exact"': f'"{integrator}"', "graph-follower": method}
     case = written(tmp_path, **changes)
     code, _, err = spoken(capfd, "envelope", case)
     assert code == status
