@@ -20,6 +20,16 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput, Problem, nearest
 from alphacut.io.toml_lines import lines_of_keys
 
+KINDS = {
+    "tuple_type": "an array",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "dict_type": "a table",
+    "model_type": "a section",
+    "model_attributes_type": "a section",
+}
+"""What a key takes, by Pydantic's name of the error."""
+
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     """Reads a case file.
@@ -97,7 +107,7 @@ def _problem(key: str, detail: ErrorDetails) -> Problem:
         return Problem(
             key, "", _written(detail["input"]), allowed, close and f"did you mean {close}?"
         )
-    words = str(cause) if cause else detail["msg"][:1].lower() + detail["msg"][1:]
+    words = str(cause) if cause else KINDS.get(detail["type"], detail["msg"])
     return Problem(key, "", _written(detail["input"]), words)
 
 

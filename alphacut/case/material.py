@@ -38,8 +38,10 @@ from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
 from alphacut.stochastic.radius_map import Kind, MapFamily
 
 CELL_METHODS = ("prism", "slices", "series", "auto")
-ELLIPSES = re.compile(r"ellipses\(\s*([0-9.]+)\s*,\s*(-?[0-9.]+)\s*\)")
-SHAPES = 'cylinders, spheres or ellipses(ratio of axes, degrees), as "ellipses(2, 30)"'
+ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
+SHAPES = (
+    'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
+)
 BETA = re.compile(r"beta\(\s*([0-9.]+)\s*,\s*([0-9.]+)\s*\)")
 LAWS = 'normal, uniform or beta(p, q), as "beta(2, 5)"'
 
@@ -129,7 +131,7 @@ class ModulusOrStiffness(Quantity):
             return super().read(value)
         try:
             return VoigtPhase(tuple(tuple(number(x, "Pa") for x in row) for row in value))
-        except ValueError:
+        except (TypeError, ValueError):
             allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
             raise RefusedError("", value, allowed) from None
 
@@ -142,10 +144,30 @@ class ModulusOrStiffness(Quantity):
         return {**text, "anyOf": [*text["anyOf"], {"type": "array", "items": row}]}
 
 
+def _outline(particles: str) -> Ellipse | None:
+    """Outline of a particle that is not round.
+
+    Raises:
+        RefusedError: There is no such shape.
+    """
+    if particles in ("cylinders", "spheres"):
+        return None
+    try:
+        aspect, turn = ELLIPSES.findall(particles)[0]
+        return Ellipse(float(aspect), float(turn))
+    except (IndexError, ValueError):
+        raise RefusedError("", particles, SHAPES) from None
+
+
+def _with_outline(particles: str) -> str:
+    _outline(particles)
+    return particles
+
+
 class RoundCell(Section):
     """The two elastic phases of the periodic cell, and the shape of its particle."""
 
-    particles: str = Field(
+    particles: Annotated[str, after(_with_outline)] = Field(
         default="cylinders",
         description=f"{SHAPES}; cylinders and ellipses in plane strain, spheres in a cubic array",
     )
@@ -170,16 +192,8 @@ class RoundCell(Section):
 
     @property
     def outline(self) -> Ellipse | None:
-        """Outline of the particle, None for round ones.
-
-        Raises:
-            RefusedError: There is no such shape.
-        """
-        if self.particles in ("cylinders", "spheres"):
-            return None
-        if (shape := ELLIPSES.fullmatch(self.particles)) is None:
-            raise RefusedError("cell.particles", self.particles, SHAPES)
-        return Ellipse(float(shape[1]), float(shape[2]))
+        """Outline of the particle, None for round ones."""
+        return _outline(self.particles)
 
     @property
     def stiffness(self) -> VoigtPhase | None:

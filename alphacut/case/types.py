@@ -205,7 +205,7 @@ def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
 after = AfterValidator
 """A check of a value that has its type."""
 CaseFile = Annotated[Path, Text(case_file)]
-Names = Annotated[tuple[str, ...], Some, after(unlike)]
+Names = Annotated[tuple[str, ...], Each, after(unlike)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]

@@ -30,15 +30,16 @@ class Ellipse:
         turn: Angle from x1 to the first, counterclockwise, in degrees.
 
     Raises:
-        RefusedError: The aspect is out of range.
+        RefusedError: The aspect is out of range, or the angle is none.
     """
 
     aspect: float
     turn: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.25 <= self.aspect <= 4:
-            raise RefusedError("aspect of the ellipse", self.aspect, "values in [0.25, 4]")
+        if not (0.25 <= self.aspect <= 4 and np.isfinite(self.turn)):
+            value = f"{self.aspect:g} turned by {self.turn:g}°"
+            raise RefusedError("aspect of the ellipse", value, "values in [0.25, 4]")
 
     def __call__(self, angle: Array) -> Array:
         """Distances over ρ at angles."""

@@ -115,15 +115,12 @@ def test_the_wheel_owns_one_name_and_holds_every_file(wheel):
     assert {name for name in names if ".dist-info/" not in name} == sources()
 
 
-def test_the_archive_holds_what_tests_need_and_each_file_once(archive):
+def test_the_archive_holds_what_tests_need(archive):
     with tarfile.open(archive) as content:
-        files = {member.name.partition("/")[2]: member for member in content.getmembers()}
-    for name in NESTED:
-        assert files[f"alphacut/{name}"].linkname == f"../{name}"
-        assert not any(file.startswith(f"alphacut/{name}/") for file in files)
+        files = {name.partition("/")[2] for name in content.getnames()}
     for folder in ("tests", "benchmarks", "cases", "docs", "meshes", *NESTED):
         here = {path.relative_to(ROOT).as_posix() for path in (ROOT / folder).rglob("*")}
-        assert {file for file in here if "__pycache__" not in file} <= set(files)
+        assert {file for file in here if "__pycache__" not in file} <= files
     for name in ("enter", "Makefile", ".ci/run", "README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
         assert name in files
 
