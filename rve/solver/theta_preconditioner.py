@@ -136,19 +136,25 @@ class ThetaPreconditioner:
         self.own = matrix.createVecLeft()
         self.scatter, self.whole = PETSc.Scatter.toAll(self.own)
         self._sets = self._spans()
-        self._parts = matrix.createSubMatrices(self._sets)
+        parts = matrix.createSubMatrices(self._sets)
         n, v, layers = numbering.planar, numbering.between, numbering.grid.layers
         self._hats = [_hat(n, v, below=k > 0, above=k < layers) for k in numbering.levels]
-        blocks = [part.PtAP(hat) for part, hat in zip(self._parts, self._hats, strict=False)]
+        blocks = [part.PtAP(hat) for part, hat in zip(parts, self._hats, strict=False)]
         self.levels = [PlaneSolver(block) for block in blocks]
-        self.middles = [PlaneSolver(part) for part in self._parts[len(blocks) :]]
+        self.middles = [PlaneSolver(part) for part in parts[len(blocks) :]]
         self._set_up(law)
 
     def renew(self, law: ThetaLaw) -> None:
-        """Take the matrix as it is now; the analysis of its pattern is kept."""
-        self.matrix.createSubMatrices(self._sets, submats=self._parts)
-        for part, hat, level in zip(self._parts, self._hats, self.levels, strict=False):
+        """Take the matrix as it is now; the analysis of its pattern is kept.
+
+        PETSc 3.22 cannot fill parts again on several ranks where they are large, so that these
+        are new each time, and copied.
+        """
+        parts = self.matrix.createSubMatrices(self._sets)
+        for part, hat, level in zip(parts, self._hats, self.levels, strict=False):
             part.PtAP(hat, level.matrix)
+        for part, middle in zip(parts[len(self.levels) :], self.middles, strict=True):
+            part.copy(middle.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self._set_up(law)
 
     def _set_up(self, law: ThetaLaw) -> None:
