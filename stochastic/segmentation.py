@@ -114,7 +114,7 @@ class Segmentation:
                 f"in doubt on {share:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
                 f" drift of light of {self.drift:.3g} grey levels",
                 f"up to {most:.0%}",
-                "smooth the image, level its light, or take a better one",
+                "smooth = true takes noise away, level = true the drift of light",
             )
 
 

@@ -17,6 +17,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document, ranks
 from alphacut.io.text_table import text_table
 from alphacut.io.units import fixed
+from alphacut.report.results import ISOTROPIC, fibre_label
 from alphacut.rve.model import cross_check
 from alphacut.rve.result import Homogenised
 from alphacut.stages import cell, image
@@ -114,14 +115,13 @@ def summary(result: Homogenised, document: Document) -> str:
         ("mean σ12, GPa", fixed(stress["s12"], 9), f"{off.get('s12', 0.0):.1e}"),
     ]
     for key, number in document["fibres"].items():
-        rows.append(
-            (key.replace("_GPa", ", GPa"), f"{number['value']:.6g}", f"{number['error']:.1e}")
-        )
+        rows.append((fibre_label(key), f"{number['value']:.6g}", f"{number['error']:.1e}"))
     if ends := document["references"].get("hashin_shtrikman_E_GPa"):
-        rows.append(("Hashin–Shtrikman bounds of E, GPa", f"{ends[0]:.4f} … {ends[1]:.4f}", ""))
+        rows.append((f"{ISOTROPIC}, GPa", f"{ends[0]:.4f} … {ends[1]:.4f}", ""))
     if "difference" in document:
         rows.append(("difference of both methods", f"{document['difference']:.1e}", ""))
-    iterations = ", ".join(map(str, result.iterations)) or "none"
+    iterations = ", ".join(map(str, result.iterations))
+    words = f", {result.solver}, iterations {iterations}" if iterations else ""
     return text_table((result.convention, "value", "± error"), rows) + (
-        f"{result.method}, {result.unknowns} unknowns, {result.solver}, iterations {iterations}\n"
+        f"{result.method}, {result.unknowns} unknowns{words}\n"
     )

@@ -16,6 +16,7 @@ from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import attributes
 from alphacut.io.text_table import text_table
 from alphacut.io.units import fixed
+from alphacut.report.results import ISOTROPIC, fibre_label, width_text
 from alphacut.stages import cell, image, modulus
 from alphacut.stages.store import Stage
 
@@ -92,14 +93,14 @@ def image_table(document: Document) -> str:
     ]
     table = text_table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows)
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
-    return table + "".join(shares)
+    return table + "".join(shares) + width_text(document) + "\n"
 
 
 def fibres(document: Document) -> str:
     """Constants of fibres at the lowest and the highest level; empty of spheres."""
     rows = [
         (
-            key.replace("_GPa", ", GPa"),
+            fibre_label(key),
             *(f"{cuts['lower'][k]:.5g} … {cuts['upper'][k]:.5g}" for k in (0, -1)),
         )
         for key, cuts in document["fibres"].items()
@@ -117,8 +118,7 @@ def summary(document: Document) -> str:
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")
     ends = document["references"].get("hashin_shtrikman_E_GPa")
-    words = "Hashin–Shtrikman bounds of E at the modal values"
-    bounds = f"{words}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else ""
+    bounds = f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else ""
     error = sum(document["error"].values())
     return (
         text_table(head, rows)

@@ -29,6 +29,8 @@ NATURES = {
 }
 """Meaning of each nature, for the page."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
+ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
+"""Label of the bounds of E of every composite that is isotropic in its plane, modal values."""
 ANSWERS = ("question", "answer", "nature")
 GRAVITY = float(STANDARD_GRAVITY)
 
@@ -84,7 +86,20 @@ def material(summary: Document) -> Table:
         rows.append((name, cut(young, -1), cut(young, 0), kind, f"{error:.1g}" if error else ""))
         if "nu_cuts" in part:
             rows.append(("ν", cut(part["nu_cuts"], -1), cut(part["nu_cuts"], 0), kind, ""))
+        if across := part.get("fibres", {}).get("E_T_GPa"):
+            rows.append((fibre_label("E_T_GPa"), cut(across, -1), cut(across, 0), kind, ""))
     return MATERIAL, rows
+
+
+def fibre_label(key: str) -> str:
+    """Label of a constant of fibres: nu_LT as ν_LT, E_T_GPa as E_T, GPa."""
+    return key.replace("nu", "ν").replace("_GPa", ", GPa")
+
+
+def width_text(image: Document) -> str:
+    """Width of E at the lowest level by what it comes from; empty without one."""
+    parts = (f"{source} {width:.3g} GPa" for source, width in image["widths_GPa"].items())
+    return "Width of E from " + ", ".join(parts)
 
 
 def motion(summary: Document) -> Table:

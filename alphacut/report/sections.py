@@ -23,6 +23,7 @@ from alphacut.report.results import (
     motion,
     nature_of,
     natures,
+    width_text,
 )
 from alphacut.report.safe import figures
 
@@ -123,7 +124,7 @@ class Page:
         words = "The bounds are those of the image as it was segmented, in plane strain."
         return section(
             "How stiff is the image?",
-            paragraphs(words, *_fractions(part.get("fractions", {}))),
+            paragraphs(words, *_fractions(part.get("fractions", {})), width_text(part) + "."),
             self._drawn("image"),
             folded("α-cuts", table(("α", "E from, GPa", "E to, GPa"), rows)),
         )
@@ -231,8 +232,8 @@ def _percent(share: float | None) -> str:
 
 def _references(part: Document) -> list[tuple[str, str]]:
     known = {
-        "hashin_shtrikman_E_GPa": "Hashin–Shtrikman bounds",
-        "mori_tanaka_E_GPa": "Mori–Tanaka",
+        "hashin_shtrikman_E_GPa": "Hashin–Shtrikman bounds, isotropic composites",
+        "mori_tanaka_E_GPa": "Mori–Tanaka, isotropic composites",
     }
     of = part.get("references", {})
     return [
