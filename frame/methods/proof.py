@@ -6,7 +6,8 @@
 2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
    the error of the motion (`frame.certificate.model_error`). The degree rises until that takes a
    fifth of the gap wanted. Where it does not, the box is cut in two across its relatively widest
-   input, and each part has polynomials of its own, up to `parts` of them.
+   input, and each part has polynomials of its own, up to `parts` of them. Where these are too few
+   to cut every input once, none is cut: the error would seldom fall enough.
 3. Branch and bound encloses the polynomials' extremes at all nodes, for all outputs, sides and
    levels, between a point that is attained and a bound that is proved (`frame.certificate`).
 4. The envelope is the union over the parts: proved bounds, the points that attain all but the gap
@@ -60,7 +61,7 @@ class Proof:
         tolerance: Largest error allowed: what the gap may grow to where a smaller one is not
         proved.
         boxes: Most boxes looked at for each bound, on average; where they end, the gap is wider.
-        parts: Most parts of the box with polynomials of their own.
+        parts: Most parts of the box with polynomials of their own; d inputs are cut from 2^d on.
         budget: Most eigen-analyses on each part.
         workers: Threads, which do not change the result; all cores unless given.
 
@@ -116,6 +117,7 @@ class Proof:
     ) -> list[tuple[Boxes, ModalModel, Array, float]]:
         """Parts of the box with their models, proved errors and gaps."""
         reason: UnprovedError | ModalError = UnprovedError("nothing was tried")
+        most = self.parts if 2 ** len(flow.boxes.names) <= self.parts else 1
         for gap in gaps:
             done: list[tuple[Boxes, ModalModel, Array, float]] = []
             left = [flow.boxes]
@@ -126,7 +128,7 @@ class Proof:
                     continue
                 except (GapError, ModalError) as error:
                     reason = error
-                if len(done) + len(left) + 2 > self.parts:
+                if len(done) + len(left) + 2 > most:
                     break
                 left += boxes.halves()
             else:
