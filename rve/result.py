@@ -11,7 +11,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, shear_modulus
+from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, require_average, shear_modulus
 from alphacut.rve.cell import STRAIN, Cell, square_moduli
 
 if TYPE_CHECKING:
@@ -95,8 +95,7 @@ class Homogenised:
         Raises:
             RefusedError: There is none of this name, or it needs a plane stiffness not computed.
         """
-        if average not in AVERAGES:
-            raise RefusedError("average", average, " or ".join(AVERAGES))
+        require_average(average)
         if average != AXES and self.stiffness is None:
             cure = "let the model make the whole plane stiffness"
             raise RefusedError("average", average, f"{AXES} without C11 − C12", cure)

@@ -37,13 +37,18 @@ class Periodicity:
 
 @lru_cache(maxsize=4)
 def identify(plane: Triangulation) -> Periodicity:
-    """Pair the nodes on opposite sides of the cell."""
+    """Pair the nodes on opposite sides of the cell.
+
+    Raises:
+        RuntimeError: A node has none.
+    """
     keys = np.round(plane.points * 1e7).astype(np.int64)
     folded = np.where(keys == 10**7, -(10**7), keys)
     _, first, label = np.unique(folded, axis=0, return_index=True, return_inverse=True)
     label = label.ravel()
     sides = (abs(keys) == 10**7).sum(axis=1)
-    assert (np.bincount(label)[label] == 2**sides).all(), "a node of a side has no partner"
+    if (np.bincount(label)[label] != 2**sides).any():
+        raise RuntimeError("a node of a side has no partner on the opposite side: mesh both alike")
     # the corner first, then as numbered
     order = np.argsort(np.where((abs(keys[first]) == 10**7).all(axis=1), -1, first))
     rank = np.empty_like(order)

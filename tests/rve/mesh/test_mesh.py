@@ -64,7 +64,7 @@ def test_a_node_without_a_partner_is_refused():
     points = plane.points.copy()
     side = np.flatnonzero((points[:, 0] == 1) & (abs(points[:, 1]) < 0.9))
     points[side[0], 1] += 1e-3
-    with pytest.raises(AssertionError, match="has no partner"):
+    with pytest.raises(RuntimeError, match="has no partner"):
         identify.__wrapped__(SimpleNamespace(points=points, vertices=plane.vertices))
 
 
