@@ -18,7 +18,6 @@ from alphacut.case.content import CONTENT
 from alphacut.case.keys import Keys, every_key, sections
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput, Problem, nearest
-from alphacut.io.toml_lines import lines_of_keys
 
 KINDS = {
     "tuple_type": "an array",
@@ -29,6 +28,8 @@ KINDS = {
     "model_attributes_type": "a section",
 }
 """What a key takes, by Pydantic's name of the error."""
+HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]*?)\s*\]\]?")
+ASSIGNMENT = re.compile(r"""\s*([A-Za-z0-9_.\-"' ]+?)\s*=""")
 
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
@@ -163,3 +164,29 @@ def _located(
     if key in changed:
         return replace(problem, file="command line")
     return replace(problem, file=str(path), line=lines.get(key, 0))
+
+
+def lines_of_keys(text: str) -> dict[str, int]:
+    """Full key name (``study[1].name`` in repeated tables) to its line, from 1."""
+    lines: dict[str, int] = {}
+    counts: dict[str, int] = {}
+    prefix, inside = "", ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if inside:
+            inside = "" if inside in line else inside
+        elif header := HEADER.match(line):
+            name = header[2].strip().strip("\"'")
+            if header[1] == "[[":
+                counts[name] = counts.get(name, -1) + 1
+                name = f"{name}[{counts[name]}]"
+            prefix = name + "."
+            lines.setdefault(name, number)
+        elif match := ASSIGNMENT.match(line):
+            lines.setdefault(prefix + re.sub(r"[\"' ]", "", match[1]), number)
+            inside = _opened(line[match.end() :])
+    return lines
+
+
+def _opened(rest: str) -> str:
+    """Closing mark of a value that goes on over the next lines, or an empty text."""
+    return next((quotes for quotes in ('"""', "'''") if rest.count(quotes) % 2), "")

@@ -34,16 +34,14 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.quantity import number
 from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
-from alphacut.stochastic import Beta, ThetaLaw, TruncatedNormal
-from alphacut.stochastic.radius_map import Kind, MapFamily
+from alphacut.stochastic import TruncatedNormal
+from alphacut.stochastic.radius_map import MapFamily
 
 CELL_METHODS = ("prism", "slices", "series", "auto")
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
 )
-BETA = re.compile(r"beta\(\s*([0-9.]+)\s*,\s*([0-9.]+)\s*\)")
-LAWS = 'normal, uniform or beta(p, q), as "beta(2, 5)"'
 
 
 class RadiusMap(Section):
@@ -56,56 +54,28 @@ class RadiusMap(Section):
         ],
         after(rising),
     ] = Field(default=(-3.0, 3.0), description="support of θ")
-    law: str = Field(default="normal", description=f"law of θ on its support: {LAWS}")
-    map: Kind = Field(
-        default="hermite",
-        description="hermite, the cubic with the slopes a2 and a4; linear; exponential",
-    )
     a1: Radius = Field(description="radius at the lower end of θ")
     a3: Radius = Field(description="radius at the upper end of θ")
-    a2: Any_ | None = Field(default=None, description="slope dr/dξ at the lower end")
-    a4: Any_ | None = Field(default=None, description="slope dr/dξ at the upper end")
+    a2: Any_ = Field(description="slope dr/dξ at the lower end")
+    a4: Any_ = Field(description="slope dr/dξ at the upper end")
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
-        """Parameters of the map by name: of eq. 12 the factors a1 … a4 of its functions."""
-        every = {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
-        kept = ((name, every[name]) for name in self.family.names)
-        return {name: number for name, number in kept if number is not None}
+        """Parameters of the map by name: the factors a1 … a4 of the functions of eq. 12."""
+        return {name: getattr(self, name) for name in self.family.names}
 
     @property
     def family(self) -> MapFamily:
-        """Maps of this kind, under the law of θ."""
-        return MapFamily(self.map, self.distribution)
-
-    @property
-    def distribution(self) -> ThetaLaw:
-        """Law of θ.
-
-        Raises:
-            RefusedError: There is no such law.
-        """
-        lower, upper = self.theta
-        if self.law == "normal":
-            return TruncatedNormal(lower, upper)
-        if self.law == "uniform":
-            return Beta(1.0, 1.0, lower, upper)
-        if (shape := BETA.fullmatch(self.law)) is None:
-            raise RefusedError("radius.law", self.law, LAWS)
-        return Beta(float(shape[1]), float(shape[2]), lower, upper)
+        """Maps of eq. 12 under the law of θ, a normal one cut off at both ends."""
+        return MapFamily("hermite", TruncatedNormal(*self.theta))
 
     @model_validator(mode="after")
     def _monotone(self) -> Self:
         """Refuses maps that leave (0, 1) at a corner of the supports, which are linear in a1 … a4.
 
         Raises:
-            RefusedError: One does, or a slope is missing.
+            RefusedError: One does.
         """
-        for name in self.family.names:
-            if getattr(self, name) is None:
-                raise RefusedError(
-                    f"radius.{name}", None, "a slope, as 0.1", "map hermite needs it"
-                )
         names = list(self.numbers)
         for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
             values = dict(zip(names, corner, strict=True))

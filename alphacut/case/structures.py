@@ -210,9 +210,15 @@ class Frame(Section):
 
 
 LISTS = (
-    "lengths", "dampers", "displacements", "velocities", "second_moment", "columns", "stiffness",
+    "lengths",
+    "dampers",
+    "displacements",
+    "velocities",
+    "second_moment",
+    "columns",
+    "stiffness",
     "damping_ratio",
-)  # fmt: skip
+)
 """Keys of a frame with one value for each floor, or one for all."""
 DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from alphacut.case.material import RadiusMap
 from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure, title
-from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.radius_map import CaseMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
@@ -17,11 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ in [-3, 3]
-
-
-def law(section: RadiusMap) -> ThetaLaw:
-    """Law of θ."""
-    return section.distribution
 
 
 def maps(section: RadiusMap, alpha: float) -> list[CaseMap]:
@@ -39,8 +33,9 @@ def modal_map(section: RadiusMap) -> CaseMap:
 def radii(section: RadiusMap) -> Figure:
     """Fig. 11: distribution of the paper's log-normal particle radii, σ_r = (ln 10)/6, median 1."""
     drawn, axes = figure()
-    theta = np.linspace(law(section).lower, law(section).upper, 400)
-    axes.plot(np.exp(SIGMA * theta), law(section).cdf(theta), color=BLUE, lw=1.8)  # eq. 11
+    law = section.family.law
+    theta = np.linspace(law.lower, law.upper, 400)
+    axes.plot(np.exp(SIGMA * theta), law.cdf(theta), color=BLUE, lw=1.8)  # eq. 11
     axes.set_xlabel("radius r over its median")
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
@@ -86,10 +81,7 @@ def cone(section: RadiusMap) -> Figure:
     drawn = plt.figure(figsize=(5.0, 5.4))
     axes: Any = drawn.add_subplot(projection="3d")
     radius = modal_map(section)
-    theta, angle = (
-        np.linspace(law(section).lower, law(section).upper, 80),
-        np.linspace(0, 2 * np.pi, 80),
-    )
+    theta, angle = np.linspace(*section.theta, 80), np.linspace(0, 2 * np.pi, 80)
     r = radius(theta)[:, None]
     axes.plot_surface(
         r * np.cos(angle),

@@ -17,7 +17,7 @@ from typing import Any, NoReturn, TextIO
 import numpy as np
 
 from alphacut.fuzzy.refused import FailedError
-from alphacut.io.printable import printable
+from alphacut.io.problem import printable
 
 FULL = 1 << 20
 """Bytes that a disk has at least where it is not full."""
