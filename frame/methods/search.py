@@ -13,7 +13,8 @@
 5. Levels are treated from the narrowest box to the widest; what one attains the next attains too.
 
 The error of a bound is what Newton's method still promises, and `UNSEEN` times the gain of the last
-two passes: of its output as a whole, and of the bounds near by where those gained more.
+two passes: of its output as a whole, and of the bounds near by where those gained more. Where the
+polynomials miss more than `ROUGH` of a peak they lead nowhere, and bounds are only called attained.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ often at a corner."""
 ROUNDS = 6
 """Rounds in which neighbours are tried, at most."""
 ROUGH = 0.3
-"""Error of the polynomials, as a share of an output's peak, above which they have no curvature."""
+"""Error of the polynomials, as a share of an output's peak, above which they do not lead."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class Search:
                 raise RefusedError(key, value, "a positive number")
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Estimated envelope of all outputs on all levels.
+        """Envelope of all outputs on all levels, estimated or, of rough polynomials, attained.
 
         Raises:
             ModalError: The structure has no oscillating modes over the box, or is not linear.
@@ -100,7 +101,8 @@ class Search:
         model = fit_modes(
             flow.flow, flow.boxes, tolerance=SMALL * tolerance, budget=self.budget, scale=flow.scale
         )
-        exact = _exact(model, flow)
+        rough = _rough(model, flow)
+        exact = ExactResponse.of(model, flow.scale, bent=not rough)
         # what leads: polynomials where they are as good as is asked for, or the exact motions
         enough = bool((model.error / flow.scale).max() <= SMALL * tolerance)
         way = exact.model if enough else exact
@@ -124,7 +126,13 @@ class Search:
         }
         cost = {"evaluations": model.analyses, "seconds": time.perf_counter() - begun}
         return flow.envelope(
-            bounds, at, error, method=self.name, nature=Nature.ESTIMATED, facts=facts, **cost
+            bounds,
+            at,
+            None if rough else error,
+            method=self.name,
+            nature=Nature.ATTAINED if rough else Nature.ESTIMATED,
+            facts=facts,
+            **cost,
         )
 
     def _level(
@@ -188,9 +196,9 @@ class Search:
         _follow(way, optima, grid, box, improved)
 
 
-def _exact(model: ModalModel, flow: UnitFlow) -> ExactResponse:
+def _rough(model: ModalModel, flow: UnitFlow) -> bool:
     peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
-    return ExactResponse.of(model, flow.scale, bent=not (model.error.max(0) > ROUGH * peak).any())
+    return bool((model.error.max(0) > ROUGH * peak).any())
 
 
 def _polynomials(way: Response) -> ModalModel:

@@ -36,6 +36,7 @@ class Row:
     guaranteed: bool
     ratios: list[np.ndarray] = field(default_factory=list)
     covered: list[np.ndarray] = field(default_factory=list)
+    most: float = MOST
 
     @property
     def share(self) -> float:
@@ -51,7 +52,7 @@ class Row:
     def right(self) -> bool:
         """Whether enough is covered and not too much declared."""
         least = 1.0 if self.guaranteed else SHARE
-        return self.share >= least and bool(self.quantiles[1] <= MOST)
+        return self.share >= least and bool(self.quantiles[1] <= self.most)
 
 
 @dataclass
@@ -87,7 +88,9 @@ class Calibration:
         floor = np.maximum(np.maximum(true, least), ROUNDING * size)
         self._add(quantity, False, declared / floor, covered, case)
 
-    def guaranteed(self, quantity: str, proved, attained, *, size=1.0, case: object = "") -> None:
+    def guaranteed(
+        self, quantity: str, proved, attained, *, size=1.0, most=MOST, case: object = ""
+    ) -> None:
         """Adds pairs of ends, proved ones and ones attained by another method, shape (N,) each.
 
         Args:
@@ -95,8 +98,11 @@ class Calibration:
             proved: Lower and upper ends.
             attained: The same, which must lie inside.
             size: Magnitude of the values, which are rounded.
+            most: Most that the median of widths may be; infinite where the truth is one point of
+                many that the bounds are of.
             case: What tells this case from others.
         """
+        self.rows.setdefault(quantity, Row(True, most=most))
         (low, high), (least, most) = map(np.atleast_1d, proved), map(np.atleast_1d, attained)
         slack = ROUNDING * np.asarray(size)
         inside = (least >= low - slack) & (most <= high + slack)

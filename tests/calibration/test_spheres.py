@@ -36,8 +36,9 @@ def test_moduli_lie_between_a_bound_and_finite_elements():
         bulk = hashin_shtrikman(volume_fraction(np.array([radius])), matrix, inclusion)[0, :, 0]
         low = np.array([bulk[0], 0.0, 0.0])
         case = f"{k}: radius {radius:.3f}, {matrix}, {inclusion}"
-        table.guaranteed("K", (low[0], above[0]), (exact[0],) * 2, size=above[0], case=case)
-        table.guaranteed("K, both bounds", bulk, (exact[0],) * 2, size=bulk[1], case=case)
+        only = {"most": np.inf, "case": case}  # bounds of many arrangements, of which this is one
+        table.guaranteed("K", (low[0], above[0]), (exact[0],) * 2, size=above[0], **only)
+        table.guaranteed("K, both bounds", bulk, (exact[0],) * 2, size=bulk[1], **only)
         near = above[1:] / 1.03, above[1:]  # elements of this size are right to 3 %
         table.guaranteed("shear", near, (exact[1:],) * 2, size=above[1:], case=case)
     table.judge()
