@@ -117,9 +117,6 @@ class Cell:
         return plain and self.outline is None
 
 
-MODULI = ("C11+C12", "C11-C12", "C33")
-
-
 def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
     """Voigt matrices (…, 3, 3) of square symmetry from C11 + C12, C11 − C12 and C33."""
     voigt = np.zeros((*bulk.shape, 3, 3))

@@ -66,7 +66,7 @@ def rows(document: Document) -> list[Row]:
     """A row for each limit."""
     return [
         (
-            in_words(name, one["limit"], one["unit"]),
+            in_words(name, one["limit"], one["unit"]).replace("beyond", "≤"),
             one["verdict"],
             one["nature"],
             degree(one["possibility"]),
@@ -88,7 +88,9 @@ def _left(one: Document) -> str:
 def words(document: Document) -> str:
     """How to read the degrees."""
     return (
-        "Passing a limit is possible to the degree of the highest α-cut that holds such a motion."
+        "A limit is kept where no motion exceeds it, passed where every motion does, and can be"
+        " passed where a motion is known that does."
+        " Passing it is possible to the degree of the highest α-cut that holds such a motion."
         " It is necessary to one less the degree to which keeping the limit is possible."
         " Attained bounds show what is possible and exclude nothing."
     )

@@ -40,7 +40,9 @@ class Limit:
             structure.require_outputs(key, [self.output])
         number = structure.numbers.get(self.output.replace("drift", "l"))
         if self.share and number is None:
-            raise RefusedError(key, self.text, "a limit in the unit of the output")
+            raise RefusedError(
+                key, self.text, "a storey of the frame, whose length the share is of"
+            )
         return self.value * number.modal if self.share and number else self.value
 
 
@@ -54,12 +56,14 @@ def _limit(value: object) -> Limit:
         return value
     name, bound, text = (part.strip() for part in str(value).partition("<="))
     allowed = "an output, <= and a quantity, as 'drift1 <= 40 mm' or 'drift1 <= 0.5 %'"
+    if not bound:
+        raise RefusedError("", value, allowed)
     share = name.startswith("drift") and text.endswith("%")
     try:
         number = quantity.number(text, "" if share else Output(name).unit)
     except (ValueError, KeyError) as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    if not bound or not re.fullmatch(r"\w+", name) or not number > 0:
+    if not re.fullmatch(r"\w+", name) or not number > 0:
         raise RefusedError("", value, allowed)
     return Limit(name, number, share, str(value))
 

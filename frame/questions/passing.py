@@ -44,11 +44,13 @@ class Passing:
 
     @property
     def verdict(self) -> str:
-        """One of kept, passed and undecided; with the level from which on where that is not 0."""
+        """Kept, passed, can be passed, or undecided; with the level from which on if not 0."""
         level = f" from α = {self.lowest:g} up" if self.lowest else ""
         if self.possibility[1] <= self.lowest:
             return f"kept{level}"
-        return f"passed{level}" if self.necessity[0] >= 1 - self.lowest else "undecided"
+        if self.necessity[0] >= 1 - self.lowest:
+            return f"passed{level}"
+        return "can be passed" if self.possibility[0] > 0 else "undecided"
 
 
 def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:

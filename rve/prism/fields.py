@@ -52,13 +52,14 @@ def cell_fields(
     problem, phases = model.problem(radius_map), (matrix.stiffness, inclusion.stiffness)
     form, grid = problem.form, problem.form.grid
     problem.assemble(phases)
-    vectors = problem.solver(model.options).solve(problem.loads(model.loads)).vectors
+    loads = model.loads(matrix, inclusion)
+    vectors = problem.solver(model.options).solve(problem.loads(loads)).vectors
     fluctuations = [problem.field(vector) for vector in vectors]
     positions = grid.positions(radius_map)
     total = np.empty((grid.nodes, 2, len(vectors)))
     wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, u in enumerate(fluctuations):
-        uniform: Array = model.loads[k]
+        uniform: Array = loads[k]
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
         total[form.node, :, k] = u + positions[form.node, :2] @ tensor
         wedges[form.wedge, ..., k] = _strain_at_nodes(problem, u) + uniform

@@ -129,10 +129,14 @@ class PrismModel:
         """The linear solver with what overrides it."""
         return SolverOptions(self.solver, self.petsc)
 
-    @property
-    def loads(self) -> Array:
-        """Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15)."""
-        return THREE_LOADS if self.stiffness else LOADS
+    def loads(self, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
+        """Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15).
+
+        Two tell all moduli of a cell with the symmetry of the square, of others three.
+        """
+        round_ = is_round(self.outline)
+        square = round_ and isinstance(matrix, Phase) and isinstance(inclusion, Phase)
+        return LOADS if square and not self.stiffness else THREE_LOADS
 
     @property
     def _projects(self) -> bool:
@@ -146,7 +150,8 @@ class PrismModel:
         """Solutions to project on, or None where two of them do not carry the others."""
         assert self.moduli is not None
         with watch("solve"):
-            basis = modulus_basis(problem, matrix, poisson, self.moduli, self.loads)
+            loads = self.loads(matrix, Phase(self.moduli[0], poisson))
+            basis = modulus_basis(problem, matrix, poisson, self.moduli, loads)
         return basis if basis.error <= TOLERANCE else None
 
     def _projected(
@@ -175,7 +180,8 @@ class PrismModel:
         stiffness = (phases[0].stiffness, phases[1].stiffness)
         with watch("assemble"):
             problem.assemble(stiffness)
-            loads = problem.loads(self.loads)
+            strained = self.loads(*phases)
+            loads = problem.loads(strained)
         if np.array_equal(*stiffness):  # the affine field is the solution
             solved = Solutions([load.duplicate() for load in loads], (0,) * len(loads), 0.0)
         else:
@@ -185,7 +191,7 @@ class PrismModel:
                 solved = solver.solve(loads)
         with watch("solve"):
             fluctuations = [problem.field(vector) for vector in solved.vectors]
-            strains = problem.slice_strains(list(zip(self.loads, fluctuations, strict=True)))
+            strains = problem.slice_strains(list(zip(strained, fluctuations, strict=True)))
         result = self._result(problem, strains, phases, solved.residual, watch)
         return replace(result, iterations=solved.iterations)
 
@@ -199,7 +205,7 @@ class PrismModel:
     ) -> Homogenised:
         """The result with its certificate and its declared errors."""
         pair = (phases[0].stiffness, phases[1].stiffness)
-        stress, loads = strains.stress(pair), self.loads
+        stress, loads = strains.stress(pair), self.loads(*phases)
         whole = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
         outline = None if is_round(self.outline) else self.outline

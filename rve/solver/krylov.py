@@ -118,7 +118,7 @@ def translations(matrix: PETSc.Mat, numbering: LevelNumbering) -> PETSc.NullSpac
 
 @contextmanager
 def in_database(options: SolverOptions) -> Iterator[None]:
-    """Keep options in PETSc's database during the block.
+    """Keep options in PETSc's database during the block; those of the caller's own there stay.
 
     Raises:
         OptionError: PETSc refuses an option, or has not asked for an override by the end of the
@@ -126,7 +126,8 @@ def in_database(options: SolverOptions) -> Iterator[None]:
         ConvergenceError: PETSc fails otherwise.
     """
     database = PETSc.Options(PREFIX)
-    for name, value in options.all.items():
+    own = {name: database.getString(name) for name in options.all if database.hasName(name)}
+    for name, value in (options.all | own | dict(options.overrides)).items():
         database[name] = value
     try:
         yield
@@ -139,6 +140,8 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     finally:
         for name in options.all:
             database.delValue(name)
+        for name, value in own.items():
+            database[name] = value
     if unused:
         value = options.overrides[unused[0]]
         option = f"-{PREFIX}{unused[0]}"

@@ -153,7 +153,7 @@ SMALL = HermiteMap(0.2, 0.1, 0.55, 0.1)
     ],
 )
 def test_any_stiffness_and_outline_agree_with_slices_within_declared_errors(outline, particle):
-    prism = solve(SMALL, particle, mesh_size=0.2, layers=6, stiffness=True, **outline)
+    prism = solve(SMALL, particle, mesh_size=0.2, layers=6, **outline)
     slices = SlicesModel(**outline).solve(SMALL, MATRIX, [particle])[0]
     allowed = prism.largest_error + slices.largest_error
     assert abs(prism.stiffness - slices.stiffness).max() <= allowed * slices.stiffness.max()
