@@ -1,4 +1,4 @@
-"""Graph Follower (section 5.3): envelopes from few graphs and their Taylor models.
+"""Graph Follower (section 5.3, eq. 21): envelopes from few graphs and their Taylor models.
 
 This differs from the paper in: 1. One storage serves all outputs, both sides and all levels: levels
 are treated from the narrowest box to the widest, so that every stored graph is admissible and

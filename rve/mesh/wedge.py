@@ -1,4 +1,4 @@
-"""Quadratic 15-node serendipity wedge of the product space (section 3.1).
+"""Quadratic 15-node serendipity wedge of the product space (section 3.1, eq. 3).
 
 Span: P2(x1, x2) ⊗ {1, ζ} plus ζ² P1(x1, x2). One degree of freedom at every vertex and at every
 edge midpoint. Basix has no serendipity element on prisms, so the element is handed to it as a

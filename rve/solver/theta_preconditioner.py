@@ -19,8 +19,7 @@ drifting blocks in the middle:
 
 Both summands are positive semidefinite, their sum is definite; P is off by the second difference of
 K between levels, so the number of iterations depends on neither mesh size nor contrast and falls
-with more layers. It wants whole solves with each level only: any PETSc preconditioner serves, by
-options under the prefix ``rve_level_``.
+with more layers. Any symmetric PETSc preconditioner solves the levels (prefix ``rve_level_``).
 
 Each rank solves for its own levels; PETSc scatters the vectors, from which it takes its rows of the
 products along θ.
@@ -145,11 +144,8 @@ class ThetaPreconditioner:
         self._set_up(law)
 
     def renew(self, law: ThetaLaw) -> None:
-        """Take the matrix as it is now; the analysis of its pattern is kept.
-
-        PETSc 3.22 cannot fill parts again on several ranks where they are large, so that these
-        are new each time, and copied.
-        """
+        """Take the matrix as it is now; the analysis of its pattern is kept."""
+        # new parts: PETSc 3.22 cannot fill large ones again on several ranks
         parts = self.matrix.createSubMatrices(self._sets)
         for part, hat, level in zip(parts, self._hats, self.levels, strict=False):
             part.PtAP(hat, level.matrix)
