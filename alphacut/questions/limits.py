@@ -56,14 +56,12 @@ def _limit(value: object) -> Limit:
         return value
     name, bound, text = (part.strip() for part in str(value).partition("<="))
     allowed = "an output, <= and a quantity, as 'drift1 <= 40 mm' or 'drift1 <= 0.5 %'"
-    if not bound:
-        raise RefusedError("", value, allowed)
     share = name.startswith("drift") and text.endswith("%")
     try:
         number = quantity.number(text, "" if share else Output(name).unit)
     except (ValueError, KeyError) as error:
-        raise RefusedError("", value, allowed, str(error)) from None
-    if not re.fullmatch(r"\w+", name) or not number > 0:
+        raise RefusedError("", value, allowed, str(error) * bool(bound)) from None
+    if not bound or not re.fullmatch(r"\w+", name) or not number > 0:
         raise RefusedError("", value, allowed)
     return Limit(name, number, share, str(value))
 
