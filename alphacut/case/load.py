@@ -1,23 +1,23 @@
-"""From TOML text to a case; every problem is reported at once, with its line."""
+"""A case, from TOML text; every problem is reported at once, with its line."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from alphacut.case.case import Case
 from alphacut.case.changes import apply_changes
-from alphacut.case.content import CONTENT
+from alphacut.case.content import CONTENT, Content
 from alphacut.case.keys import Keys, every_key, sections
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput, Problem, nearest
+from alphacut.io.provenance import digest
 
 KINDS = {
     "tuple_type": "an array",
@@ -30,6 +30,39 @@ KINDS = {
 """What a key takes, by Pydantic's name of the error."""
 HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]*?)\s*\]\]?")
 ASSIGNMENT = re.compile(r"""\s*([A-Za-z0-9_.\-"' ]+?)\s*=""")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case that was read.
+
+    Args:
+        path: File that it comes from.
+        text: The file as it stands.
+        content: The sections of the file, built.
+        changes: Changes from the command line, KEY=VALUE each.
+    """
+
+    path: Path
+    text: str
+    content: Content
+    changes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The file's name without its ending: results go to results/NAME."""
+        return self.path.stem
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """The stages that a run computes."""
+        return self.content.stages
+
+    def traces(self) -> dict[str, str]:
+        """Digest of each section; "" of those that the file does not have."""
+        names = (name for name in CONTENT.model_fields if name not in ("title", "about"))
+        every: Mapping[str, object] = {name: getattr(self.content, name) for name in names}
+        return {name: digest(section) if section else "" for name, section in every.items()}
 
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:

@@ -210,9 +210,6 @@ class ImageCell(Section):
     poisson: Annotated[tuple[Ratio, ...], Each] = Field(description="Poisson's ratio of each phase")
     smooth: bool = Field(default=False, description="whether noise is taken away first")
     level: bool = Field(default=False, description="whether the drift of light is taken away first")
-    width: Annotated[float, Quantity(least=1e-6, most=1)] | None = Field(
-        default=None, description="relative width of the stiffness's bounds to refine pixels to"
-    )
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:

@@ -13,7 +13,7 @@ from alphacut.case.load import load
 from alphacut.case.material import CELL_METHODS, RadiusMap, RoundCell
 from alphacut.commands import options as common
 from alphacut.commands.modulus import image_table
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document, ranks
 from alphacut.io.text_table import text_table
 from alphacut.io.units import fixed
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     choice = cell.CellChoice.of(content.round, content.mesh, content.modulus, petsc)
     choice = replace(choice, parallel=ranks() > 1, estimate=True)
     result = cell.solve(content.radius, content.round, choice)
-    _require_tolerance(result, content.modulus.tolerance)
+    cell.require_tolerance(result.error, content.modulus.tolerance)
     document = {
         **cell.document(result),
         "references": cell.references(content.radius, content.round),
@@ -69,13 +69,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         document["export"] = export(*cross_section, choice, path)
     common.answer(options, document, out, summary(result, document))
     return 0
-
-
-def _require_tolerance(result: Homogenised, tolerance: float | None) -> None:
-    error = sum(result.error.values())
-    if tolerance is not None and error > tolerance * (1 + 1e-9):
-        what = f"the relative error of E is {error:.2g}; the case allows {tolerance:.2g}"
-        raise FailedError(what, "--method auto reaches it")
 
 
 def difference(

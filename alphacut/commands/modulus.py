@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         return 0
     assert content.radius is not None
     assert content.round is not None
-    modulus.require_tolerance(data, content.modulus.tolerance)
+    cell.require_tolerance(modulus.listed(data, "error"), content.modulus.tolerance)
     beside = cell.references(content.radius, content.round)
     document = modulus.document(data) | {"references": beside}
     common.answer(options, document, out, summary(document))

@@ -9,8 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.case.case import Case
-from alphacut.case.load import load
+from alphacut.case.load import Case, load
 from alphacut.commands import options as common
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool

@@ -98,6 +98,11 @@ def digest(content: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def file_digest(path: Path) -> str:
+    """Digest of the content of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def _canonical(value: object) -> object:
     if isinstance(value, BaseModel):
         return [type(value).__name__, {x: getattr(value, x) for x in type(value).model_fields}]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import Document
 from alphacut.io.problem import BadInput, missing
 from alphacut.io.provenance import versions
@@ -281,3 +282,15 @@ def declared_errors(result: Homogenised) -> Document | None:
         "nu": nu,
         "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
     }
+
+
+def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> None:
+    """Requires the declared relative errors of E, by source, within a tolerance, if any.
+
+    Raises:
+        FailedError: Their sum is larger.
+    """
+    whole = sum(error.values())
+    if tolerance is not None and whole > tolerance * (1 + 1e-9):
+        what = f"the relative error of E is {whole:.2g}; the case allows {tolerance:.2g}"
+        raise FailedError(what, "method auto reaches it")

@@ -90,7 +90,7 @@ class Chain:
         assert content.radius is not None
         assert content.round is not None
         data = self.store.take(modulus.stage(samples))
-        modulus.require_tolerance(data, content.modulus.tolerance)
+        cell.require_tolerance(modulus.listed(data, "error"), content.modulus.tolerance)
         beside = cell.references(content.radius, content.round)
         results = replace(results, modulus=data, references=beside)
         if content.response is None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.case import file_digest
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
 from alphacut.frame.identify import (
@@ -26,6 +25,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document
 from alphacut.io.modes_csv import ModeRows, mode_rows
+from alphacut.io.provenance import file_digest
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.store import Stage, Work
 

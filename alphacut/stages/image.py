@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.case import file_digest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document, as_json
+from alphacut.io.provenance import file_digest
 from alphacut.rve.image.bounds import Ends
 from alphacut.rve.image.model import ImageCut, ImageModel
 from alphacut.stages.cell import GPA

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from alphacut.case.material import ImageCell
 
 ACCURACY = 1e-5
-"""Relative energy that the solver may leave; a width takes less."""
+"""Relative energy that the solver may leave."""
 Level = float | None
 """α-level, or None for the modal values alone."""
 Ranges = Callable[[Level], tuple[Rows, Rows]]
@@ -99,9 +99,8 @@ def study_of(cell: ImageCell, alpha: tuple[float, ...], average: str) -> ImageSt
     try:
         grey = read_grey(cell.image, division=1, square=len(cell.pixel) == 1)
         ranges, fuzzy = _labelled(grey, cell.labels) if cell.labels else _thresholds(grey, cell)
-        accuracy = ACCURACY if cell.width is None else min(ACCURACY, cell.width / 100)
-        aspect, solver = cell.pixel[-1] / cell.pixel[0], ConjugateGradient(accuracy)
-        model = ImageModel(aspect, solver=solver, width=cell.width, average=average)
+        aspect, solver = cell.pixel[-1] / cell.pixel[0], ConjugateGradient(ACCURACY)
+        model = ImageModel(aspect, solver=solver, average=average)
         return ImageStudy(cell, ranges, alpha, model, fuzzy)
     except RefusedError:
         raise

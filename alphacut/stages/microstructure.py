@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.case import file_digest
 from alphacut.case.material import RadiusMap
 from alphacut.case.particles import Microstructure as Section
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import as_json, write_text
+from alphacut.io.provenance import file_digest
 from alphacut.stages.store import Stage, Work
 from alphacut.stochastic.microstructure import Microstructure, study
 from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset

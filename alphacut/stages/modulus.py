@@ -22,7 +22,7 @@ from alphacut.fuzzy import (
 )
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.method import Method as Plan
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Bounds as Cuts
 from alphacut.fuzzy.samples.model import Samples
 from alphacut.fuzzy.sets.stepwise import outer_steps
@@ -370,18 +370,6 @@ def fibres(dataset: xarray.Dataset) -> Document:
             key = f"{name}_GPa" if unit == "Pa" else name
             cuts[key] = {"lower": ends[:, 0], "upper": ends[:, 1]}
     return cuts
-
-
-def require_tolerance(dataset: xarray.Dataset, tolerance: float | None) -> None:
-    """Requires the declared relative error of E within a tolerance, if any.
-
-    Raises:
-        FailedError: It is larger.
-    """
-    error = sum(listed(dataset, "error").values())
-    if tolerance is not None and error > tolerance * (1 + 1e-9):
-        what = f"the relative error of E is {error:.2g}; the case allows {tolerance:.2g}"
-        raise FailedError(what, 'modulus.method = "auto" reaches it')
 
 
 def number_of(dataset: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:

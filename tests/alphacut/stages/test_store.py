@@ -8,9 +8,8 @@ import pytest
 import xarray
 
 import alphacut
-from alphacut.case.case import Case
 from alphacut.case.content import Content
-from alphacut.case.load import load
+from alphacut.case.load import Case, load
 from alphacut.entry import main
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.netcdf import own_files, read_dataset, read_summary
@@ -127,7 +126,7 @@ def test_the_case_reaches_few_files(tmp_path):
 
 def test_few_files_import_the_case():
     """Files that name the case or its sections as a whole, for types or to build them."""
-    pattern = re.compile(r"from alphacut\.case\.(case|content|load) import|Results\b.*import")
+    pattern = re.compile(r"from alphacut\.case\.(content|load) import|Results\b.*import")
     every = [path for path in ROOT.glob("alphacut/**/*.py") if path.parts[-2] != "case"]
     names = [path for path in every if pattern.search(path.read_text(encoding="utf-8"))]
     assert 1 <= len(names) <= 18, names
