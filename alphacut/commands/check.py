@@ -13,7 +13,7 @@ from alphacut.case.keys import quantity_of
 from alphacut.case.load import load
 from alphacut.case.types import Section
 from alphacut.commands.options import add_common, answer
-from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.linear import LinearSystem, frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
 from alphacut.io.text_table import text_table
@@ -38,7 +38,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         problems = [asdict(problem) for problem in error.problems]
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
         raise
-    rows, period = list(rows_of("", content)), first_period(content)
+    rows, linear = list(rows_of("", content)), structure(content)
+    period = 2 * pi / float(frequencies(linear)[0]) if linear else None
     document = {
         "case": options.case,
         "ok": True,
@@ -48,13 +49,18 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
     text = text_table(("key", "value", "kind"), rows)
-    text += f"first natural period: {period:.4g} s\n" if period else ""
+    text += (
+        f"first natural period: {period:.4g} s, at the most plausible values\n" if period else ""
+    )
+    if linear and (record := linear.ground):
+        peak = engineering(record.extremes[0], "m/s^2")
+        text += f"record: {len(record.acceleration)} samples, peak {peak}\n"
     answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 
 
-def first_period(content: Content) -> float | None:
-    """First natural period in s at the modal values; None where no linear structure vibrates.
+def structure(content: Content) -> LinearSystem | None:
+    """The linear structure at the modal values; None where none vibrates.
 
     A modulus that is yet to be computed is that of the series at the modal values.
     """
@@ -65,8 +71,7 @@ def first_period(content: Content) -> float | None:
         if content.round is None or content.radius is None:
             return None
         number = Crisp(solve(content.radius, content.round, CellChoice(tolerance=1e-4)).modulus)
-    linear = content.frame.structure(number).linear
-    return None if linear is None else 2 * pi / float(frequencies(linear)[0])
+    return content.frame.structure(number).linear
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

@@ -62,6 +62,9 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     assert "first natural period" in out
     assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
     assert out.endswith("no problems\n")
+    assert (
+        "record: 2001 samples, peak 2.500 m/s^2" in spoken(capfd, "check", "cases/building.toml")[1]
+    )
 
 
 def test_check_gives_problems_as_json(tmp_path, capfd):
