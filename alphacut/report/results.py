@@ -188,7 +188,7 @@ def drivers(summary: Document) -> Iterator[str]:
     """Lines on what drives the modulus, and the peak of the last output."""
     of = {name: one for name, one in summary.get("shares", {}).items() if name == "E"}
     of |= {f"the peak of {x}": one for x, one in [*summary.get("peak_shares", {}).items()][-1:]}
-    yield from (f"Fixing one input narrows {name} by: {_ranked(one)}" for name, one in of.items())
+    yield from (f"Fixing one narrows {name} by: {_ranked(one)}" for name, one in of.items())
 
 
 def _ranked(shares: Document) -> str:

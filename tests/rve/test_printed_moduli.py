@@ -80,7 +80,7 @@ def agree(text, expected):
     """Whether a table has the expected numbers, to the digits that it shows."""
     shown = numbers_of(text)
     for name, value in expected.items():
-        number, half = shown["ν" if name == "nu" else name]
+        number, half = shown[name.replace("nu", "ν")]
         assert abs(number - value) <= 1.0001 * half, (name, number, value)
 
 

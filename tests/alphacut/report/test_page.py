@@ -129,7 +129,7 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
 def test_what_drives_the_peak_is_one_line_of_the_largest_shares():
     shares = {"q1": {"E": 0.1}, "q2": {"E": 0.2, "m1": 0.5, "d": 0.05, "l": 0.3}}
     assert [*drivers({"peak_shares": shares})] == [
-        "Fixing one input narrows the peak of q2 by: m1 50%, l 30%, E 20%"
+        "Fixing one narrows the peak of q2 by: m1 50%, l 30%, E 20%"
     ]
 
 
