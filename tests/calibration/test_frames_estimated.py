@@ -8,6 +8,7 @@ import pytest
 from alphacut.frame import GraphFollower, ImprovedFollower, Search, envelope
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Interval
+from alphacut.fuzzy.result import Nature
 from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached
 
@@ -47,6 +48,7 @@ KINDS = {"usual": usual, "undamped": undamped, "large steps": large_steps, "wide
 def test_errors_of_searches_and_followers_cover(kind):
     seed = free_seed(kind)
     table = Calibration(f"frames under estimate, {kind}: declared over true", seed)
+    natures = set()
     for number in range(6):
         rng = np.random.default_rng([seed, number])
         drawn = KINDS[kind](rng)
@@ -55,6 +57,8 @@ def test_errors_of_searches_and_followers_cover(kind):
             found = envelope(
                 drawn.system, drawn.inputs, method=method, integrator="exact", **drawn.motion
             )
+            natures.add(found.nature)
             case = number, method.name, *drawn.inputs
             judged(table, found, ends, method.name, case, tolerance=TOLERANCE)
-    table.judge()
+    if natures != {Nature.ATTAINED}:  # which promise nothing
+        table.judge()
