@@ -30,7 +30,7 @@ NATURES = {
 """Meaning of each nature, for the page."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
-"""Label of the bounds of E of every composite that is isotropic in its plane, modal values."""
+"""Label of the bounds that hold for isotropic composites, at the modal values."""
 ANSWERS = ("question", "answer", "nature")
 GRAVITY = float(STANDARD_GRAVITY)
 

@@ -125,3 +125,15 @@ def test_an_interruption_below_petsc_arrives_after_the_solve(problem, monkeypatc
 def test_options_leave_no_trace_in_the_database(problem):
     problem.solver(SolverOptions("theta", {"ksp_rtol": "1e-6", "level_pc_type": "lu"}))
     assert not [name for name in PETSc.Options().getAll() if name.startswith("rve_")]
+
+
+def test_options_of_the_caller_hold_and_stay(problem):
+    database = PETSc.Options()
+    database["rve_ksp_rtol"] = "1e-13"
+    try:
+        solver = problem.solver(SolverOptions("theta", {"ksp_max_it": "99"}))
+        assert solver.ksp.getTolerances()[0] == 1e-13
+        assert solver.ksp.getTolerances()[3] == 99
+        assert database.getString("rve_ksp_rtol") == "1e-13"
+    finally:
+        database.delValue("rve_ksp_rtol")
