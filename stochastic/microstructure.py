@@ -18,7 +18,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
@@ -71,8 +71,7 @@ class Study:
             ("confidence", 0 < self.confidence < 1, "values in (0, 1)"),
             ("bootstrap", self.bootstrap >= 100, "numbers from 100 on"),
         ):
-            if not meaningful:
-                raise RefusedError(f"microstructure.{name}", getattr(self, name), allowed)
+            require(meaningful, f"microstructure.{name}", getattr(self, name), allowed)
 
     @property
     def holds_slopes(self) -> bool:
@@ -98,13 +97,11 @@ class Study:
         reach = self.shape.reach
         if self.limits or self.shape is SPHERES:
             return sample
-        if (share := 1 - float(sample.cdf(reach))) > MOST_CAPPED:
-            raise RefusedError(
-                "particles",
-                f"{share:.1%} of the area in cells tighter than r_n = {reach:g}",
-                f"shares up to {MOST_CAPPED:.0%}, since a disc fills its square cell at 1",
-                "take an image of them as the cell (cell.image), or set limits",
-            )
+        share = 1 - float(sample.cdf(reach))
+        value = f"{share:.1%} of the area in cells tighter than r_n = {reach:g}"
+        allowed = f"shares up to {MOST_CAPPED:.0%}, since a disc fills its square cell at 1"
+        cure = "take an image of them as the cell (cell.image), or set limits"
+        require(share <= MOST_CAPPED, "particles", value, allowed, cure)
         return sample.capped(reach)
 
 
@@ -221,9 +218,9 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
     streams = np.random.SeedSequence(case.seed, spawn_key=(1,)).spawn(2)
     used = case.used(sample)
     lower, upper = case.limits_of(used)
-    if upper - lower < SAME:
-        cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
-        raise RefusedError("r_n", f"{upper:.10g} in all cells", "cells of unequal r_n", cure)
+    cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
+    value = f"{upper:.10g} in all cells"
+    require(upper - lower >= SAME, "r_n", value, "cells of unequal r_n", cure)
     kept, fit = used.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
     band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
     slopes = slope_band(

@@ -7,21 +7,18 @@ cell, r < 1, and not by √(π/4).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Literal, Protocol, get_args
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.theta.law import ThetaLaw, require_support
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
-Kind = Literal["hermite", "linear", "exponential"]
-KINDS: tuple[str, ...] = get_args(Kind)
 RADII = "radii inside (0, 1), in halves of the cell's side"
 
 
@@ -49,17 +46,11 @@ def require_map(radius_map: RadiusMap) -> None:
     require_support(law.lower, law.upper)
     theta = np.linspace(law.lower, law.upper, 65)
     radii = np.asarray(radius_map(theta), float)
-    if radii.shape != theta.shape:
-        allowed = f"the shape of θ, {theta.shape}"
-        raise RefusedError("shape of the radii", radii.shape, allowed)
-    if not ((radii > 0) & (radii < 1)).all():
-        place = int(np.argmin((radii > 0) & (radii < 1)))
-        raise RefusedError(f"r at θ = {theta[place]:.4g}", f"{radii[place]:.4g}", RADII)
-
-
-def _xi(law: ThetaLaw, theta: ArrayLike) -> Array:
-    """θ carried to [0, 1]."""
-    return np.asarray((np.asarray(theta, float) - law.lower) / (law.upper - law.lower))
+    alike = radii.shape == theta.shape
+    require(alike, "shape of the radii", radii.shape, f"the shape of θ, {theta.shape}")
+    inside = (radii > 0) & (radii < 1)
+    place = int(np.argmin(inside))
+    require(inside.all(), f"r at θ = {theta[place]:.4g}", f"{radii[place]:.4g}", RADII)
 
 
 @dataclass(frozen=True)
@@ -87,9 +78,9 @@ class HermiteMap:
         values = (self.a1, self.a2, self.a3, self.a4)
         plain = all(isinstance(value, Real) and np.isfinite(value) for value in values)
         low, high = self.extremes() if plain else (np.nan, np.nan)
-        if not (low > 0 and high < 1):  # also catches nan
-            key, value = f"r of the map {values}", f"{low:.4g} … {high:.4g}"
-            raise RefusedError(key, value, RADII, "lower a1 or a3, or the slopes a2, a4")
+        inside, shown = low > 0 and high < 1, f"{low:.4g} … {high:.4g}"
+        cure = "lower a1 or a3, or the slopes a2, a4"
+        require(inside, f"r of the map {values}", shown, RADII, cure)
 
     @property
     def monomials(self) -> Array:
@@ -99,7 +90,8 @@ class HermiteMap:
 
     def xi(self, theta: ArrayLike) -> Array:
         """θ carried to [0, 1]."""
-        return _xi(self.distribution, theta)
+        law = self.distribution
+        return np.asarray((np.asarray(theta, float) - law.lower) / (law.upper - law.lower))
 
     def __call__(self, theta: ArrayLike) -> Array:
         """Reduced radius at `theta`, any shape."""
@@ -119,70 +111,3 @@ class HermiteMap:
             np.concatenate([[0.0, 1.0], inner]), self.monomials
         )
         return float(radii.min()), float(radii.max())
-
-
-@dataclass(frozen=True)
-class ExponentialMap:
-    """Map r(θ) = a1 (a3/a1)^ξ, ξ ∈ [0, 1]: eq. 11 between two radii.
-
-    Of the truncated normal θ the radius is log-normal, truncated.
-
-    Args:
-        a1: Radius at the lower end of θ, in (0, 1) (radius over half the side of the cell).
-        a3: Radius at the upper end, in (0, 1).
-        distribution: Law of θ.
-
-    Raises:
-        RefusedError: A radius lies outside (0, 1).
-    """
-
-    a1: float
-    a3: float
-    distribution: ThetaLaw = field(default_factory=TruncatedNormal)
-
-    def __post_init__(self) -> None:
-        for name, radius in (("a1", self.a1), ("a3", self.a3)):
-            if not 0 < radius < 1:
-                raise RefusedError(name, radius, RADII)
-
-    def __call__(self, theta: ArrayLike) -> Array:
-        """Reduced radius at `theta`, any shape."""
-        xi = _xi(self.distribution, theta)
-        return np.asarray(self.a1 * (self.a3 / self.a1) ** xi)  # eq. 11
-
-    def extremes(self) -> tuple[float, float]:
-        """Least and greatest radius on the support."""
-        return min(self.a1, self.a3), max(self.a1, self.a3)
-
-
-CaseMap = HermiteMap | ExponentialMap
-
-
-@dataclass(frozen=True)
-class MapFamily:
-    """Radius maps of one kind under one law of θ.
-
-    Args:
-        kind: hermite (eq. 12), linear, its case of both slopes a3 − a1, or exponential.
-        law: Law of θ.
-    """
-
-    kind: Kind = "hermite"
-    law: ThetaLaw = field(default_factory=TruncatedNormal)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of its parameters."""
-        return ("a1", "a2", "a3", "a4") if self.kind == "hermite" else ("a1", "a3")
-
-    def __call__(self, values: Mapping[str, float]) -> CaseMap:
-        """The map with the parameters `names` of some values, dimensionless.
-
-        Raises:
-            RefusedError: Its radii leave (0, 1).
-        """
-        a1, a3 = values["a1"], values["a3"]
-        if self.kind == "exponential":
-            return ExponentialMap(a1, a3, self.law)
-        slopes = (a3 - a1, a3 - a1) if self.kind == "linear" else (values["a2"], values["a4"])
-        return HermiteMap(a1, slopes[0], a3, slopes[1], self.law)

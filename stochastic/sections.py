@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
@@ -77,8 +77,8 @@ class Simulated:
     packings: int = 20
 
     def __post_init__(self) -> None:
-        if self.packings < FEWEST:
-            raise RefusedError("packing.packings", self.packings, f"numbers from {FEWEST} on")
+        enough, allowed = self.packings >= FEWEST, f"numbers from {FEWEST} on"
+        require(enough, "packing.packings", self.packings, allowed)
 
     @property
     def shape(self) -> Shape:
@@ -140,10 +140,9 @@ def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
     sample = AreaWeighted.of(
         np.concatenate(values), np.concatenate(weights), np.concatenate(groups)
     )
-    largest = sections[0].particles.shape.largest
-    if sample.values[-1] > largest:
-        cure = "mend the overlaps in the data"
-        raise RefusedError("r_n of a cell", sample.values[-1], f"values up to {largest:.4g}", cure)
+    largest, most = sections[0].particles.shape.largest, sample.values[-1]
+    allowed = f"values up to {largest:.4g}"
+    require(most <= largest, "r_n of a cell", most, allowed, "mend the overlaps in the data")
     return sample
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, median_filter, minimum_filter, uniform_filter
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 CONFIDENT = 3.0  # deviations of the noise
 MOST_OPEN = 0.15  # area that may be open, over that of the smallest class
@@ -108,14 +108,12 @@ class Segmentation:
             RefusedError: More is open than `most` of the smallest class's area.
         """
         share = self.open / float(self.fractions.min())
-        if share > most:
-            raise RefusedError(
-                "threshold",
-                f"in doubt on {share:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
-                f" drift of light of {self.drift:.3g} grey levels",
-                f"up to {most:.0%}",
-                "smooth = true takes noise away, level = true the drift of light",
-            )
+        value = (
+            f"in doubt on {share:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
+            f" drift of light of {self.drift:.3g} grey levels"
+        )
+        cure = "smooth = true takes noise away, level = true the drift of light"
+        require(share <= most, "threshold", value, f"up to {most:.0%}", cure)
 
 
 def segmented(
@@ -237,9 +235,8 @@ def _inner(labels: Rows, classes: int) -> Mask:
         RefusedError: A class has no pixel.
     """
     counts = np.bincount(labels.ravel(), minlength=classes)
-    if not counts.all():
-        allowed = "values that leave each class some pixels"
-        raise RefusedError("threshold", "beyond the grey values of a class", allowed)
+    value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"
+    require(counts.all(), "threshold", value, allowed)
     for reach in range(_BORDER, 0, -1):
         inner = _far(labels, reach)
         if (np.bincount(labels[inner], minlength=classes) >= _ENOUGH * counts).all():

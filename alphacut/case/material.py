@@ -34,8 +34,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.quantity import number
 from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
-from alphacut.stochastic import TruncatedNormal
-from alphacut.stochastic.radius_map import MapFamily
+from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 CELL_METHODS = ("prism", "slices", "series", "auto")
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
@@ -62,12 +61,12 @@ class RadiusMap(Section):
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
         """Parameters of the map by name: the factors a1 … a4 of the functions of eq. 12."""
-        return {name: getattr(self, name) for name in self.family.names}
+        return {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
 
     @property
-    def family(self) -> MapFamily:
-        """Maps of eq. 12 under the law of θ, a normal one cut off at both ends."""
-        return MapFamily("hermite", TruncatedNormal(*self.theta))
+    def law(self) -> TruncatedNormal:
+        """Law of θ, a normal one cut off at both ends."""
+        return TruncatedNormal(*self.theta)
 
     @model_validator(mode="after")
     def _monotone(self) -> Self:
@@ -80,7 +79,7 @@ class RadiusMap(Section):
         for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
             values = dict(zip(names, corner, strict=True))
             try:
-                self.family(values)
+                HermiteMap(**values, distribution=self.law)
             except ValueError as error:
                 at = ", ".join(f"{name} {value:g}" for name, value in values.items())
                 raise RefusedError("radius", at, "a map inside (0, 1)", str(error)) from None

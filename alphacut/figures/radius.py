@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.case.material import RadiusMap
 from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure, title
-from alphacut.stochastic.radius_map import CaseMap
+from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ in [-3, 3]
 
 
-def maps(section: RadiusMap, alpha: float) -> list[CaseMap]:
+def maps(section: RadiusMap, alpha: float) -> list[HermiteMap]:
     """The radius maps at the corners of an α-cut."""
     numbers = section.numbers
     corners = itertools.product(*(sorted(set(one.cut(alpha))) for one in numbers.values()))
-    return [section.family(dict(zip(numbers, corner, strict=True))) for corner in corners]
+    return [HermiteMap(*corner, section.law) for corner in corners]
 
 
-def modal_map(section: RadiusMap) -> CaseMap:
+def modal_map(section: RadiusMap) -> HermiteMap:
     """The radius map at the modal values."""
-    return section.family({name: one.modal for name, one in section.numbers.items()})
+    return HermiteMap(*(one.modal for one in section.numbers.values()), section.law)
 
 
 def radii(section: RadiusMap) -> Figure:
     """Fig. 11: distribution of the paper's log-normal particle radii, σ_r = (ln 10)/6, median 1."""
     drawn, axes = figure()
-    law = section.family.law
+    law = section.law
     theta = np.linspace(law.lower, law.upper, 400)
     axes.plot(np.exp(SIGMA * theta), law.cdf(theta), color=BLUE, lw=1.8)  # eq. 11
     axes.set_xlabel("radius r over its median")
@@ -43,7 +43,7 @@ def radii(section: RadiusMap) -> Figure:
     return drawn
 
 
-def distribution(radius: CaseMap, at: Array) -> Array:
+def distribution(radius: HermiteMap, at: Array) -> Array:
     """P(r ≤ at) under the law of θ."""
     law = radius.distribution
     theta = np.linspace(law.lower, law.upper, 4001)

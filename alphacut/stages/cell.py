@@ -23,9 +23,8 @@ from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
 from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.stochastic import HermiteMap, ThetaLaw, gauss_rule
 from alphacut.stochastic import RadiusMap as Radii
-from alphacut.stochastic import gauss_rule
-from alphacut.stochastic.radius_map import CaseMap, MapFamily
 
 if TYPE_CHECKING:
     from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
@@ -170,18 +169,19 @@ def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
 
 
 def parts(
-    values: Mapping[str, float], family: MapFamily, stiffness: VoigtPhase | None = None
-) -> tuple[CaseMap, Phase, AnyPhase]:
+    values: Mapping[str, float], law: ThetaLaw, stiffness: VoigtPhase | None = None
+) -> tuple[HermiteMap, Phase, AnyPhase]:
     """Radius map, matrix and inclusion from crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
     inclusion = stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-    return family(values), matrix, inclusion
+    a1, a2, a3, a4 = (values[name] for name in ("a1", "a2", "a3", "a4"))
+    return HermiteMap(a1, a2, a3, a4, law), matrix, inclusion
 
 
 def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    map_of, matrix, inclusion = parts(values, radius.family, cell.stiffness)
+    map_of, matrix, inclusion = parts(values, radius.law, cell.stiffness)
     return Cell(matrix, inclusion, map_of, cell.outline)
 
 

@@ -33,7 +33,7 @@ from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
 from alphacut.stages.cell import GPA, CellChoice, inputs_of, parts
 from alphacut.stages.store import Stage, Work
-from alphacut.stochastic.radius_map import MapFamily
+from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.theta.quadrature import between_nodes
 
 if TYPE_CHECKING:
@@ -72,17 +72,17 @@ class CellTask:
     Args:
         choice: Model of the cell.
         crisp: Inputs that are not fuzzy, by name, in SI.
-        family: Radius maps and the law of θ.
+        law: Law of θ.
     """
 
     choice: CellChoice
     crisp: Mapping[str, float]
-    family: MapFamily
+    law: ThetaLaw
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
-        family, stiffness = self.family, self.choice.stiffness
-        every = [parts({**self.crisp, **point}, family, stiffness) for point in points]
+        stiffness = self.choice.stiffness
+        every = [parts({**self.crisp, **point}, self.law, stiffness) for point in points]
         radius, matrix, _ = every[0]
         results = self.choice.model().solve(radius, matrix, [inclusion for *_, inclusion in every])
         return [
@@ -116,7 +116,7 @@ class CellTask:
     @property
     def theta(self) -> Array:
         """The θ at which stress curves are stored, shape (SHOWN,)."""
-        return np.asarray(np.linspace(self.family.law.lower, self.family.law.upper, SHOWN))
+        return np.asarray(np.linspace(self.law.lower, self.law.upper, SHOWN))
 
     @property
     def identity(self) -> Document:
@@ -124,7 +124,7 @@ class CellTask:
         content = {
             "choice": asdict(self.choice),
             "crisp": dict(self.crisp),
-            "map": repr(self.family),
+            "law": repr(self.law),
             "source": source_digest(("stochastic", "rve")),
             "versions": versions(),
         }
@@ -178,7 +178,7 @@ class Campaign:
             return largest
         modal = {name: number.modal for name, number in self.inputs.items()}
         values, choice = {**self.task.crisp, **modal}, self.task.choice
-        radius, matrix, inclusion = parts(values, self.task.family, choice.stiffness)
+        radius, matrix, inclusion = parts(values, self.task.law, choice.stiffness)
         model = replace(choice, estimate=True).model()
         return dict(model.solve(radius, matrix, [inclusion])[0].error)
 
@@ -213,7 +213,7 @@ def campaign(
         choice = replace(choice, moduli=(support.lower, support.upper))
     if curves and choice.method in ("auto", "series"):
         choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
-    task = CellTask(choice, crisp, radius.family)
+    task = CellTask(choice, crisp, radius.law)
     known = _known(cell, fuzzy) if modulus.method != "prism" else Known()
     return Campaign(task, fuzzy, plan_of(modulus.plan), modulus.alpha, known)
 

@@ -47,7 +47,7 @@ def random_response(
         {str(name): campaign.inputs[str(name)] for name in modulus["parameter"].values},
         tuple(map(float, modulus["alpha"].values)),
     )
-    quantile = campaign.task.family.law.quantile
+    quantile = campaign.task.law.quantile
     return RandomResponse.from_curves(
         domain, modulus["point"].values, curves, theta=theta, quantile=quantile
     )

@@ -21,7 +21,7 @@ from alphacut.rve.cell import LOADS, Phase
 from alphacut.rve.prism import model as prism
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.solver.options import SOLVERS
-from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, RadiusMap
+from alphacut.stochastic import HermiteMap, RadiusMap
 from benchmarks.rows import write
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
@@ -36,9 +36,6 @@ MAPS: dict[str, RadiusMap] = {
     "radii .05 to .95": HermiteMap(0.05, 0.0, 0.95, 0.0),
     "not monotone": HermiteMap(0.6, -1.5, 0.7, 0.5),
     "steep": HermiteMap(0.1, 0.0, 0.9, 2.0),
-    "exponential": ExponentialMap(0.8, 0.2),
-    "exponential, Beta law": ExponentialMap(0.8, 0.2, Beta()),
-    "Beta(2, 4)": HermiteMap(0.2, 0.1, 0.8, 0.2, Beta(2, 4, 0.0, 1.0)),
     "crisp": HermiteMap(0.5, 0.0, 0.5, 0.0),
 }
 

@@ -14,17 +14,41 @@ import argparse
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import nnls
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic.microstructure import Study, study
 from alphacut.stochastic.microstructure_summary import fragment
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.particles.wicksell import unfolded
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
 
 FRACTION = 0.2092  # of the paper's map
 CIRCLES = 200_000
+BINS = 16  # of the law of spheres
+
+
+def unfolded(circles: Array, *, visible: float, largest: float) -> MeasuredRadii:
+    """Law of sphere radii behind circles in a plane (Wicksell, Biometrika 17, 84, 1925).
+
+    Saltykov's, by least squares: a plane hits a sphere of radius R with a chance in proportion to
+    R, and cuts a circle greater than r with the chance √(1 − r²/R²).
+
+    Args:
+        circles: Radii of circles, shape (n,), in m.
+        visible: Radius from which on every circle is seen, and the smallest sphere, in m.
+        largest: Radius that no sphere exceeds, in m.
+    """
+    edges = np.geomspace(visible, largest, BINS + 1)
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    heights = np.geomspace(visible, largest, 8 * BINS + 1)[:-1]
+    seen = (circles[None] > heights[:, None]).mean(axis=1)
+    kernel = np.sqrt(np.maximum(1 - (heights[:, None] / middle) ** 2, 0.0))
+    hit = nnls(kernel / kernel[0], seen)[0] / kernel[0]
+    share = np.concatenate([[0.0], np.cumsum(hit / middle)])
+    grade = (np.arange(4000) + 0.5) / 4000
+    return MeasuredRadii(tuple(np.interp(grade, share / share[-1], edges)), "unfolded circles")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +46,9 @@ class AreaWeighted:
             if groups is None
             else np.unique(np.asarray(groups).ravel(), return_inverse=True)[1]
         )
-        if not len(values) or not (
-            np.isfinite(values).all() and (weights >= 0).all() and weights.sum() > 0
-        ):
-            allowed = "one or more, finite, with weights from 0 on"
-            raise RefusedError("reduced radii", f"{len(values)} values", allowed)
+        plain = np.isfinite(values).all() and (weights >= 0).all() and weights.sum() > 0
+        allowed = "one or more, finite, with weights from 0 on"
+        require(plain, "reduced radii", f"{len(values)} values", allowed)
         order = np.argsort(values, kind="stable")
         return cls(values[order], weights[order] / weights.sum(), labels[order])
 
@@ -97,10 +95,9 @@ class AreaWeighted:
             RefusedError: Fewer than ten values lie within them.
         """
         inside = (self.values >= lower) & (self.values <= upper)
-        if inside.sum() < 10:
-            value = f"[{lower:g}, {upper:g}] with {int(inside.sum())} reduced radii"
-            allowed = "limits that hold ten or more"
-            raise RefusedError("limits", value, allowed, "take more particles")
+        value = f"[{lower:g}, {upper:g}] with {int(inside.sum())} reduced radii"
+        allowed = "limits that hold ten or more"
+        require(inside.sum() >= 10, "limits", value, allowed, "take more particles")
         return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
 
     def capped(self, most: float) -> AreaWeighted:
@@ -122,10 +119,9 @@ class AreaWeighted:
             RefusedError: There are fewer than five groups to draw from.
         """
         groups = int(self.groups.max()) + 1
-        if groups < 5:
-            allowed = "five packings, or cells in five of the 25 patches of a section, or more"
-            cure = "take more particles, and check the size of the section"
-            raise RefusedError("groups of the bootstrap", groups, allowed, cure)
+        allowed = "five packings, or cells in five of the 25 patches of a section, or more"
+        cure = "take more particles, and check the size of the section"
+        require(groups >= 5, "groups of the bootstrap", groups, allowed, cure)
         step = np.append(np.diff(self.values) > 0, True)
         farthest = [
             np.abs((np.cumsum(w) - self.cumulated)[step]).max()

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.stochastic.particles.particles import Particles
 
 SMOOTHING = 1.5  # standard deviation, in pixels
@@ -47,8 +47,8 @@ class SectionImage:
     pixel: float
 
     def __post_init__(self) -> None:
-        if not 1e-12 <= self.pixel <= 1:
-            raise RefusedError("image.pixel", f"{self.pixel} m", "lengths from 1e-12 to 1 m")
+        inside = 1e-12 <= self.pixel <= 1
+        require(inside, "image.pixel", f"{self.pixel} m", "lengths from 1e-12 to 1 m")
 
     def read(self) -> Particles:
         """The circles of the image file, y up from the lower edge."""
@@ -70,9 +70,9 @@ class SectionImage:
             ) from None
         if picture.ndim == 3:
             picture = color.rgb2gray(picture[..., :3]) if picture.shape[2] > 2 else picture[..., 0]
-        if picture.ndim != 2 or min(picture.shape) < 16:
-            size = " × ".join(map(str, picture.shape))
-            raise RefusedError("image", f"{size} pixels", "plane images of 16 × 16 pixels or more")
+        size, plane = " × ".join(map(str, picture.shape)), picture.ndim == 2
+        allowed = "plane images of 16 × 16 pixels or more"
+        require(plane and min(picture.shape) >= 16, "image", f"{size} pixels", allowed)
         return picture
 
     def circles(self, picture: Array) -> Particles:
@@ -94,14 +94,14 @@ class SectionImage:
                 odd += piece.area
             else:
                 inside.append((*piece.centroid, piece.equivalent_diameter_area / 2))
-        if not inside or odd > LOST * phase.sum():
-            raise RefusedError(
-                str(self.path.name),
-                f"{odd / max(phase.sum(), 1):.1%} of the particles' area in pieces that are not"
-                f" round, beside {len(inside)} that are",
-                f"images with round particles, up to {LOST:.0%} of others",
-                "take the image itself as the cell: cell.image",
-            )
+        require(
+            bool(inside) and odd <= LOST * phase.sum(),
+            self.path.name,
+            f"{odd / max(phase.sum(), 1):.1%} of the particles' area in pieces that are not"
+            f" round, beside {len(inside)} that are",
+            f"images with round particles, up to {LOST:.0%} of others",
+            "take the image itself as the cell: cell.image",
+        )
         row, column, radius = np.array(inside).T
         centres = np.stack([column + 0.5, phase.shape[0] - row - 0.5], axis=1)
         size = np.array(phase.shape[::-1]) * self.pixel
@@ -116,17 +116,15 @@ class SectionImage:
         greys = [smooth[part] for part in (bright, ~bright) if part.any()]
         contrast = float(np.ptp([np.median(grey) for grey in greys]))
         noise = float(np.sqrt(np.mean([np.var(grey) for grey in greys])))
-        if len(greys) < 2 or contrast < NOISE * noise:
-            value = (
-                f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
-            )
-            allowed = f"images of two greys, {NOISE:g} standard deviations apart"
-            raise RefusedError(self.path.name, value, allowed, "average the image before")
+        clear = len(greys) == 2 and contrast >= NOISE * noise
+        value = f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
+        allowed = f"images of two greys, {NOISE:g} standard deviations apart"
+        require(clear, self.path.name, value, allowed, "average the image before")
         phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
-        if (apart := _unevenness(smooth, ~phase) / contrast) > UNEVEN:
-            value = f"light that differs by {apart:.2g} of the contrast"
-            cure = "subtract the background, for example by skimage.restoration.rolling_ball"
-            raise RefusedError(self.path.name, value, f"values up to {UNEVEN:g}", cure)
+        apart = _unevenness(smooth, ~phase) / contrast
+        value = f"light that differs by {apart:.2g} of the contrast"
+        cure = "subtract the background, for example by skimage.restoration.rolling_ball"
+        require(apart <= UNEVEN, self.path.name, value, f"values up to {UNEVEN:g}", cure)
         return phase
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.stochastic.particles.neighbour_search import balls, size_classes
 from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
@@ -39,18 +39,10 @@ class Packing:
     shape: Shape = DISCS
 
     def __post_init__(self) -> None:
-        name = self.shape.particles
-        for key, value, meaningful, allowed in (
-            (name, self.number, self.number >= 1, "numbers from 1 on"),
-            (
-                f"{self.shape.cells}_fraction",
-                self.fraction,
-                0 < self.fraction <= self.shape.densest,
-                f"values in (0, {self.shape.densest:g}]",
-            ),
-        ):
-            if not meaningful:
-                raise RefusedError(f"packing.{key}", value, allowed)
+        number, fraction, densest = self.number, self.fraction, self.shape.densest
+        require(number >= 1, f"packing.{self.shape.particles}", number, "numbers from 1 on")
+        key, allowed = f"packing.{self.shape.cells}_fraction", f"values in (0, {densest:g}]"
+        require(0 < fraction <= densest, key, fraction, allowed)
 
     def make(self, generator: np.random.Generator) -> Particles:
         """One packing, in a box as large as the particles and the fraction make it.
@@ -72,10 +64,10 @@ class Packing:
         side = -np.inf
         room = 2.0 * (self.shape.dimensions - 1)  # a sphere's cell has room for its own images
         while not len(radii) or room * radii.max() > side:
-            if len(radii) >= max(MOST, self.number):
-                least = f"more than {MOST}, where the largest radius is {radii.max():.3g} m"
-                cure = "leave out the smallest sizes, or lower the fraction"
-                raise RefusedError(f"packing.{self.shape.particles}", self.number, least, cure)
+            least = f"more than {MOST}, where the largest radius is {radii.max(initial=0.0):.3g} m"
+            cure = "leave out the smallest sizes, or lower the fraction"
+            few = len(radii) < max(MOST, self.number)
+            require(few, f"packing.{self.shape.particles}", self.number, least, cure)
             radii = np.append(radii, self.radii.sample(self.number, generator))
             whole = float(self.shape.measure(radii).sum()) / self.fraction
             side = float(np.sqrt(whole) if self.shape is DISCS else np.cbrt(whole))

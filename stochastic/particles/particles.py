@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,11 @@ class Particles:
         size = np.array(self.size, float).ravel()
         centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()
-        if not 0 < len(radii) == len(centres):
-            allowed = f"{len(centres)} positions, of one particle or more"
-            raise RefusedError("radii", f"{len(radii)} numbers", allowed)
-        if not (np.isfinite(size).all() and (size > 0).all()):
-            raise RefusedError("size", size.tolist(), "positive, finite lengths in m")
+        allowed = f"{len(centres)} positions, of one particle or more"
+        alike = 0 < len(radii) == len(centres)
+        require(alike, "radii", f"{len(radii)} numbers", allowed)
+        positive = np.isfinite(size).all() and (size > 0).all()
+        require(positive, "size", size.tolist(), "positive, finite lengths in m")
         _refuse(
             np.asarray(~np.isfinite(centres).all(axis=1)), "centres", centres, "finite lengths in m"
         )
@@ -126,6 +126,5 @@ class Particles:
 
 def _refuse(bad: Mask, name: str, values: Array, allowed: str) -> None:
     """Refuses the first bad one of some values."""
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise RefusedError(f"{name}[{row}]", values[row].tolist(), allowed)
+    row = int(np.argmax(bad))
+    require(not bad.any(), f"{name}[{row}]", values[row].tolist(), allowed)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
@@ -48,9 +48,9 @@ def require_radii(key: str, radii: ArrayLike) -> None:
     """
     radii = np.atleast_1d(np.asarray(radii, float))
     wrong = radii[~((radii >= LEAST) & (radii <= MOST))]
-    if len(wrong) or not len(radii):
-        value = f"{wrong[0]:.6g} m" if len(wrong) else None
-        raise RefusedError(key, value, f"radii from {LEAST:g} to {MOST:g} m")
+    value = f"{wrong[0]:.6g} m" if len(wrong) else None
+    plain = len(radii) > 0 and not len(wrong)
+    require(plain, key, value, f"radii from {LEAST:g} to {MOST:g} m")
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ class LogNormalRadii:
     def __post_init__(self) -> None:
         require_radii("smallest_radius", self.smallest)
         require_radii("largest_radius", self.largest)
-        if self.smallest > self.largest:
-            allowed = f"radii from smallest_radius = {self.smallest:g} m on"
-            raise RefusedError("largest_radius", f"{self.largest:g} m", allowed)
+        allowed = f"radii from smallest_radius = {self.smallest:g} m on"
+        rising = self.smallest <= self.largest
+        require(rising, "largest_radius", f"{self.largest:g} m", allowed)
 
     @property
     def label(self) -> str:

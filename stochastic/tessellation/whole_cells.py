@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.tessellation.apollonius import Apollonius
 
 # directions of the left, right, lower and upper edge
@@ -50,9 +50,8 @@ def whole_cells(diagram: Apollonius) -> WholeCells:
         inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
         room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
         disc = np.flatnonzero((reach <= room).all(axis=1) & ~diagram.cut)
-        if not len(disc):
-            allowed = "windows in which the edge leaves a cell whole"
-            raise RefusedError("size", discs.size.tolist(), allowed, "take a larger section")
+        allowed = "windows in which the edge leaves a cell whole"
+        require(len(disc) > 0, "size", discs.size.tolist(), allowed, "take a larger section")
         fits = (
             inner - np.stack([reach[disc, :2].sum(axis=1), reach[disc, 2:].sum(axis=1)], axis=1)
         ).prod(axis=1)

@@ -1,15 +1,14 @@
-"""Laws of the basic random variable θ (section 3.1), and the beta law."""
+"""Laws of the basic random variable θ (section 3.1)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 MASS_GAP = 1e-8
 """Most by which the integral of a density may miss the difference of its distribution function."""
@@ -50,9 +49,9 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
     """
     least = NARROWEST * max(abs(lower), abs(upper), unit)
     ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
-    if not (ordered and upper - lower >= 0.999 * least):  # 9.999 … 10 is wide enough
-        apart = f", {least:.2g} or more apart" if ordered else ""
-        raise RefusedError("support of θ", [lower, upper], f"two finite ends, rising{apart}")
+    wide = ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough
+    apart = f", {least:.2g} or more apart" if ordered else ""
+    require(wide, "support of θ", [lower, upper], f"two finite ends, rising{apart}")
 
 
 def require_shares(share: Array) -> None:
@@ -61,8 +60,9 @@ def require_shares(share: Array) -> None:
     Raises:
         RefusedError: One lies outside.
     """
-    if (wrong := ~((share >= 0) & (share <= 1))).any():
-        raise RefusedError("probability", share[wrong].flat[0], "values in [0, 1]")
+    inside = (share >= 0) & (share <= 1)
+    wrong = share[~inside]
+    require(not wrong.size, "probability", next(wrong.flat, None), "values in [0, 1]")
 
 
 def panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
@@ -86,10 +86,10 @@ def panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array
         if not coarse.size or len(edges) > _MOST_PANELS:
             break
         edges = np.insert(edges, coarse + 1, (edges[coarse] + edges[coarse + 1]) / 2)
-    if not (total := float(_mass_gaps(law, edges, rule).sum())) <= MASS_GAP:
-        key = "probability between the density of θ and its distribution function"
-        cure = "pdf must be the derivative of cdf, finite everywhere on the support"
-        raise RefusedError(key, f"{total:.1e}", f"differences up to {MASS_GAP:g}", cure)
+    total = float(_mass_gaps(law, edges, rule).sum())
+    key = "probability between the density of θ and its distribution function"
+    cure = "pdf must be the derivative of cdf, finite everywhere on the support"
+    require(total <= MASS_GAP, key, f"{total:.1e}", f"differences up to {MASS_GAP:g}", cure)
     return edges
 
 
@@ -107,65 +107,3 @@ def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
     odd = (mass * x).sum(axis=1) - (below[1:] + below[:-1] - (w * law.cdf(theta)).sum(axis=1))
     gaps: Array = np.maximum(np.abs(even), np.abs(odd))
     return gaps
-
-
-LARGEST_EXPONENT = 1000.0
-
-
-@dataclass(frozen=True)
-class Beta:
-    """Law of θ whose ξ = (θ − lower)/(upper − lower) has the density ξ^(p−1) (1 − ξ)^(q−1)/B(p, q).
-
-    Johnson, Kotz & Balakrishnan, Continuous Univariate Distributions 2, 1995, chapter 25. Its mean
-    is lower + (upper − lower) p/(p + q).
-
-    Args:
-        p: Exponent of the lower end, in [1, 1000]; below 1 the density is infinite there.
-        q: Exponent of the upper end, in [1, 1000].
-        lower: Left end of the support.
-        upper: Right end of the support, greater than `lower`.
-
-    Raises:
-        RefusedError: A value lies outside its range.
-    """
-
-    p: float = 1.0
-    q: float = 1.0
-    lower: float = -3.0
-    upper: float = 3.0
-
-    def __post_init__(self) -> None:
-        require_support(self.lower, self.upper)
-        for name, exponent in (("p", self.p), ("q", self.q)):
-            if not 1 <= exponent <= LARGEST_EXPONENT:
-                raise RefusedError(name, exponent, f"exponents in [1, {LARGEST_EXPONENT:g}]")
-
-    def xi(self, theta: ArrayLike) -> Array:
-        """θ carried to [0, 1], any shape; ends beyond the support stay there."""
-        inside = np.clip(np.asarray(theta, float), self.lower, self.upper)
-        return np.asarray((inside - self.lower) / (self.upper - self.lower))
-
-    def pdf(self, theta: ArrayLike) -> Array:
-        """Density f_Θ at `theta` (any shape); zero outside the support."""
-        from scipy.special import betaln, xlog1py, xlogy
-
-        theta = np.asarray(theta, float)
-        inside = (theta >= self.lower) & (theta <= self.upper)
-        xi = self.xi(theta)
-        log = xlogy(self.p - 1, xi) + xlog1py(self.q - 1, -xi) - betaln(self.p, self.q)
-        return np.where(inside, np.exp(log) / (self.upper - self.lower), 0.0)
-
-    def cdf(self, theta: ArrayLike) -> Array:
-        """P(Θ ≤ theta), any shape."""
-        from scipy.special import betainc
-
-        return np.asarray(betainc(self.p, self.q, self.xi(theta)))
-
-    def quantile(self, probability: ArrayLike) -> Array:
-        """The θ below which a share `probability` in [0, 1] lies, any shape."""
-        from scipy.special import betaincinv
-
-        share = np.asarray(probability, float)
-        require_shares(share)
-        xi = betaincinv(self.p, self.q, share)
-        return np.asarray(self.lower + (self.upper - self.lower) * xi)

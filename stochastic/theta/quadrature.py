@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.theta.law import ThetaLaw, panel_edges
 
 
@@ -70,8 +70,7 @@ def gauss_rule(
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
     """
-    if points < 1:
-        raise RefusedError("points", points, "numbers from 1 on")
+    require(points >= 1, "points", points, "numbers from 1 on")
     fine = _fine_rule(distribution, 16 + 2 * points, between)
     held = fine.weights > _NEGLIGIBLE
     at, weights = fine.nodes[held], fine.weights[held]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.theta.law import require_shares, require_support
 
 __all__ = ["Array", "TruncatedNormal"]
@@ -33,9 +33,9 @@ class TruncatedNormal:
 
     def __post_init__(self) -> None:
         require_support(self.lower, self.upper, unit=1.0)
-        if not self.mass > 0:
-            cure = "the standard normal law gives this one no probability"
-            raise RefusedError("support of θ", [self.lower, self.upper], "ends nearer to 0", cure)
+        cure = "the standard normal law gives this one no probability"
+        ends = [self.lower, self.upper]
+        require(self.mass > 0, "support of θ", ends, "ends nearer to 0", cure)
 
     @cached_property
     def mass(self) -> float:

@@ -15,7 +15,7 @@ from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.solver.krylov import ConvergenceError
-from alphacut.stochastic import ExponentialMap, HermiteMap
+from alphacut.stochastic import HermiteMap
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
@@ -123,7 +123,6 @@ def test_every_solver_gives_the_same_modulus(solver):
         (HermiteMap(0.05, 0, 0.95, 0), 4, 12, 8),
         (PAPER, 4, 24, 4),
         (PAPER, 4, 6, 12),
-        (ExponentialMap(0.8, 0.2), 4, 6, 25),
     ],
 )
 def test_iterations_depend_on_neither_map_nor_contrast_and_fall_with_layers(

@@ -11,7 +11,8 @@ from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.theta_rule import theta_rule
-from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, TruncatedNormal
+from alphacut.stochastic import HermiteMap
+from tests.stochastic.test_laws import Own
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 
@@ -31,9 +32,8 @@ class Broken:
 
 
 MAPS = {
-    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta()),
-    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta(2, 5, -1.0, 1.0)),
-    "exponential": ExponentialMap(0.2, 0.8, TruncatedNormal(-2.0, 3.0)),
+    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Own("uniform", ())),
+    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Own("beta", (2, 5))),
     "user": Broken(),
 }
 
