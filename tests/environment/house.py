@@ -45,10 +45,10 @@ def lines(files: Iterable[Path]) -> int:
 
 
 def raising(tree: ast.AST) -> int:
-    """Places of a syntax tree that raise something new or list a problem."""
+    """Places of a syntax tree that raise something new, list a problem or call `require`."""
     return sum(
         (isinstance(node, ast.Raise) and node.exc is not None)
-        or (isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Problem")
+        or (isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("Problem", "require"))
         for node in ast.walk(tree)
     )
 

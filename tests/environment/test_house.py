@@ -12,7 +12,7 @@ REACHED = {  # counts above their bound, which must not grow; delete a line when
     "lines of the packages": 37_073,
     "files of the packages": 281,
     "places of fmt: skip": 15,
-    "places that raise": 353,
+    "places that raise": 432,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
 TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
@@ -79,7 +79,7 @@ def test_what_the_counts_look_for_would_be_seen():
     assert signatures_with_any(tree) == ["f"]
     assert words.vague_names(tree) == ["found"]
     assert words.odd_docstrings(tree) == ["What f is."]
-    assert house.raising(ast.parse("raise ValueError(1)\nraise\nProblem('a')\n")) == 2
+    assert house.raising(ast.parse("raise ValueError(1)\nraise\nProblem('a')\nrequire(x)\n")) == 3
     long = "One word " + "and more " * 20 + "ends. Short one."
     assert [words.words(text) for text in words.sentences(long)] == [43, 2]
 
