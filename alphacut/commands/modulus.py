@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import attributes
 from alphacut.io.text_table import text_table
-from alphacut.io.units import fixed
-from alphacut.report.results import ISOTROPIC, fibre_label, width_text
+from alphacut.io.units import between, rounded
+from alphacut.report.results import ISOTROPIC, fibre_label, nature_of, width_text
 from alphacut.stages import cell, image, modulus
 from alphacut.stages.store import Stage
 
@@ -88,7 +90,7 @@ def image_table(document: Document) -> str:
     cuts = document["cuts"]
     ends = (cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"])
     rows = [
-        (f"{a:g}", fixed(low, 5), fixed(high, 5), nature)
+        (f"{a:g}", *printed((low, high), nature_of(nature)), nature)
         for a, low, high, nature in zip(cuts["alpha"], *ends, cuts["nature"], strict=True)
     ]
     table = text_table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows)
@@ -96,12 +98,19 @@ def image_table(document: Document) -> str:
     return table + "".join(shares) + width_text(document) + "\n"
 
 
+def printed(ends: Sequence[float], nature: Nature) -> Iterator[str]:
+    """Ends of ranges with seven digits, each lower one before its upper one."""
+    for end, side in zip(ends, itertools.cycle(("lower", "upper"))):
+        yield f"{rounded(end, side, nature, 7):#.7g}"
+
+
 def fibres(document: Document) -> str:
     """Constants of fibres at the lowest and the highest level; empty of spheres."""
+    nature = nature_of(document["nature"])
     rows = [
         (
             fibre_label(key),
-            *(f"{cuts['lower'][k]:.5g} … {cuts['upper'][k]:.5g}" for k in (0, -1)),
+            *(between(cuts["lower"][k], cuts["upper"][k], nature, 5) for k in (0, -1)),
         )
         for key, cuts in document["fibres"].items()
     ]
@@ -113,7 +122,7 @@ def summary(document: Document) -> str:
     """The α-cuts as a table, and what they cost."""
     columns = [document[key][side] for key in ("E_GPa", "nu_cuts") for side in ("lower", "upper")]
     rows = [
-        (f"{alpha:g}", *(fixed(float(x), 5) for x in ends))
+        (f"{alpha:g}", *printed(ends, nature_of(document["nature"])))
         for alpha, *ends in zip(document["alpha"], *columns, strict=True)
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")

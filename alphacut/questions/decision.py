@@ -1,4 +1,4 @@
-"""Decision: how possible and how necessary it is that limits are passed, and their margins."""
+"""Decision: how possible and how necessary it is that limits are exceeded, and their margins."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PRECISION = 5e-3
 
 
 class Decision(Limited):
-    """Possibility and necessity that limits are passed."""
+    """Possibility and necessity that limits are exceeded."""
 
 
 def answer(section: Decision, motion: Motion) -> Document:
@@ -66,7 +66,7 @@ def rows(document: Document) -> list[Row]:
     """A row for each limit."""
     return [
         (
-            in_words(name, one["limit"], one["unit"]).replace("beyond", "≤"),
+            in_words(name, one["limit"], one["unit"]).replace(">", "≤").removesuffix(" exceeded"),
             one["verdict"],
             one["nature"],
             degree(one["possibility"]),
@@ -88,10 +88,10 @@ def _left(one: Document) -> str:
 def words(document: Document) -> str:
     """How to read the degrees."""
     return (
-        "A limit is kept where no motion exceeds it, passed where every motion does, and can be"
-        " passed where a motion is known that does."
-        " Passing it is possible to the degree of the highest α-cut that holds such a motion."
-        " It is necessary to one less the degree to which keeping the limit is possible."
+        "A limit is not exceeded where no motion exceeds it, exceeded where every motion does, and"
+        " can be exceeded where a motion is known that does."
+        " Exceeding it is possible to the degree of the highest α-cut that holds such a motion."
+        " It is necessary to one less the degree to which not exceeding it is possible."
         " Attained bounds show what is possible and exclude nothing."
     )
 
@@ -124,7 +124,7 @@ def draw(document: Document) -> Figure:
 QUESTION = Question(
     key="decision",
     section=Decision,
-    title="Can or must limits be passed?",
+    title="Can or must limits be exceeded?",
     caption="Fuzzy peak of each limited output over its limit",
     answer=answer,
     figure=draw,

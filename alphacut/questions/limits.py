@@ -85,5 +85,5 @@ def in_si(limits: tuple[Limit, ...], structure: Structure, key: str) -> dict[str
 
 
 def in_words(output: str, limit: float, unit: str) -> str:
-    """A limit for people: "|drift1| beyond 40.00 mm"; the event's name where it has no unit."""
-    return f"|{output}| beyond {engineering(limit, unit)}" if unit else f"{output} passed"
+    """A limit for people: "|drift1| > 40.00 mm"; the event's name where it has no unit."""
+    return f"|{output}| > {engineering(limit, unit)}" if unit else f"{output} exceeded"

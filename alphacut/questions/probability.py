@@ -1,4 +1,4 @@
-"""Probability that limits are passed, with some inputs random and the others fuzzy."""
+"""Probability that limits are exceeded, with some inputs random and the others fuzzy."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from alphacut.frame.questions.probability import Probability, probabilities
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.units import axis_prefix, engineering
+from alphacut.io.units import axis_prefix, between, engineering
 from alphacut.questions.limits import in_si, in_words
 from alphacut.questions.question import Limited, Motion, Question, Row
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class ProbabilitySection(Limited):
-    """Fuzzy probability that limits are passed; inputs that are not random stay fuzzy."""
+    """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
 
     random: tuple[str, ...] = Field(
         default=(), description="inputs that are random, with the shape of their membership"
@@ -64,7 +65,7 @@ def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Arr
 
 
 def answer(section: ProbabilitySection, motion: Motion) -> Document:
-    """Probabilities of passing each limit, and any of several."""
+    """Probabilities of exceeding each limit, and any of several."""
     structure = motion.structure
     limits = in_si(section.limits, structure, "probability.limits")
     random = structure.inputs(section.random, "probability.random")
@@ -123,7 +124,7 @@ def rows(document: Document) -> list[Row]:
 
 def cut(one: Document, level: int) -> str:
     """Bounds of a probability on a level."""
-    return " … ".join(dict.fromkeys(f"{one[side][level]:.3g}" for side in ("lower", "upper")))
+    return between(one["lower"][level], one["upper"][level], Nature.ATTAINED, 3)
 
 
 def words(document: Document) -> str:
@@ -152,7 +153,7 @@ def draw(document: Document) -> Figure:
     factor, unit = axis_prefix(float(limits[-1]), one["unit"])
     axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}")
     axes.set_xlabel(f"{title} ({unit})".replace("^2", "²") if unit else title)
-    axes.set_ylabel("probability of passing it")
+    axes.set_ylabel("probability of exceeding it")
     axes.set_ylim(0, 1.02)
     alpha_legend(axes, alpha)
     return drawn
@@ -170,8 +171,8 @@ def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
 QUESTION = Question(
     key="probability",
     section=ProbabilitySection,
-    title="How probable is it that limits are passed?",
-    caption="Fuzzy probability of passing a limit, over the limit",
+    title="How probable is it that limits are exceeded?",
+    caption="Fuzzy probability of exceeding a limit, over the limit",
     answer=answer,
     figure=draw,
     head=("limit", "at the lowest α", "nature", "at the highest α", "scatter", "between nodes"),

@@ -1,4 +1,4 @@
-"""Tolerances: the largest scale of all supports at which every limit is kept."""
+"""Tolerances: the largest scale of all supports at which no limit is exceeded."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from alphacut.case.types import Quantity
 from alphacut.figures.style import BLUE, GREY, INK, figure
 from alphacut.frame.questions.tolerances import tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.units import engineering
+from alphacut.io.units import engineering, rounded
 from alphacut.questions.decision import PRECISION
 from alphacut.questions.limits import in_si
 from alphacut.questions.question import Limited, Motion, Question, Row
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Tolerances(Limited):
-    """Largest scale of the supports of the fuzzy inputs at which every limit is kept."""
+    """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
 
     most: Annotated[float, Quantity(above=0, most=100)] = Field(
         default=2.0, description="largest scale that is tried; 1 is that of the case"
@@ -31,7 +32,7 @@ class Tolerances(Limited):
 
 
 def answer(section: Tolerances, motion: Motion) -> Document:
-    """Scales that are kept and passed, and the supports at the first."""
+    """Scales at which no limit and one is exceeded, and the supports at the first."""
     limits = in_si(section.limits, motion.structure, "tolerances.limits")
     scale = tolerances(
         motion.observed(tuple(limits)),
@@ -64,10 +65,10 @@ def answer(section: Tolerances, motion: Motion) -> Document:
 def rows(document: Document) -> list[Row]:
     """The scale, then each input's tolerance."""
     kept, passed = document["kept"], document["passed"]
-    scale = "none" if kept is None else f"up to {kept:.4g}"
-    beyond = f"passed at {passed:.4g}" if passed is not None else "none passed"
+    scale = "none" if kept is None else f"up to {rounded(kept, 'upper', Nature.ATTAINED):.4g}"
+    beyond = f"exceeded at {passed:.4g}" if passed is not None else "none is exceeded"
     if passed is not None and document["clear"] is not None:
-        beyond = f"none found to {document['clear']:.4g}, {beyond}"
+        beyond = f"none seen up to {document['clear']:.4g}, {beyond}"
     head = ("scale of all tolerances", scale, document["nature"], beyond)
     return [head, *(_row(name, one, document) for name, one in document["supports"].items())]
 
@@ -89,11 +90,11 @@ def words(document: Document) -> str:
 
 
 def draw(document: Document) -> Figure:
-    """Supports of the case and at the scale that keeps the limits, over their modal values."""
+    """Supports of the case and at the scale that exceeds no limit, over their modal values."""
     each = document["supports"]
     drawn, axes = figure(7.2, 1.0 + 0.4 * len(each))
     places = np.arange(len(each))[::-1]
-    series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "limits kept"))
+    series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "no limit exceeded"))
     for kind, colour, height, label in series:
         ends = np.array([np.asarray(one[kind]) / (one["modal"] or 1.0) for one in each.values()])
         wide = ends[:, 1] - ends[:, 0]
@@ -109,10 +110,10 @@ QUESTION = Question(
     key="tolerances",
     section=Tolerances,
     title="How far may tolerances go?",
-    caption="Supports of the inputs in the case, and at the scale that keeps all limits",
+    caption="Supports of the inputs in the case, and at the scale that exceeds no limit",
     answer=answer,
     figure=draw,
-    head=("quantity", "limits kept", "nature", "beyond, or relative"),
+    head=("quantity", "no limit exceeded", "nature", "limit exceeded, or relative"),
     rows=rows,
     words=words,
 )

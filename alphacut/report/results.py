@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.text_table import text_table
-from alphacut.io.units import STANDARD_GRAVITY, axis_prefix, engineering, largest_by_unit
+from alphacut.io.units import (
+    STANDARD_GRAVITY,
+    axis_prefix,
+    between,
+    engineering,
+    largest_by_unit,
+    rounded,
+)
 from alphacut.questions.table import QUESTIONS
 
 Row = tuple[str, ...]
@@ -50,27 +56,22 @@ def nature_of(text: object) -> Nature:
     return next((nature for nature in Nature if [str(nature)] == first), Nature.ATTAINED)
 
 
-def outward(value: float, *, up: bool, digits: int = 4) -> float:
-    """A bound at so many digits that is not narrower, but for rounding in the tenth."""
-    if value == 0 or not math.isfinite(value):
-        return value
-    scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
-    slack = 1e-10 * abs(value) * scale
-    whole = math.ceil(value * scale - slack) if up else math.floor(value * scale + slack)
-    return whole / scale
+def whole(ends: Document, level: int, error: float, nature: Nature) -> tuple[float, float, float]:
+    """Ends of a cut, and the error that they leave out; guaranteed ends contain it."""
+    low, high = float(ends["lower"][level]), float(ends["upper"][level])
+    if nature is not Nature.GUARANTEED:
+        return low, high, error
+    return max(low - error, min(low, 0.0)), high + error, 0.0
 
 
-def between(low: float, high: float, digits: int = 4) -> str:
-    """An interval rounded outwards; one number where both ends are the same."""
-    if high - low <= 1e-9 * abs(high):
-        return f"{low:.{digits}g}"
-    low, high = outward(low, up=False, digits=digits), outward(high, up=True, digits=digits)
-    return " … ".join(dict.fromkeys(f"{end:.{digits}g}" for end in (low, high)))
+def cut(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
+    """One cut of a quantity with five digits."""
+    return between(*whole(ends, level, error, nature)[:2], nature, 5)
 
 
-def cut(ends: Document, level: int, digits: int = 5, factor: float = 1.0) -> str:
-    """One cut of a quantity."""
-    return between(factor * ends["lower"][level], factor * ends["upper"][level], digits)
+def error_text(error: float, nature: Nature, digits: int = 2) -> str:
+    """Error that a range leaves out; a guaranteed one leaves out none."""
+    return "none" if nature is Nature.GUARANTEED else f"{error:.{digits}g}"
 
 
 def material(summary: Document) -> Table:
@@ -80,14 +81,15 @@ def material(summary: Document) -> Table:
         if part is None:
             continue
         young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
-        kind, mean = str(nature_of(part["nature"])), AVERAGES.get(str(part.get("average")), "")
+        nature, mean = nature_of(part["nature"]), AVERAGES.get(str(part.get("average")), "")
         name = f"E, GPa ({mean})" if mean else "E, GPa"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
-        rows.append((name, cut(young, -1), cut(young, 0), kind, f"{error:.1g}" if error else ""))
-        if "nu_cuts" in part:
-            rows.append(("ν", cut(part["nu_cuts"], -1), cut(part["nu_cuts"], 0), kind, ""))
-        if across := part.get("fibres", {}).get("E_T_GPa"):
-            rows.append((fibre_label("E_T_GPa"), cut(across, -1), cut(across, 0), kind, ""))
+        ends = cut(young, -1, nature), cut(young, 0, nature, error)
+        rows.append((name, *ends, str(nature), error_text(error, nature, 1)))
+        others = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
+        for label, of in others.items():
+            if of:
+                rows.append((label, cut(of, -1, nature), cut(of, 0, nature), str(nature), ""))
     return MATERIAL, rows
 
 
@@ -103,13 +105,13 @@ def width_text(image: Document) -> str:
 
 
 def motion(summary: Document) -> Table:
-    """Peaks of the magnitude of each output: nominal, on two levels, error, limit and verdict."""
+    """Peak of the magnitude of each output: nominal, on two levels, error, limit and verdict."""
     studies = summary.get("envelopes", {})
     if not studies:
         return ("peak of",), []
     alpha = [float(x) for x in next(iter(studies.values()))["alpha"]]
     levels = list(dict.fromkeys((len(alpha) - 1, middle(alpha), 0)))
-    titles = ["nominal" if alpha[k] == 1 else f"α = {alpha[k]:g}" for k in levels]
+    titles = [f"α = {alpha[k]:g}" for k in levels]
     limits = limits_of(summary)
     rows: list[Row] = []
     for name, study in studies.items():
@@ -117,18 +119,23 @@ def motion(summary: Document) -> Table:
         for output, peak in study["peak"].items():
             each = scales(output, peak, summary.get("structure", {}))
             for label, factor in each if study.get("drawn") in (None, "", output) else ():
-                error = f"{factor * max(peak.get('error', [0.0])):.2g}"
-                cuts = [nominal(peak, factor)] if alpha[-1] == 1 else []
-                cuts += [cut(peak, k, 4 - (k > 0), factor) for k in levels[len(cuts) :]]
+                nature, error = nature_of(study["nature"]), max(peak.get("error", [0.0]))
+                cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
+                for k in levels[len(cuts) :]:
+                    low, high, _ = whole(peak, k, error, nature)
+                    cuts.append(between(factor * low, factor * high, nature, 4 - (k > 0)))
                 limit = [limit_text(limits.get(output), factor)] * bool(limits)
-                rows.append((label + where, *cuts, error, *limit))
+                rows.append((label + where, *cuts, error_text(factor * error, nature), *limit))
+    if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
+        titles[0] = "nominal"
     return ("peak of", *titles, "± error", *["limit"] * bool(limits)), rows
 
 
-def nominal(peak: Document, factor: float) -> str:
+def nominal(peak: Document, factor: float, nature: Nature) -> str:
     """A peak on the highest level: one number, or an interval wider than a hundredth of it."""
     low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
-    return f"{(low + high) / 2:.4g}" if high - low <= 0.01 * abs(high) else between(low, high)
+    near = high - low <= 0.01 * abs(high)
+    return f"{(low + high) / 2:.4g}" if near else between(low, high, nature)
 
 
 def middle(alpha: Sequence[float]) -> int:
@@ -156,7 +163,7 @@ def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
     for key, inner in (("tolerances", "limits"), ("probability", "events"), ("decision", "limits")):
         for output, one in summary.get(key, {}).get(inner, {}).items():
             of = one if isinstance(one, Mapping) else {"limit": one}
-            limits[output] = of["limit"], of.get("verdict", "").partition(" ")[0]
+            limits[output] = of["limit"], of.get("verdict", "").partition(" from")[0]
     return limits
 
 
@@ -168,10 +175,11 @@ def limit_text(limit: tuple[float, str] | None, factor: float) -> str:
 def natures(summary: Document) -> Iterator[str]:
     """A line on the nature of the peaks."""
     each = {name: nature_of(one["nature"]) for name, one in summary.get("envelopes", {}).items()}
-    if len(set(each.values())) == 1:
-        yield f"All peaks are {next(iter(each.values()))}"
-    elif each:
-        yield "Peaks are " + ", ".join(f"{nature} ({name})" for name, nature in each.items())
+    words = [f"all {nature}" for nature in set(each.values())]
+    if len(words) > 1:
+        words = [f"{nature} ({name})" for name, nature in each.items()]
+    if each:
+        yield "Peaks are largest magnitudes over time, " + ", ".join(words)
 
 
 def answers(summary: Document) -> list[Row]:
@@ -185,16 +193,13 @@ def answers(summary: Document) -> list[Row]:
 
 
 def drivers(summary: Document) -> Iterator[str]:
-    """Lines on what drives the modulus, and the peak of the last output."""
+    """Lines on what drives the modulus, and the peak of the last output: the largest shares."""
     of = {name: one for name, one in summary.get("shares", {}).items() if name == "E"}
     of |= {f"the peak of {x}": one for x, one in [*summary.get("peak_shares", {}).items()][-1:]}
-    yield from (f"Fixing one narrows {name} by: {_ranked(one)}" for name, one in of.items())
-
-
-def _ranked(shares: Document) -> str:
-    """The three largest shares, the largest first."""
-    first = sorted(shares.items(), key=lambda pair: -pair[1])[:3]
-    return ", ".join(f"{name} {share:.0%}" for name, share in first)
+    for name, shares in of.items():
+        first, *others = sorted(shares.items(), key=lambda pair: -pair[1])[:3]
+        more = "".join(f", {x} by {share:.0%}" for x, share in others)
+        yield f"Fixing {first[0]} narrows {name} by {first[1]:.0%}{more}"
 
 
 def identified(document: Document | None) -> Iterator[str]:
@@ -203,29 +208,35 @@ def identified(document: Document | None) -> Iterator[str]:
         yield from [str(document["refuted"])] if document else []
         return
     for name, ends in document["inputs"].items():
-        both_ends, unit = (ends["lower"][0], ends["upper"][0]), document["units"][name]
+        unit, wider = document["units"][name], Nature.GUARANTEED
+        both_ends = (rounded(ends[side][0], side, wider) for side in ("lower", "upper"))
         words = " … ".join(engineering(end, unit) for end in both_ends)
         yield f"{name}: {words}, {document['narrowed'][name]:.0%} of its width before"
     for mode in document["held_out"]:
         low, high = mode["predicted"]
         where = f"{mode['measured']:.4g}, {'inside' if mode['inside'] else 'outside'}"
-        yield f"mode {mode['mode']}: {low:.4g} … {high:.4g} Hz predicted, measured {where}"
+        words = between(low, high, Nature.GUARANTEED)
+        yield f"mode {mode['mode']}: {words} Hz predicted, measured {where}"
 
 
 def extremes(study: Document) -> list[Row]:
     """Least and greatest value of each output at the lowest level, with the error beside them."""
     units = {name: Output(name).unit for name in study["min"]}
     values = ((study[side][x], units[x]) for side in ("min", "max") for x in units)
-    largest, errors = largest_by_unit(values), study.get("error", {})
+    largest, errors, nature = (
+        largest_by_unit(values),
+        study.get("error", {}),
+        nature_of(study["nature"]),
+    )
     return [
         (
             name,
             *(
-                engineering(outward(study[x][name], up=x == "max"), unit, beside=largest[unit])
-                for x in ("min", "max")
+                engineering(rounded(study[x][name], side, nature), unit, beside=largest[unit])
+                for x, side in (("min", "lower"), ("max", "upper"))
             ),
             engineering(errors[name], unit, digits=2) if name in errors else "not estimated",
-            str(nature_of(study["nature"])),
+            str(nature),
         )
         for name, unit in units.items()
     ]

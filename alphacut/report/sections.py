@@ -9,7 +9,9 @@ from pathlib import Path
 from markupsafe import Markup
 
 from alphacut.figures.captions import INPUTS, caption, in_words
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
+from alphacut.io.units import between, rounded
 from alphacut.questions.question import Question
 from alphacut.questions.table import QUESTIONS
 from alphacut.report.html import code, folded, fragment, paragraphs, picture, section, table
@@ -99,7 +101,7 @@ class Page:
     def _modulus(self, part: Document) -> Markup:
         columns = [part["E_GPa"], *([part["nu_cuts"]] if "nu_cuts" in part else [])]
         cuts = [
-            (f"{alpha:g}", *(f"{one[side][row]:.5g}" for one in columns for side in one))
+            (f"{alpha:g}", *(_end(one, side, row, part) for one in columns for side in one))
             for row, alpha in enumerate(part["alpha"])
         ]
         head = ("α", "E from, GPa", "E to, GPa", "ν from", "ν to")[: 1 + 2 * len(columns)]
@@ -119,8 +121,10 @@ class Page:
 
     def _image(self, part: Document) -> Markup:
         cuts = part["cuts"]
-        ends = zip(cuts["alpha"], cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"], strict=True)
-        rows = [(f"{alpha:g}", f"{low:.5g}", f"{high:.5g}") for alpha, low, high in ends]
+        rows = [
+            (f"{alpha:g}", *(_end(cuts["E_GPa"], side, row, part) for side in ("lower", "upper")))
+            for row, alpha in enumerate(cuts["alpha"])
+        ]
         words = "The bounds are those of the image as it was segmented, in plane strain."
         return section(
             "How stiff is the image?",
@@ -135,7 +139,7 @@ class Page:
             (f"quantile {one['probability']:g}", _widest(one["GPa"])) for one in part["quantiles"]
         ]
         if "exceedance" in part:
-            limit = f"probability beyond {part['exceedance']['limit_GPa']:g} GPa"
+            limit = f"probability above {part['exceedance']['limit_GPa']:g} GPa"
             rows.append((limit, _widest(part["exceedance"])))
         words = f"Homogenised stress {part['quantity']}, random with θ at every fuzzy sample."
         head = ("quantity, GPa", f"at α = {part['alpha'][0]:g}")
@@ -149,7 +153,7 @@ class Page:
         if "refuted" in part:
             return section(title, paragraphs(str(part["refuted"])))
         rows = [
-            (name, *(f"{low:.5g} … {high:.5g}" for low, high in (part["prior"][name], after)))
+            (name, *(between(*ends, Nature.GUARANTEED, 5) for ends in (part["prior"][name], after)))
             for name, ends in part["inputs"].items()
             for after in [(ends["lower"][0], ends["upper"][0])]
         ]
@@ -222,8 +226,12 @@ def _ends(value: object) -> list[float]:
     return [float(x) for x in value] if isinstance(value, list) else [float(str(value))]
 
 
+def _end(ends: Document, side: str, row: int, part: Document) -> str:
+    return f"{rounded(ends[side][row], side, nature_of(part['nature']), 5):.5g}"
+
+
 def _widest(ends: Document) -> str:
-    return f"{ends['lower'][0]:.4g} … {ends['upper'][0]:.4g}"
+    return between(ends["lower"][0], ends["upper"][0], Nature.ESTIMATED)
 
 
 def _percent(share: float | None) -> str:

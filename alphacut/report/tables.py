@@ -12,8 +12,9 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, write_text
 from alphacut.io.netcdf import read_dataset
+from alphacut.io.units import rounded
 from alphacut.questions.table import QUESTIONS
-from alphacut.report.results import nature_of
+from alphacut.report.results import nature_of, whole
 from alphacut.report.safe import cleaned, plain_name
 
 if TYPE_CHECKING:
@@ -74,8 +75,8 @@ def tables(summary: Document, results: Path) -> Iterator[tuple[str, Table]]:
 
 def modulus(part: Document) -> Table:
     """α-cuts of E and ν, with the error of E."""
-    error, nature = sum(part.get("error", {}).values()), str(nature_of(part["nature"]))
-    columns = [part["alpha"], *_ends(part["E_GPa"]), *_ends(part["nu_cuts"])]
+    error, nature = sum(part.get("error", {}).values()), nature_of(part["nature"])
+    columns = [part["alpha"], *_ends(part["E_GPa"], nature), *_ends(part["nu_cuts"], nature)]
     head = ("alpha", "E from [GPa]", "E to [GPa]", "nu from", "nu to")
     rows = [(*row, error * row[2], nature) for row in zip(*columns, strict=True)]
     return (*head, "error of E [GPa]", "nature"), rows
@@ -83,28 +84,29 @@ def modulus(part: Document) -> Table:
 
 def image(part: Document) -> Table:
     """Proved α-cuts of E of an image."""
-    cuts, nature = part["cuts"], part["cuts"]["nature"]
-    words = [nature] * len(cuts["alpha"]) if isinstance(nature, str) else nature
-    rows = zip(cuts["alpha"], *_ends(cuts["E_GPa"]), map(nature_of, words), strict=True)
-    return ("alpha", "E from [GPa]", "E to [GPa]", "nature"), rows
+    cuts, nature = part["cuts"], nature_of(part["nature"])
+    rows = zip(cuts["alpha"], *_ends(cuts["E_GPa"], nature), strict=True)
+    return ("alpha", "E from [GPa]", "E to [GPa]", "nature"), [(*row, nature) for row in rows]
 
 
-def _ends(cuts: Document) -> tuple[Sequence[float], Sequence[float]]:
-    return cuts["lower"], cuts["upper"]
+def _ends(cuts: Document, nature: Nature) -> Iterator[list[float]]:
+    for side in ("lower", "upper"):
+        yield [rounded(end, side, nature, 6) for end in cuts[side]]
 
 
 def envelope(data: xarray.Dataset, output: str) -> Table:
     """Bounds of one output by time, those of each level beside each other with their error."""
     one, unit = data.sel(output=output), Output(output).unit
     nature = nature_of(data.attrs["nature"])
-    inside = " (inside the bounds)" if nature is Nature.GUARANTEED else ""
+    error = "gap to attained" if nature is Nature.GUARANTEED else "error"
     columns = {"time [s]": one["time"].values}
     for level in one["alpha"].values:
         at = one.sel(alpha=level)
         for band in ("lower", "upper", "error"):
             if band in at:
-                title = f"{nature} {band}" if band != "error" else f"error{inside}"
-                columns[f"{title} at alpha {level:g} [{unit}]"] = at[band].values
+                title = f"{nature} {band}" if band != "error" else error
+                ends = (rounded(float(x), band, nature, 6) for x in at[band].values)
+                columns[f"{title} at alpha {level:g} [{unit}]"] = [*ends]
     return tuple(columns), zip(*columns.values(), strict=True)
 
 
@@ -115,7 +117,9 @@ def peaks(studies: Document) -> Iterator[Sequence[object]]:
     """Rows of the peaks of all studies, an output and a level each."""
     for name, study in studies.items():
         for output, peak in study.get("peak", {}).items():
-            errors = peak.get("error", [""] * len(study["alpha"]))
-            columns = study["alpha"], peak["lower"], peak["upper"], errors
-            for row in zip(*columns, strict=True):
-                yield name, output, Output(output).unit, *row, nature_of(study["nature"])
+            nature, unit = nature_of(study["nature"]), Output(output).unit
+            for level, alpha in enumerate(study["alpha"]):
+                error = peak["error"][level] if "error" in peak else 0.0
+                low, high, rest = whole(peak, level, error, nature)
+                ends = rounded(low, "lower", nature, 6), rounded(high, "upper", nature, 6)
+                yield name, output, unit, alpha, *ends, rest, nature

@@ -1,9 +1,9 @@
-"""Possibility and necessity that outputs pass their limits, read off their fuzzy peaks.
+"""Possibility and necessity that outputs exceed their limits, read off their fuzzy peaks.
 
-Passing a limit is possible to the degree of the highest α-cut that holds such a motion, and
-necessary to one less the degree to which keeping it is possible (Dubois and Prade, Possibility
-Theory, chapter 1). The α-cut of a peak is the answer: a peak that stays below the limit excludes
-passing on its level and above, one that is attained beyond the limit proves it possible.
+Exceeding a limit is possible to the degree of the highest α-cut that holds such a motion. It is
+necessary to one less the degree to which not exceeding it is possible (Dubois and Prade,
+Possibility Theory, chapter 1). The α-cut of a peak is the answer: a peak that stays below the limit
+excludes the motion on its level and above. One that is attained above it proves the possibility.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 
 ANY = "any of them"
-"""Name of the event that any of several limits is passed."""
+"""Name of the event that any of several limits is exceeded."""
 
 
 @dataclass(frozen=True, eq=False)
 class Passing:
-    """Degrees to which a limit is passed at some time.
+    """Degrees to which a limit is exceeded at some time.
 
     Args:
         possibility: Lower and upper bound, from 0 to 1.
@@ -44,17 +44,17 @@ class Passing:
 
     @property
     def verdict(self) -> str:
-        """Kept, passed, can be passed, or undecided; with the level from which on if not 0."""
+        """(Not) exceeded, can be exceeded, or undecided; with the level from which on if not 0."""
         level = f" from α = {self.lowest:g} up" if self.lowest else ""
         if self.possibility[1] <= self.lowest:
-            return f"kept{level}"
+            return f"not exceeded{level}"
         if self.necessity[0] >= 1 - self.lowest:
-            return f"passed{level}"
-        return "can be passed" if self.possibility[0] > 0 else "undecided"
+            return f"exceeded{level}"
+        return "can be exceeded" if self.possibility[0] > 0 else "undecided"
 
 
 def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
-    """Degrees to which the magnitude of each output passes its limit.
+    """Degrees to which the magnitude of each output exceeds its limit.
 
     Args:
         peaks: Fuzzy peaks of the outputs.
@@ -90,7 +90,7 @@ def _one(peaks: Peaks, output: str, limit: float) -> Passing:
 
 
 def _any(each: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
-    """Degrees to which any limit is passed: as possible as the most possible of them."""
+    """Degrees to which any limit is exceeded: as possible as the most possible of them."""
     every = list(each.values())
     possible = tuple(max(one.possibility[k] for one in every) for k in (0, 1))
     least = max(one.necessity[0] for one in every)

@@ -1,4 +1,4 @@
-"""Fuzzy probability that limits are passed, with some inputs random and others fuzzy.
+"""Fuzzy probability that limits are exceeded, with some inputs random and others fuzzy.
 
 The same random draws serve every fuzzy point (common random numbers), so that differences between
 points are no noise. The points are the corners of each α-cut and a spread inside, so the bounds of
@@ -41,7 +41,7 @@ Sampler = Callable[[np.random.Generator, int], Array]
 
 @dataclass(frozen=True, eq=False)
 class Probability:
-    """Probability that a magnitude passes its limit within the duration, by level.
+    """Probability that a magnitude exceeds its limit within the duration, by level.
 
     Args:
         alpha: Levels, shape (A,).
@@ -50,7 +50,7 @@ class Probability:
         error: What peaks between nodes may add to either, estimated, shape (A,).
         deviation: Standard deviation of the estimates, the largest of all.
         limits: Other limits, shape (L,), in SI units; shares of their limits for `ANY`.
-        curve: Least and greatest probability of passing each of them, shape (2, A, L).
+        curve: Least and greatest probability of exceeding each of them, shape (2, A, L).
         evaluations: Motions computed.
         nature: Always attained.
     """
@@ -80,7 +80,7 @@ def probabilities(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> dict[str, Probability]:
-    """Fuzzy probability of passing each limit, and `ANY` of several, from the same motions.
+    """Fuzzy probability of exceeding each limit, and `ANY` of several, from the same motions.
 
     Args:
         model: A linear structure, moved by the exact propagator, or a general system, by the

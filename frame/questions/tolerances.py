@@ -1,8 +1,8 @@
-"""Tolerances: the largest scale of all supports at which every limit is kept.
+"""Tolerances: the largest scale of all supports at which no limit is exceeded.
 
 Supports are scaled about their modal values. The scale is halved between one whose envelope
-excludes that a limit is passed and one whose envelope does not. Where these bounds leave a doubt,
-it is halved once more, between a scale at which no motion tried passes a limit and one at which a
+excludes that a limit is exceeded and one whose envelope does not. Where these bounds leave a doubt,
+it is halved once more, between a scale at which no motion tried exceeds a limit and one at which a
 motion does. Each step is one call of `envelope` on the support alone, and as sure as its nature.
 """
 
@@ -29,11 +29,11 @@ class Tolerances:
     """Scales of the supports: 1 are those of the inputs.
 
     Args:
-        kept: Largest scale tried at which passing a limit is excluded; None where it is at none,
-            not even at scale 0.
-        clear: Largest scale tried at which no motion that was looked at passes a limit; None where
-            it is at none.
-        passed: Least scale tried at which a limit is passed by a motion that is known; infinite
+        kept: Largest scale tried at which exceeding a limit is excluded; None where it is at
+            none, not even at scale 0.
+        clear: Largest scale tried at which no motion that was looked at exceeds a limit; None
+            where it is at none.
+        passed: Least scale tried at which a motion that is known exceeds a limit; infinite
             where none was met.
         supports: Supports at the scale `kept`, by input, in SI units.
         nature: Weakest nature of the envelopes that `kept` rests on.

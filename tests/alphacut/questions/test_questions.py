@@ -31,9 +31,9 @@ def test_decision_and_probability_agree(summary):
     assert set(limits) == set(events)
     for name, one in limits.items():
         assert one["nature"] == "guaranteed"
-        if one["verdict"] == "kept":
+        if one["verdict"] == "not exceeded":
             assert max(events[name]["upper"]) == 0
-        if one["verdict"] == "passed":
+        if one["verdict"] == "exceeded":
             assert min(events[name]["lower"]) == 1
 
 

@@ -65,16 +65,19 @@ def test_the_limit_that_a_level_just_reaches_is_possible_to_that_level():
     middle = passing(of, {"q1": amplitude(1050)})["q1"]  # reached at the mass of level 0.5
     assert middle.possibility == (0.4, 0.6)
     assert middle.necessity == (0.0, 0.0)
-    assert passing(of, {"q1": amplitude(1101)})["q1"].verdict == "kept"
+    assert passing(of, {"q1": amplitude(1101)})["q1"].verdict == "not exceeded"
     surely = passing(of, {"q1": amplitude(899)})["q1"]
     assert surely.possibility == (1.0, 1.0)
-    assert surely.verdict in ("passed", "can be passed")  # the least peak is a bound, not attained
+    assert surely.verdict in (
+        "exceeded",
+        "can be exceeded",
+    )  # the least peak is a bound, not attained
 
 
 def test_a_limit_far_below_is_passed_by_all_motions(proved):
     low = 0.9 * proved.lower[0]
     answers = passing(proved, dict(zip(proved.outputs, low, strict=True)))
-    assert {one.verdict for one in answers.values()} == {"passed"}
+    assert {one.verdict for one in answers.values()} == {"exceeded"}
     assert answers[ANY].necessity == (1.0, 1.0)
 
 
@@ -104,7 +107,7 @@ def test_levels_below_the_lowest_are_left_open():
     motion = envelope(FRAME, INPUTS, duration=5, step=0.02, alpha=(0.5, 1))
     answer = passing(peaks(motion), {"q1": 1.0})["q1"]
     assert answer.possibility == (0.0, 0.5)
-    assert answer.verdict == "kept from α = 0.5 up"
+    assert answer.verdict == "not exceeded from α = 0.5 up"
 
 
 def test_the_scale_of_tolerances_is_kept_and_a_greater_one_passed():
