@@ -89,8 +89,7 @@ class Frame(Section):
         description="CSV or AT2 file of the ground's acceleration; motion is relative to it",
     )
     outputs: tuple[str, ...] = Field(
-        default=(),
-        description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear",
+        default=(), description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"
     )
 
     @property

@@ -70,10 +70,7 @@ def base(
     for index, graph in enumerate(shown):
         fresh = index >= len(shown) - last
         panel.plot(
-            walk.time,
-            walk.graphs[graph],
-            color=ORANGE if fresh else GREY,
-            lw=1.3 if fresh else 0.4,
+            walk.time, walk.graphs[graph], color=ORANGE if fresh else GREY, lw=1.3 if fresh else 0.4
         )
     if node is not None:
         panel.axvline(walk.time[node], color=INK, lw=0.8, ls=":")

@@ -66,10 +66,7 @@ def _limit(value: object) -> Limit:
     return Limit(name, number, share, str(value))
 
 
-Limits = Annotated[
-    tuple[Annotated[Limit, Text(lambda value, info: _limit(value))], ...],
-    Some,
-]
+Limits = Annotated[tuple[Annotated[Limit, Text(lambda value, info: _limit(value))], ...], Some]
 
 
 def in_si(limits: tuple[Limit, ...], structure: Structure, key: str) -> dict[str, float]:

@@ -21,12 +21,7 @@ from alphacut.questions.table import QUESTIONS
 Row = tuple[str, ...]
 Table = tuple[Row, list[Row]]
 """Titles of the columns, and the rows."""
-AVERAGES = {
-    "cylinders": "eq. 16",
-    "axes": "eq. 16",
-    "isotropic": "isotropic",
-    "spheres": "spheres",
-}
+AVERAGES = {"cylinders": "eq. 16", "axes": "eq. 16", "isotropic": "isotropic", "spheres": "spheres"}
 """Averages of the stiffness that E and ν are of."""
 NATURES = {
     Nature.GUARANTEED: "No value in the α-cut lies outside these bounds; this is proved.",
@@ -38,6 +33,13 @@ MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
 """Label of the bounds that hold for isotropic composites, at the modal values."""
 ANSWERS = ("question", "answer", "nature")
+EXCEEDED = {
+    "exceeded": "yes",
+    "not exceeded": "no",
+    "can be exceeded": "can be",
+    "undecided": "unknown",
+}
+"""Verdicts on a limit as they stand in a column."""
 GRAVITY = float(STANDARD_GRAVITY)
 
 
@@ -90,7 +92,13 @@ def material(summary: Document) -> Table:
         for label, of in others.items():
             if of:
                 rows.append((label, cut(of, -1, nature), cut(of, 0, nature), str(nature), ""))
-    return MATERIAL, rows
+    return filled(MATERIAL, rows)
+
+
+def filled(head: Row, rows: list[Row]) -> Table:
+    """The columns that hold something, an error that ranges leave out for example."""
+    kept = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
+    return tuple(head[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
 
 
 def fibre_label(key: str) -> str:
@@ -108,7 +116,7 @@ def motion(summary: Document) -> Table:
     """Peak of the magnitude of each output: nominal, on two levels, error, limit and verdict."""
     studies = summary.get("envelopes", {})
     if not studies:
-        return ("peak of",), []
+        return (), []
     alpha = [float(x) for x in next(iter(studies.values()))["alpha"]]
     levels = list(dict.fromkeys((len(alpha) - 1, middle(alpha), 0)))
     titles = [f"α = {alpha[k]:g}" for k in levels]
@@ -124,18 +132,19 @@ def motion(summary: Document) -> Table:
                 for k in levels[len(cuts) :]:
                     low, high, _ = whole(peak, k, error, nature)
                     cuts.append(between(factor * low, factor * high, nature, 4 - (k > 0)))
-                limit = [limit_text(limits.get(output), factor)] * bool(limits)
-                rows.append((label + where, *cuts, error_text(factor * error, nature), *limit))
+                limit, verdict = limits.get(output, (None, ""))
+                words = "" if limit is None else f"{limit * factor:.4g}", EXCEEDED.get(verdict, "")
+                rows.append((label + where, *cuts, error_text(factor * error, nature), *words))
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
-    return ("peak of", *titles, "± error", *["limit"] * bool(limits)), rows
+    return filled(("peak of", *titles, "± error", "limit", "exceeded"), rows)
 
 
 def nominal(peak: Document, factor: float, nature: Nature) -> str:
     """A peak on the highest level: one number, or an interval wider than a hundredth of it."""
     low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
     near = high - low <= 0.01 * abs(high)
-    return f"{(low + high) / 2:.4g}" if near else between(low, high, nature)
+    return f"{(low + high) / 2:.4g}" if near else between(low, high, nature, 3)
 
 
 def middle(alpha: Sequence[float]) -> int:
@@ -165,11 +174,6 @@ def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
             of = one if isinstance(one, Mapping) else {"limit": one}
             limits[output] = of["limit"], of.get("verdict", "").partition(" from")[0]
     return limits
-
-
-def limit_text(limit: tuple[float, str] | None, factor: float) -> str:
-    """A limit times a factor, with the verdict on it."""
-    return ", ".join(filter(None, (f"{limit[0] * factor:.4g}", limit[1]))) if limit else ""
 
 
 def natures(summary: Document) -> Iterator[str]:

@@ -277,11 +277,7 @@ def declared_errors(result: Homogenised) -> Document | None:
         s11, s12 = result.error_of(lambda k: STRAIN * np.array([2 * k[0] + 2 / 3 * k[1], 2 * k[2]]))
     else:
         modulus, nu, s11, s12 = error_of_means(result)
-    return {
-        "E_GPa": modulus / GPA,
-        "nu": nu,
-        "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
-    }
+    return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA}}
 
 
 def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> None:

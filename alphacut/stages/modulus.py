@@ -10,16 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.fuzzy import (
-    Crisp,
-    Extended,
-    FuzzyNumber,
-    General,
-    Known,
-    Reduced,
-    Signed,
-    propagate,
-)
+from alphacut.fuzzy import Crisp, Extended, FuzzyNumber, General, Known, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.method import Method as Plan
 from alphacut.fuzzy.refused import RefusedError

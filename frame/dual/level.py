@@ -104,10 +104,7 @@ def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
         (low, high), (least, top) = mode.omega_range, mode.quotient_range
         reach = FINE * (max(least, 0.0) * low + 2 / duration)
         most = [max(most[0], (high - low) / reach), max(most[1], (top - least) * high / reach)]
-    return (
-        int(np.clip(most[0], *POINTS[0])) + 1,
-        int(np.clip(most[1], *POINTS[1])) + 1,
-    )
+    return (int(np.clip(most[0], *POINTS[0])) + 1, int(np.clip(most[1], *POINTS[1])) + 1)
 
 
 def _grid(

@@ -29,11 +29,7 @@ class Enclosure:
 
 
 def enclosure(
-    chain: Chain,
-    lower: Array,
-    upper: Array,
-    modes: list[tuple[MeasuredMode, ModeCut]],
-    passes: int,
+    chain: Chain, lower: Array, upper: Array, modes: list[tuple[MeasuredMode, ModeCut]], passes: int
 ) -> Enclosure | None:
     """The box, from one that holds all parameters that are possible; None where none agree.
 

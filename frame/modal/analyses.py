@@ -9,13 +9,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.linear import Matrices, evaluate
-from alphacut.frame.structures.modes import (
-    ModalError,
-    Modes,
-    eigenvectors,
-    modes,
-    state_matrix,
-)
+from alphacut.frame.structures.modes import ModalError, Modes, eigenvectors, modes, state_matrix
 
 
 def analyse(

@@ -79,11 +79,7 @@ def square_stiffness(
         return np.concatenate(values), np.concatenate(errors)
 
     moduli, errors, used = _TRUNCATION.settle(
-        radius,
-        count,
-        _first_guess(radius, tolerance),
-        solve,
-        tolerance=max(tolerance, _ROUND_OFF),
+        radius, count, _first_guess(radius, tolerance), solve, tolerance=max(tolerance, _ROUND_OFF)
     )
     bulk, deviator, shear = np.moveaxis(moduli, -1, 0)
     return SquareStiffness(bulk, deviator, shear, errors, used)

@@ -34,13 +34,7 @@ class Truncation:
     particles: str
 
     def settle(
-        self,
-        radius: Array,
-        inclusions: int,
-        first: Array,
-        solve: Solve,
-        *,
-        tolerance: float,
+        self, radius: Array, inclusions: int, first: Array, solve: Solve, *, tolerance: float
     ) -> tuple[Array, Array, Array]:
         """Moduli of n cells times m inclusions, each with as many terms as it needs.
 

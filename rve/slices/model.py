@@ -101,10 +101,7 @@ class SlicesModel:
                 max(one.unknowns[_ORDERS.index(self.order)] for one in slices),
                 (),
                 seconds,
-                {
-                    "space": mean_errors(curve, error[nodes], square=cell.square),
-                    "theta": in_theta,
-                },
+                {"space": mean_errors(curve, error[nodes], square=cell.square), "theta": in_theta},
                 f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size"
                 f" {self.mesh_size:g}",
             )

@@ -65,11 +65,7 @@ class PBox:
 
 
 def least_pbox(
-    fit: HermiteFit,
-    sample: AreaWeighted,
-    band: float,
-    *,
-    hold: SlopeBand | None = None,
+    fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None
 ) -> PBox:
     """Least p-box around the fitted map that contains `sample`, within a band of `band`.
 

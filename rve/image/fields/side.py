@@ -95,11 +95,7 @@ def solve_side(
 
 
 def _fields(
-    element: Element,
-    trace: Array,
-    deviator: Array,
-    solver: ConjugateGradient,
-    start: Array | None,
+    element: Element, trace: Array, deviator: Array, solver: ConjugateGradient, start: Array | None
 ) -> tuple[Array, int]:
     """Fields of the solved loads and the most iterations; large images load by load."""
     modes = element.mean_modes(SOLVED_LOADS)
