@@ -21,16 +21,11 @@ def bands(dataset: xarray.Dataset, output: str) -> Figure:
     """Envelope with the priors and with what was identified, at the lowest level."""
     drawn, axes = figure()
     shown, time = dataset.sel(output=output).isel(alpha=0), dataset["time"].values
-    looks = {"prior": (GREY, 0.55, "before"), "posterior": (BLUE, 0.9, "after")}
-    for knowledge, (colour, opacity, words) in looks.items():
+    looks = ("prior", GREY, 0.55, "before"), ("posterior", BLUE, 0.9, "after")
+    for knowledge, colour, opacity, words in looks:
         band = shown.sel(knowledge=knowledge)
-        fill: Look = {
-            "color": colour,
-            "alpha": opacity,
-            "lw": 0,
-            "label": f"{words} the measurement",
-        }
-        axes.fill_between(time, band["lower"], band["upper"], **fill)
+        fill: Look = {"color": colour, "alpha": opacity, "label": f"{words} the measurement"}
+        axes.fill_between(time, band["lower"], band["upper"], lw=0, **fill)
     time_axes(axes, time, output)
     title(axes, f"{output} at α = {float(dataset['alpha'].values[0]):g}")
     axes.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))

@@ -90,8 +90,6 @@ def words(document: Document) -> str:
     return (
         "A limit is not exceeded where no motion exceeds it, exceeded where every motion does, and"
         " can be exceeded where a motion is known that does."
-        " Exceeding it is possible to the degree of the highest α-cut that holds such a motion."
-        " It is necessary to one less the degree to which not exceeding it is possible."
         " Attained bounds show what is possible and exclude nothing."
     )
 

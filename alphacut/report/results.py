@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
@@ -71,9 +71,9 @@ def cut(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
     return between(*whole(ends, level, error, nature)[:2], nature, 5)
 
 
-def error_text(error: float, nature: Nature, digits: int = 2) -> str:
+def error_text(error: float, nature: Nature) -> str:
     """Error that a range leaves out; a guaranteed one leaves out none."""
-    return "none" if nature is Nature.GUARANTEED else f"{error:.{digits}g}"
+    return "none" if nature is Nature.GUARANTEED else f"{error:.2g}"
 
 
 def material(summary: Document) -> Table:
@@ -87,7 +87,7 @@ def material(summary: Document) -> Table:
         name = f"E, GPa ({mean})" if mean else "E, GPa"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
         ends = cut(young, -1, nature), cut(young, 0, nature, error)
-        rows.append((name, *ends, str(nature), error_text(error, nature, 1)))
+        rows.append((name, *ends, str(nature), error_text(error, nature)))
         others = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
         for label, of in others.items():
             if of:
@@ -118,7 +118,8 @@ def motion(summary: Document) -> Table:
     if not studies:
         return (), []
     alpha = [float(x) for x in next(iter(studies.values()))["alpha"]]
-    levels = list(dict.fromkeys((len(alpha) - 1, middle(alpha), 0)))
+    middle = min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5))
+    levels = list(dict.fromkeys((len(alpha) - 1, middle, 0)))
     titles = [f"α = {alpha[k]:g}" for k in levels]
     limits = limits_of(summary)
     rows: list[Row] = []
@@ -145,11 +146,6 @@ def nominal(peak: Document, factor: float, nature: Nature) -> str:
     low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
     near = high - low <= 0.01 * abs(high)
     return f"{(low + high) / 2:.4g}" if near else between(low, high, nature, 3)
-
-
-def middle(alpha: Sequence[float]) -> int:
-    """Place of the level next to 0.5."""
-    return min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5))
 
 
 def scales(output: str, peak: Document, structure: Document) -> Iterator[tuple[str, float]]:
@@ -213,8 +209,8 @@ def identified(document: Document | None) -> Iterator[str]:
         return
     for name, ends in document["inputs"].items():
         unit, wider = document["units"][name], Nature.GUARANTEED
-        both_ends = (rounded(ends[side][0], side, wider) for side in ("lower", "upper"))
-        words = " … ".join(engineering(end, unit) for end in both_ends)
+        both = (rounded(ends[side][0], side, wider) for side in ("lower", "upper"))
+        words = " … ".join(engineering(end, unit) for end in both)
         yield f"{name}: {words}, {document['narrowed'][name]:.0%} of its width before"
     for mode in document["held_out"]:
         low, high = mode["predicted"]
