@@ -305,7 +305,7 @@ class _Comparison:
         scale = self.distance**-0.5
         y: Array = np.full(len(right), np.inf)
         moved = scale[:, None] * more * scale * (self.above[:, None] == self.above)
-        left = self.left - float(np.linalg.norm(moved, 2))
+        left = self.left - float(np.linalg.svd(moved, compute_uv=False).max(initial=0.0))
         if left > 0:
             y = np.asarray(scale * np.linalg.norm(scale * right) / left)
         comparison = np.diag(self.diagonal) - self.off - more

@@ -69,17 +69,14 @@ def oscillators(
     """Intervening variables of the single modes, and the group of all others."""
     n, zero = len(modes.basis), structure.start * 0.0
     rows = structure.rows @ modes.basis
-    inverse = np.linalg.inv(modes.basis)
+    d = zero.inner
+    back = Expansion.constant(np.asarray(np.linalg.inv(modes.basis).T, float), d)
     vectors = {
         "load": zero[0] + structure.pattern,
         "velocity": structure.start[1],
         "start": structure.start[0],
     }
-    excited = stacked([vectors[name] for name in sources])
-    excited = product(
-        excited, Expansion.constant(np.asarray(inverse.T, float), zero.inner), "si,ij->sj"
-    )
-    d = zero.inner
+    excited = product(stacked([vectors[name] for name in sources]), back, "si,ij->sj")
     single, shares, read, driven = [], [], [], []
     for k, mode in modes.single.items():
         a, mode = mode.shape.through(rows).cut(DEGREE), mode.cut(DEGREE)
@@ -94,7 +91,7 @@ def oscillators(
         return single, None
     constant = Expansion.constant(rows, d)
     share = _minus(product(excited, constant, "sj,oj->so"), shares)
-    of_rows = product(product(constant, _inverse(modes.mass), "oi,ij->oj"), constant, "oj,oj->o")
+    of_rows = product(product(constant, inverse(modes.mass), "oi,ij->oj"), constant, "oj,oj->o")
     of_start = product(product(excited, modes.mass, "si,ij->sj"), excited, "sj,sj->s")
     A, B = (
         np.maximum(_highest(_minus(x, y)), 0.0) for x, y in ((of_rows, read), (of_start, driven))
@@ -180,7 +177,7 @@ def _minus(total: Expansion, shares: list[Expansion]) -> Expansion:
     return total
 
 
-def _inverse(mass: Expansion) -> Expansion:
+def inverse(mass: Expansion) -> Expansion:
     """M⁻¹ of a matrix near the identity, by Neumann's series."""
     one = np.eye(len(mass.rest))
     step = mass * -1.0 + one
