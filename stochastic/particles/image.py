@@ -60,16 +60,15 @@ class SectionImage:
         Raises:
             RefusedError: The file is no image, or smaller than 16 × 16 pixels.
         """
-        from skimage import color, io
+        from PIL import Image
 
         try:
-            picture = np.asarray(io.imread(self.path), float)
-        except (OSError, ValueError, SyntaxError) as error:
-            raise RefusedError(
-                "image.file", self.path, f"images that can be read ({error})"
-            ) from None
-        if picture.ndim == 3:
-            picture = color.rgb2gray(picture[..., :3]) if picture.shape[2] > 2 else picture[..., 0]
+            with Image.open(self.path) as opened:
+                plain = opened.mode in ("1", "L", "I", "F") or opened.mode.startswith("I;16")
+                picture = np.asarray(opened if plain else opened.convert("L"), float)
+        except Exception as error:  # readers of damaged files raise errors of many kinds
+            allowed = f"images that can be read ({error})"
+            raise RefusedError("image.file", self.path, allowed) from None
         size, plane = " × ".join(map(str, picture.shape)), picture.ndim == 2
         allowed = "plane images of 16 × 16 pixels or more"
         require(plane and min(picture.shape) >= 16, "image", f"{size} pixels", allowed)

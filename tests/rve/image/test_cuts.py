@@ -123,6 +123,7 @@ BROKEN = {
     "line.npy": np.arange(5.0),
     "text.png": b"no image",
     "text.npy": b"no array",
+    "header.npy": b"\x93NUMPY\x01\x00\x08\x00{'descr\n",  # NumPy's reader raises a TokenError
 }
 
 
