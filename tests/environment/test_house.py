@@ -9,7 +9,7 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 37_069,
+    "lines of the packages": 37_068,
     "files of the packages": 281,
     "places of fmt: skip": 15,
     "places that raise": 432,
