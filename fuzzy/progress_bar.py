@@ -22,12 +22,6 @@ def share(progress: Progress | None, first: float, last: float) -> Progress:
     return lambda done: progress(first + (last - first) * done)
 
 
-def stage(progress: Progress | None, what: str) -> None:
-    """Tell a progress that shows it what is being done from now on."""
-    if (tell := getattr(progress, "stage", None)) is not None:
-        tell(what)
-
-
 @contextmanager
 def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
     """Function that the share done goes to.

@@ -88,10 +88,7 @@ def propagate(
     """
     start = perf_counter()
     domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
-    method = method or Automatic()
-    runs = hasattr(method, "run") and not isinstance(method, type)
-    require(runs, "method", repr(method), "an object such as General() or Signed()")
-    chosen("on_failure", on_failure, ("raise", "skip"))
+    method = _checked(method or Automatic(), on_failure)
     call = Call(function, domain.names, tuple(shared), vectorised)
     key = b"" if store is None else model_key(identity or {})
     with (
@@ -101,19 +98,27 @@ def propagate(
     ):
         skip = on_failure == "skip"
         campaign = Campaign(call, known or Known(), budget, each, tell, shelf, key, skip)
-        bounds = method.run(campaign, domain)
+        bounds = _without_failed(method.run(campaign, domain), campaign.failed)
         campaign.report(1.0)
-    bounds = _without_failed(bounds, campaign.failed)
     return replace(
         bounds,
         units=_units(units or {}, bounds.outputs),
-        evaluations=campaign.evaluations,
+        evaluations=len(campaign),
+        samples=campaign.samples,
         calls=campaign.calls,
         reused=campaign.reused,
         budget=budget,
         notes=(*bounds.notes, *_wider_steps(domain)),
         seconds=perf_counter() - start,
     )
+
+
+def _checked(method: Method, on_failure: str) -> Method:
+    """The method, which must be an object that runs."""
+    runs = hasattr(method, "run") and not isinstance(method, type)
+    require(runs, "method", repr(method), "an object such as General() or Signed()")
+    chosen("on_failure", on_failure, ("raise", "skip"))
+    return method
 
 
 def _without_failed(bounds: Bounds, failed: int) -> Bounds:

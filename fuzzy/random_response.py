@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.values import Samples, Values
+from alphacut.fuzzy.plans.design import of_samples
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds
-from alphacut.fuzzy.samples.design import Design
-from alphacut.fuzzy.samples.model import Values
 from alphacut.fuzzy.sets.boxes import Domain
 
 _STRATA = 2000  # equally likely parts of θ: the resolution of a probability is 1 / _STRATA
@@ -90,8 +90,8 @@ class RandomResponse:
 
     def _bounds(self, name: str, table: Array) -> Bounds:
         """α-cuts of a quantity that each sample has, shape (n, m)."""
-        design = Design.from_samples(self.domain, self.points)
-        bounds = design.bounds(Values(((name, table.shape[1:]),), table), "stored samples")
+        values = Values(((name, table.shape[1:]),), table)
+        bounds = of_samples(self.domain, Samples(self.points, values), "stored samples")
         return replace(bounds, notes=(f"probabilities resolve to 1/{self.ordered.shape[1]}",))
 
 

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.drawing import draw_bands, draw_membership, new_axes
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, chosen, require
 from alphacut.fuzzy.sets.claimed import Claimed
@@ -31,9 +30,8 @@ from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
 
-    from alphacut.fuzzy.samples.model import Samples
+    from alphacut.fuzzy.campaign.values import Samples
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 ROUND_OFF = 1e-9
@@ -313,30 +311,6 @@ class Bounds:
         for row in zip(self.alpha, low, high, worst, strict=True):
             alpha, *ends, miss = (_digits(x) for x in row)
             yield f"{self.named[column]}, α = {alpha}: {' … '.join(ends)}, error {miss}{differs}"
-
-    def plot(self, output: str | None = None, axes: Axes | None = None) -> Axes:
-        """Draw one output: a membership function, or bands over time, with its error.
-
-        Args:
-            output: Name of the output; the first one if not given.
-            axes: Where to draw; a new figure if not given.
-
-        Returns:
-            The axes drawn on.
-        """
-        column = 0 if output is None else self.column(output)
-        low, high, error = (x[..., column] for x in (self.lower, self.upper, self.error))
-        axes, wide = new_axes(axes), np.nan_to_num(error)
-        title = f"bounds {self.nature_of(self.outputs[column])}"
-        title += f", error up to {_digits(wide.max())}, dotted" if wide.max() > 0 else ""
-        axes.set_title(title, fontsize="medium")
-        if self.time is None:
-            draw_membership(axes, self.alpha, low, high, wide)
-            axes.set_xlabel(self.named[column])
-        else:
-            draw_bands(axes, self.time, self.alpha, low, high, wide)
-            axes.set_ylabel(self.named[column])
-        return axes
 
     def to_dataset(self) -> xarray.Dataset:
         """Bounds over (alpha, time, output), where they are attained over (…, parameter)."""

@@ -12,10 +12,10 @@ import numpy as np
 
 from alphacut.fuzzy import Crisp, Extended, FuzzyNumber, General, Known, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.values import Samples
 from alphacut.fuzzy.plans.method import Method as Plan
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Bounds as Cuts
-from alphacut.fuzzy.samples.model import Samples
 from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset

@@ -37,7 +37,7 @@ LAWS: dict[str, tuple[Any, tuple[float, float]]] = {
     "coin 0.1": (stats.bernoulli(0.1), (0.0, 1.0)),
 }
 FREE = ("next value", "median", "quantile 0.9")
-NAMED = ("next value", "mean", "median", "quantile 0.9")
+NAMED = {"normal": (*FREE, "mean"), "log-normal": FREE}
 
 
 @dataclass(frozen=True)
@@ -101,9 +101,9 @@ def ways(name: str, n: int) -> Iterator[tuple[str, str, dict[str, Any]]]:
     yield from ((claim, "from_data", {}) for claim in FREE)
     if np.abs(LAWS[name][1]).max() <= 1:
         yield "mean", "from_data", {}
-    if name in ("normal", "log-normal") and n > 1:
-        yield from ((claim, f"from_data {name}", {"named": name}) for claim in NAMED)
     if n > 1:
+        own = NAMED.get(name, ())
+        yield from ((claim, f"from_data {name}", {"named": name}) for claim in own)
         yield "next value", "min-max triangle", {"make": triangle}
         yield "next value", "mean ± 2 s", {"make": spread}
 

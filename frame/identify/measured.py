@@ -143,7 +143,7 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
     if (count - 1) * (scatter / deviation) ** 2 > chdtri(max(count - 1, 1), CHANCE):
         value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
         raise RefusedError(f"{what}: {key} times the mean", value, allowed, "leave it out")
-    return from_scatter(float(values.mean()), deviation, count, known=True)
+    return from_scatter(float(values.mean()), deviation, count)
 
 
 @dataclass(frozen=True)

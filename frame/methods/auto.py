@@ -21,7 +21,7 @@ from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress, stage
+from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import RefusedError
 
 BOXES = 1000
@@ -60,7 +60,6 @@ class Auto:
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
         reasons: list[str] = []
         for proof in self._proofs(len(flow.boxes.names)):
-            stage(progress, proof.name)
             try:
                 proved = proof.run(flow, progress)
             except (UnprovedError, ModalError) as error:
@@ -70,7 +69,6 @@ class Auto:
                 return _noted(proved, "; ".join([f"{proof.name}: a proof", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
         why = f"unproved: {'; '.join(reasons)}"
-        stage(progress, f"search ({why})")
         try:
             search = Search(self.tolerance, seed=self.seed)
             return _noted(search.run(flow, progress), f"search; {why}")

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.values import Layout, flatten
 from alphacut.fuzzy.refused import chosen, require
-from alphacut.fuzzy.samples.model import Layout, flatten
 
 Function = Callable[..., object]
 _BATCH = 1024  # points per call of a vectorised function
@@ -98,12 +98,11 @@ class Call:
         """Outputs of a vectorised function, point by point."""
         outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
         named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
-        rows = {}
-        for name, value in named.items():
-            rows[name] = array = np.asarray(value, float).reshape(np.shape(value) or (1,))
+        arrays = {name: np.atleast_1d(np.asarray(value, float)) for name, value in named.items()}
+        for name, array in arrays.items():
             allowed = f"arrays of the length {len(points)}, that of the points"
             require(len(array) == len(points), f"output {name}", len(array), allowed)
-        return [{name: array[row] for name, array in rows.items()} for row in range(len(points))]
+        return [{name: array[row] for name, array in arrays.items()} for row in range(len(points))]
 
 
 def named_point(names: Sequence[str], point: Array) -> dict[str, float]:

@@ -12,10 +12,10 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_point
 from alphacut.fuzzy.campaign.store import Store, point_key
+from alphacut.fuzzy.campaign.values import Layout, Samples, SpentError, Values
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.refused import FailedError, real
-from alphacut.fuzzy.samples.model import Layout, SpentError, Values
 
 _SHOWN = 3  # failed samples that a message quotes
 _LONG = 300  # letters of an error that a message quotes
@@ -51,7 +51,7 @@ def _brief(error: str) -> str:
 
 @dataclass
 class Campaign:
-    """Evaluates points of a model through workers: the `Model` that methods get.
+    """Evaluates points of a model through workers and keeps every sample: what methods get.
 
     Args:
         call: The function with the way it is called.
@@ -64,8 +64,7 @@ class Campaign:
         skip: Whether samples that fail are left out (NaN) instead of ending the campaign.
 
     Attributes:
-        evaluations: Of the model so far, those from the store among them.
-        reused: Those taken from the store.
+        reused: Samples taken from the store.
         calls: Calls of the function.
         failed: Samples left out.
         layout: Names and shapes of the outputs, as the first sample had them.
@@ -82,53 +81,74 @@ class Campaign:
     store: Store | None = None
     model: bytes = b""
     skip: bool = False
-    evaluations: int = 0
     reused: int = 0
     calls: int = 0
     failed: int = 0
     layout: Layout = ()
+    _rows: dict[bytes, Array] = field(default_factory=dict)  # outputs by the bytes of the point
+    _samples: Samples | None = None
     _share: float = 0.0
 
     def __post_init__(self) -> None:
         self.known.check_inputs(self.call.names)
         real("budget", self.budget, positive=True, whole=True)
 
+    def __len__(self) -> int:
+        """Evaluations so far, those from the store among them."""
+        return len(self._rows)
+
     @property
     def left(self) -> int:
         """Evaluations that the budget still allows."""
-        return self.budget - self.evaluations
+        return self.budget - len(self)
+
+    @property
+    def samples(self) -> Samples:
+        """All samples so far in the order of their first use."""
+        if self._samples is None:
+            points = np.frombuffer(b"".join(self._rows)).reshape(len(self), -1)
+            values = Values(self.layout, np.array(list(self._rows.values())))
+            self._samples = Samples(points, values)
+        return self._samples
 
     def __call__(self, points: Array) -> Values:
         """Outputs at the points, shape (n, inputs), in their order; NaN where one was skipped.
 
+        A point that was seen before costs nothing.
+
         Raises:
-            SpentError: They would pass the budget; none is run.
+            SpentError: The others would pass the budget; none is run.
             CampaignError: Samples failed; raised after all others have run.
         """
-        if len(points) > self.left:
-            what = f"{self.evaluations:,} evaluations are done, the next {len(points):,} would pass"
+        keys = [point.tobytes() for point in points + 0.0]  # no -0.0
+        fresh = [key for key in dict.fromkeys(keys) if key not in self._rows]
+        if len(fresh) > self.left:
+            what = f"{len(self):,} evaluations are done, the next {len(fresh):,} would pass"
             raise SpentError(f"{what} the budget of {self.budget:,}", "take a larger budget")
-        self.evaluations += len(points)
+        if fresh:
+            rows = self._run(np.frombuffer(b"".join(fresh)).reshape(len(fresh), -1))
+            self._rows |= dict(zip(fresh, rows, strict=True))
+            self._samples = None
+        return Values(self.layout, np.array([self._rows[key] for key in keys]))
+
+    def _run(self, points: Array) -> Array:
+        """Outputs at new points, shape (n, columns)."""
         batch = _Batch(self, points)
         batch.run()
         failures = {
             row: one.error for row, one in batch.outcomes.items() if isinstance(one, Failure)
         }
-        if failures and (not self.skip or len(failures) == len(points) == self.evaluations):
+        if failures and (not self.skip or (len(failures) == len(points) and not self._rows)):
             names = self.call.names
             pairs = [(named_point(names, points[row]), failures[row]) for row in sorted(failures)]
             raise CampaignError(pairs, len(points))
         self.failed += len(failures)
-        return self._values(batch.outcomes)
-
-    def _values(self, outcomes: dict[int, Outcome]) -> Values:
-        """Outputs of all rows, in the order of the first sample's outputs."""
-        width = Values(self.layout, np.zeros((0, 0))).columns
-        array = np.full((len(outcomes), len(width)), np.nan)
-        for row, outcome in outcomes.items():
+        width = len(Values(self.layout, np.zeros((0, 0))).columns)
+        array = np.full((len(points), width), np.nan)
+        for row, outcome in batch.outcomes.items():
             if isinstance(outcome, Sample):
                 array[row] = outcome.row
-        return Values(self.layout, array)
+        return array
 
     def in_order(self, outcome: Outcome) -> Outcome:
         """The outcome with its outputs in the order of the first sample's."""
@@ -152,7 +172,7 @@ class Campaign:
 
 
 class _Batch:
-    """One batch of points on its way through the workers and the store."""
+    """New points on their way through the workers and the store."""
 
     def __init__(self, campaign: Campaign, points: Array) -> None:
         self.campaign, self.points = campaign, points
@@ -162,10 +182,7 @@ class _Batch:
 
     def run(self) -> None:
         """Take what is stored, run the rest, and keep it whatever happens."""
-        campaign, first = (
-            self.campaign,
-            self.campaign.left == self.campaign.budget - len(self.points),
-        )
+        campaign, count = self.campaign, len(self.points)
         self._take_stored()
         try:
             for rows, outcomes in completed(campaign.call, self._tasks(), campaign.executor):
@@ -173,17 +190,20 @@ class _Batch:
                 for row, outcome in zip(rows, outcomes, strict=True):
                     self._record(row, outcome)
                 self._write()
-                if first and len(self.points) > 1:  # of later ones nobody knows how many come
-                    campaign.report(0.99 * len(self.outcomes) / len(self.points))
+                if not len(campaign) and count > 1:  # of later ones nobody knows how many come
+                    campaign.report(0.99 * len(self.outcomes) / count)
         finally:
             self._write(now=True)
 
+    def _key(self, row: int) -> str:
+        return point_key(self.campaign.call.names, self.points[row])
+
     def _take_stored(self) -> None:
         campaign = self.campaign
-        for row in range(len(self.points) if campaign.store else 0):
-            assert campaign.store is not None
-            key = point_key(campaign.call.names, self.points[row])
-            sample = campaign.store.get(campaign.model, key)
+        if campaign.store is None:
+            return
+        for row in range(len(self.points)):
+            sample = campaign.store.get(campaign.model, self._key(row))
             if sample is not None:
                 self.outcomes[row] = campaign.in_order(sample)
                 campaign.reused += 1
@@ -197,15 +217,14 @@ class _Batch:
     def _record(self, row: int, outcome: Outcome) -> None:
         outcome = self.outcomes[row] = self.campaign.in_order(outcome)
         if self.campaign.store and isinstance(outcome, Sample):
-            self._gathered[point_key(self.campaign.call.names, self.points[row])] = outcome
+            self._gathered[self._key(row)] = outcome
 
     def _write(self, *, now: bool = False) -> None:
         """Write what is gathered: now, or when the last write is long enough ago to cost little."""
-        start = perf_counter()
+        start, store = perf_counter(), self.campaign.store
         due = start - self._written > max(_PAUSE, _SHARE * self._cost)
-        if self._gathered and (now or due or len(self._gathered) >= _GATHERED):
-            assert self.campaign.store is not None
-            self.campaign.store.put(self.campaign.model, self._gathered)
+        if store and self._gathered and (now or due or len(self._gathered) >= _GATHERED):
+            store.put(self.campaign.model, self._gathered)
             self._gathered = {}
             self._written = perf_counter()
             self._cost = self._written - start

@@ -23,8 +23,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Sample
-from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.fuzzy.samples.model import Layout
+from alphacut.fuzzy.campaign.values import Layout
+from alphacut.fuzzy.refused import FailedError, RefusedError, require
 
 Identity = Mapping[str, object]
 _PATIENCE = 60.0  # seconds to wait for another campaign's write
@@ -95,45 +95,41 @@ class Store:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             start = self.path.open("rb").read(16) if self.path.exists() else b""
         except OSError as error:
-            raise RefusedError(
-                "store", self.path, "a file that may be written", str(error)
-            ) from None
-        if start not in (b"", b"SQLite format 3\0"):
-            cure = "move it away, or name another path"
-            raise RefusedError("store", self.path, "a file of samples", cure)
+            allowed = "a file that may be written"
+            raise RefusedError("store", self.path, allowed, str(error)) from None
+        own = start in (b"", b"SQLite format 3\0")
+        cure = "move it away, or name another path"
+        require(own, "store", self.path, "a file of samples", cure)
         self._connection = self._opened()
 
     def _opened(self) -> sqlite3.Connection:
         """The file with its rows read, mended if it is damaged."""
-        connection, damaged = self._connected(), False
+        connection = self._connected()
         with self.reported():
             try:
                 _prepare(connection)
                 damaged = connection.execute("pragma quick_check").fetchone() != ("ok",)
             except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
                 damaged = _is_damage(error)
-            if not damaged:
-                damaged = self._read(connection, "order by rowid")
-            if damaged:
-                self._read(connection, "order by rowid desc")
+        damaged |= not self._read(connection, "asc")
         return self._mended(connection) if damaged else connection
 
     def _read(self, connection: sqlite3.Connection, order: str) -> bool:
-        """Keep the rows that are whole; whether anything was damaged."""
-        damaged = False
+        """Keep the rows that are whole; whether all are."""
+        whole = True
         try:
-            for row in connection.execute(f"select {_COLUMNS} from sample {order}"):
+            for row in connection.execute(f"select {_COLUMNS} from sample order by rowid {order}"):
                 one = Row(*row)
-                damaged |= not one.whole
+                whole &= one.whole
                 if one.whole:
                     self._rows[one.model, one.point] = one
         except (sqlite3.DatabaseError, UnicodeDecodeError):
-            return True
-        return damaged
+            return False
+        return whole
 
     def _mended(self, connection: sqlite3.Connection) -> sqlite3.Connection:
         """A new file with the rows that are whole; the damaged one is kept beside it."""
-        self._read(connection, "order by rowid")
+        self._read(connection, "desc")  # up to the damage from its other side
         connection.close()
         aside = self.path.with_name(f"{self.path.name}.damaged")
         with suppress(FileNotFoundError):
@@ -143,10 +139,10 @@ class Store:
         with self.reported():
             _prepare(fresh)
         self._write(fresh, self._rows.values())
-        said = (
-            f"{len(self._rows)} samples are whole, the others are run anew; it is kept as {aside}"
+        said = f"{len(self._rows)} samples are whole, the others are run anew"
+        warnings.warn(
+            f"the store {self.path} was damaged: {said}; it is kept as {aside}", stacklevel=2
         )
-        warnings.warn(f"the store {self.path} was damaged: {said}", stacklevel=2)
         return fresh
 
     def _connected(self) -> sqlite3.Connection:
@@ -216,9 +212,9 @@ def model_key(identity: Identity) -> bytes:
         text = json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError):
         text = ""
-    if not isinstance(identity, Mapping) or not identity or not text:
-        cure = "it says what a sample depends on besides its inputs; texts and numbers"
-        raise RefusedError("identity", identity, "a mapping, as {'version': 1}", cure)
+    named = isinstance(identity, Mapping) and bool(identity) and bool(text)
+    cure = "it says what a sample depends on besides its inputs; texts and numbers"
+    require(named, "identity", identity, "a mapping, as {'version': 1}", cure)
     return blake2b(text.encode(), digest_size=16).digest()
 
 

@@ -47,7 +47,8 @@ def from_data(
         bounds: Physically possible values (lower, upper), None where there is no bound. They fill
             in what the values do not decide: without them the number has no cut at low α, and none
             at 0.
-        law: "normal" or "log-normal", where that is known: narrower cuts, which rest on it.
+        law: "normal" or, but for the mean, "log-normal", where that is known: narrower cuts, which
+            rest on it.
         resolution: Step to which the values were rounded.
 
     Raises:
@@ -101,7 +102,7 @@ def mean_cuts(data: Observations) -> Stepwise:
         RefusedError: A bound is missing.
     """
     low, high = data.bounds
-    cure = "give both, or law='normal' or 'log-normal'"
+    cure = "give both, or law='normal'"
     finite = np.isfinite(data.bounds).all()
     require(finite, "bounds", data.bounds, "finite ends for a mean of any law", cure)
     band, count = _band(data.count), np.arange(data.count + 1) / data.count

@@ -1,8 +1,6 @@
 """Exact cuts under a named law: normal, or log-normal through the logarithms of the values.
 
-Next value and mean by Student's t, quantiles by the non-central t, the mean of a log-normal law by
-a joint region of both parameters of the logarithms (Mood and Graybill): wider than need be, never
-too narrow.
+Next value and mean by Student's t, quantiles by the non-central t.
 
 Source: Hahn and Meeker, Statistical Intervals, chapters 4 and 14.
 """
@@ -42,19 +40,18 @@ def law_cuts(
 
     Raises:
         RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
-            censored without an end.
+            censored without an end; or the mean of a log-normal law is meant.
     """
     logarithmic = law == "log-normal"
+    normal = not (logarithmic and mean)
+    require(normal, "law of a mean", law, "normal", "give bounds=(lower, upper) in place of a law")
     positive = not logarithmic or (data.lower > 0).all()
     require(positive, "least value", data.lower[0], "positive ones with a log-normal law")
     about = data.mapped(np.log) if logarithmic else data
     _require_scatter(about, law)
-    if logarithmic and mean:
-        lower, upper = _log_normal_mean(about)
-    else:
-        lower, upper = _student(about, 0.5 if mean else quantile)
-        with np.errstate(over="ignore"):
-            lower, upper = (np.exp(lower), np.exp(upper)) if logarithmic else (lower, upper)
+    lower, upper = _student(about, 0.5 if mean else quantile)
+    with np.errstate(over="ignore"):
+        lower, upper = (np.exp(lower), np.exp(upper)) if logarithmic else (lower, upper)
     return _within(lower, upper, data.bounds)
 
 
@@ -102,36 +99,6 @@ def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
     return nct.ppf(tail, n - 1, shift) / np.sqrt(n), nct.isf(tail, n - 1, shift) / np.sqrt(n)
 
 
-def _log_normal_mean(data: Observations) -> tuple[Array, Array]:
-    """Least and greatest exp(μ + σ²/2) over the region of (μ, σ)."""
-    reach, narrow, wide = _region(data.count)
-    scatter = _scatter(data)
-    least, most = scatter[0] * narrow, scatter[1] * wide
-    at = np.clip(reach, least, most)  # where x − reach σ + σ²/2 is least
-    with np.errstate(over="ignore"):
-        return np.exp(data.lower.mean() - reach * at + at**2 / 2), np.exp(
-            data.upper.mean() + reach * most + most**2 / 2
-        )
-
-
-@lru_cache(maxsize=64)
-def _region(n: int) -> tuple[Array, Array, Array]:
-    """Bounds of |μ − mean| / σ, and of σ / s from below and above, at every level.
-
-    Both hold with probability √(1 − α), independently.
-    """
-    from scipy.stats import chi2, norm
-
-    part = -np.expm1(np.log1p(-LEVELS[:-1]) / 2)
-    part = np.append(part, 1.0)
-    reach = norm.isf(part / 2) / np.sqrt(n)
-    return (
-        reach,
-        np.sqrt((n - 1) / chi2.isf(part / 2, n - 1)),
-        np.sqrt((n - 1) / chi2.ppf(part / 2, n - 1)),
-    )
-
-
 def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
     """Steps from 0 to 1 within the bounds, and the least level at which they are finite."""
     low, high = bounds
@@ -140,36 +107,29 @@ def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[St
     lower = np.minimum(np.maximum.accumulate(np.clip(lower, low, high)), upper[-1])
     first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
     whole = bool(np.isfinite(bounds).all())
-    ends = (low, high) if whole else (lower[first], upper[first])
+    least, most = (low, high) if whole else (lower[first], upper[first])
     lower[:first], upper[:first] = lower[first], upper[first]
-    return Stepwise((0.0, *LEVELS), (ends[0], *lower), (ends[1], *upper)), 0.0 if whole else float(
-        LEVELS[first]
-    )
+    steps = Stepwise((0.0, *LEVELS), (least, *lower), (most, *upper))
+    return steps, 0.0 if whole else float(LEVELS[first])
 
 
-def from_scatter(mean: float, deviation: float, count: int, *, known: bool = False) -> Claimed:
-    """Fuzzy number of the mean of a normal law, from the mean and the scatter of measured values.
+def from_scatter(mean: float, deviation: float, count: int) -> Claimed:
+    """Fuzzy number of the mean of a normal law whose deviation is known from elsewhere.
 
     Args:
         mean: Mean of the values.
-        deviation: Standard deviation of one value, from the values, or known from elsewhere.
-        count: Number of values: 2 at least, or 1 where the deviation is known.
-        known: Whether the deviation is known: a normal pivot in place of Student's t.
+        deviation: Standard deviation of one value.
+        count: Number of values, 1 or more.
 
     Raises:
-        RefusedError: The deviation is not positive, or there are too few values.
+        RefusedError: The deviation or the count is not positive.
     """
-    from scipy.stats import norm, t
+    from scipy.stats import norm
 
     real("mean", mean)
     real("deviation", deviation, positive=True)
-    enough = count >= (1 if known else 2)
-    require(enough, "count", count, "2 or more, or 1 where the deviation is known")
-    factors = norm.isf(LEVELS / 2) if known else t.isf(LEVELS / 2, count - 1)
-    reach = deviation / np.sqrt(count) * np.maximum(factors, 0.0)
-    law = f"{count} values drawn alike and independently from a normal law"
-    law += " of known deviation" if known else ""
-    number = Stepwise(
-        (0.0, *LEVELS), (mean - reach[0], *(mean - reach)), (mean + reach[0], *(mean + reach))
-    )
-    return Claimed(number, Claim("mean", (law,)), float(LEVELS[0]))
+    real("count", count, positive=True, whole=True)
+    reach = deviation / np.sqrt(count) * np.maximum(norm.isf(LEVELS / 2), 0.0)
+    law = f"{count} values drawn alike and independently from a normal law of known deviation"
+    steps, decided = _within(mean - reach, mean + reach, (-np.inf, np.inf))
+    return Claimed(steps, Claim("mean", (law,)), decided)

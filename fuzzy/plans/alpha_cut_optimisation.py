@@ -8,11 +8,12 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.campaign.values import SpentError
+from alphacut.fuzzy.plans.design import of_samples
 from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
 from alphacut.fuzzy.refused import chosen, real
 from alphacut.fuzzy.result import Bounds
-from alphacut.fuzzy.samples.design import Design
-from alphacut.fuzzy.samples.model import Memo, Model, SpentError
 from alphacut.fuzzy.sets.boxes import Domain
 
 Optimiser = Literal["multistart", "differential_evolution"]
@@ -49,20 +50,19 @@ class Optimisation:
             real(key, getattr(self, key), positive=True, whole=True)
         real("seed", self.seed, whole=True)
 
-    def run(self, model: Model, domain: Domain) -> Bounds:
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Search all bounds."""
-        memo = Memo(model)
-        spent = self.search(memo, domain, searched(memo, domain, self.outputs))
-        return attained(memo, domain, self.name, spent=spent)
+        spent = self.search(campaign, domain, searched(campaign, domain, self.outputs))
+        return attained(campaign, domain, self.name, spent=spent)
 
-    def search(self, memo: Memo, domain: Domain, outputs: tuple[str, ...]) -> bool:
+    def search(self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> bool:
         """Search the bounds of some outputs; whether the budget ended that."""
         try:
-            for cut in cuts(memo, domain):
+            for cut in cuts(campaign, domain):
                 cut.look(self.look * len(cut.moving), self.seed)
                 for output, sign in product(outputs, (1.0, -1.0)):
                     self._descend(cut, output, sign)
-                memo.report(1 - cut.level / len(domain.alpha))
+                campaign.report(1 - cut.level / len(domain.alpha))
         except SpentError:
             return True
         return False
@@ -87,18 +87,16 @@ class Optimisation:
         )
 
 
-def searched(memo: Memo, domain: Domain, outputs: tuple[str, ...]) -> tuple[str, ...]:
+def searched(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> tuple[str, ...]:
     """The outputs that are to be searched, after a first sample that names them all."""
-    columns = memo(domain.modal[None]).columns
+    columns = campaign(domain.modal[None]).columns
     for name in outputs:
         chosen("output", name, columns)
     return outputs or columns
 
 
-def attained(memo: Memo, domain: Domain, method: str, *, spent: bool) -> Bounds:
+def attained(campaign: Campaign, domain: Domain, method: str, *, spent: bool) -> Bounds:
     """Bounds from all samples of a search, with a note where the budget ended it."""
-    samples = memo.samples
-    design = Design.from_samples(domain, samples.points)
-    bounds = design.bounds(samples.values, method)
+    bounds = of_samples(domain, campaign.samples, method)
     note = "the budget ended the search: a larger one may find more"
     return replace(bounds, notes=(note,)) if spent else bounds

@@ -16,12 +16,13 @@ from itertools import product
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.campaign.values import SpentError
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation, attained, searched
 from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds, Nature
-from alphacut.fuzzy.samples.model import Memo, Model, SpentError
 from alphacut.fuzzy.sets.boxes import Domain
 
 _MOST = 12  # outputs of which each bound is searched
@@ -66,26 +67,17 @@ class Automatic:
             real(key, getattr(self, key), positive=True, whole=True)
         real("seed", self.seed, whole=True)
 
-    def run(self, model: Model, domain: Domain) -> Bounds:
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output."""
-        memo = Memo(model)
-        outputs = searched(memo, domain, self.outputs)
-        if not domain.interactions and corners_suffice(domain, outputs, model.known).all():
-            return replace(Reduced().run(memo, domain), method=self.name)
+        outputs = searched(campaign, domain, self.outputs)
+        if not domain.interactions and corners_suffice(domain, outputs, campaign.known).all():
+            return replace(Reduced().run(campaign, domain), method=self.name)
         outputs = outputs if len(outputs) <= _MOST else ()
         search = Optimisation(starts=self.starts, look=self.look, seed=self.seed)
-        spent = search.search(memo, domain, outputs)
-        check = _Passes(self, memo, domain, outputs)
+        spent = search.search(campaign, domain, outputs)
+        check = _Passes(self, campaign, domain, outputs)
         spent = spent or check.run()
-        judged = check.judged(attained(memo, domain, self.name, spent=spent), spent=spent)
-        last = attained(memo, domain, self.name, spent=spent)  # the judgement took samples, too
-        return replace(
-            last,
-            error=judged.error,
-            natures=judged.natures,
-            nature=judged.nature,
-            notes=judged.notes,
-        )
+        return check.judged(spent=spent)
 
 
 @dataclass
@@ -94,7 +86,7 @@ class _Passes:
 
     Args:
         method: Their settings.
-        memo: The model with the samples of the search.
+        campaign: The model with the samples of the search.
         domain: Inputs and levels.
         outputs: Outputs whose bounds were searched.
 
@@ -104,7 +96,7 @@ class _Passes:
     """
 
     method: Automatic
-    memo: Memo
+    campaign: Campaign
     domain: Domain
     outputs: tuple[str, ...]
     gain: Array = field(default_factory=lambda: np.zeros(()))
@@ -125,7 +117,7 @@ class _Passes:
     def _pass(self, seed: int) -> bool:
         """Look and descend in every cut; whether the budget ended that."""
         try:
-            for cut in cuts(self.memo, self.domain):
+            for cut in cuts(self.campaign, self.domain):
                 fresh = cut.look(self.method.look * len(cut.moving), seed)
                 for output, sign in product(self.outputs if len(fresh) else (), (1.0, -1.0)):
                     end = self._end(cut, fresh, output, sign)
@@ -143,9 +135,9 @@ class _Passes:
         end = cut.along(cut.descend(start, output, sign, _ROUNDS), output, sign, _ROUNDS)
         return float(sign * cut.worth(end[None], output, sign)[0])
 
-    def judged(self, bounds: Bounds, *, spent: bool) -> Bounds:
-        """The bounds with their error where most fresh descents agree with them, else attained."""
-        near = self.method.tolerance * self._span()
+    def judged(self, *, spent: bool) -> Bounds:
+        """Bounds with their error where most fresh descents agree with them, else attained."""
+        bounds, near = self._bounds(), self.method.tolerance * self._span()
         missed = [self._missed(bounds, column, near[column]) for column in range(len(near))]
         agrees = np.array([own is not None for own in missed]) & (self.gain <= near).all(axis=0)
         agrees[agrees] = [self._smooth(bounds, column) for column in np.flatnonzero(agrees)]
@@ -158,19 +150,14 @@ class _Passes:
         natures = tuple(Nature.ESTIMATED if own else Nature.ATTAINED for own in sure)
         unsure = [name for name in self.outputs if not agrees[bounds.column(name)]]
         note = f"a better bound of {', '.join(unsure[:4])} is likely: an independent search ended"
+        note += " elsewhere, or the bound lies at a kink or a jump"
+        last = attained(self.campaign, self.domain, self.method.name, spent=spent)
         return replace(
-            bounds,
+            last,  # the judgement took samples, too
             error=np.where(sure & ~crisp, error, 0.0),
             natures=natures,
             nature=min(natures, key=list(Nature).index),
-            notes=(
-                *bounds.notes,
-                *(
-                    [f"{note} elsewhere, or the bound lies at a kink or a jump"]
-                    if unsure and not spent
-                    else []
-                ),
-            ),
+            notes=(*last.notes, note) if unsure and not spent else last.notes,
         )
 
     def _missed(self, bounds: Bounds, column: int, near: float) -> Array | None:
@@ -190,7 +177,7 @@ class _Passes:
             return all(
                 cut.steepest(cut.unit(places[cut.level, column][None])[0], bounds.outputs[column])
                 <= _SLOPE
-                for cut in cuts(self.memo, self.domain)
+                for cut in cuts(self.campaign, self.domain)
                 for places in (bounds.lower_at, bounds.upper_at)
             )
         except SpentError:
@@ -198,9 +185,9 @@ class _Passes:
 
     def _bounds(self) -> Bounds:
         """Bounds so far."""
-        return attained(self.memo, self.domain, self.method.name, spent=False)
+        return attained(self.campaign, self.domain, self.method.name, spent=False)
 
     def _span(self) -> Array:
         """Range of each output over all samples, shape (columns,)."""
-        values = self.memo.samples.values.array
+        values = self.campaign.samples.values.array
         return np.asarray(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))

@@ -20,10 +20,10 @@ from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.method import Method
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.propagation import propagate
-from alphacut.fuzzy.refused import chosen, real, require
-from alphacut.fuzzy.result import Nature
-from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs
-from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, PiecewiseLinear
+from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.sets.boxes import fuzzy_inputs
+from alphacut.fuzzy.sets.numbers import FuzzyNumber, PiecewiseLinear
 
 
 @dataclass(frozen=True)
@@ -31,20 +31,24 @@ class RandomInput:
     """A random input with fuzzy parameters.
 
     Args:
-        quantile: From a probability u (n,) and the parameters by name to quantiles (n,), monotone
-            in each parameter.
+        quantile: From a probability and the parameters by name to a quantile, monotone in each
+            parameter.
         parameters: The fuzzy parameters by name; a plain number is crisp.
     """
 
-    quantile: Callable[..., Array]
+    quantile: Callable[..., float]
     parameters: Mapping[str, FuzzyNumber | float]
 
-    def interval(self, u: Array, alpha: float) -> tuple[Array, Array]:
-        """Least and greatest quantile at probabilities (n,) over the cut, two arrays (n,)."""
+    def at(self, u: float, alpha: Sequence[float]) -> PiecewiseLinear:
+        """Quantiles at a probability that the cuts of the parameters allow, as a fuzzy number."""
         numbers = fuzzy_inputs(self.parameters)
-        corners = product(*(number.cut(alpha) for number in numbers.values()))
-        rows = [self.quantile(u, **dict(zip(numbers, corner, strict=True))) for corner in corners]
-        return np.min(rows, axis=0), np.max(rows, axis=0)
+        rows = []
+        for level in (grid := sorted({0.0, *alpha, 1.0})):
+            corners = product(*(number.cut(level) for number in numbers.values()))
+            rows.append([self.quantile(u, **dict(zip(numbers, x, strict=True))) for x in corners])
+        low = np.maximum.accumulate(np.min(rows, axis=1))  # nested to round-off
+        high = np.maximum(np.minimum.accumulate(np.max(rows, axis=1)), low[-1])
+        return PiecewiseLinear(tuple(grid), tuple(low), tuple(high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,21 +56,20 @@ class IntervalResponse:
     """A response with bounds at every quasi-random point.
 
     Args:
-        alpha: Levels.
-        outputs: Names of the outputs.
-        lower: Lower ends, shape (points, levels, outputs).
-        upper: Upper ends, shape (points, levels, outputs).
-        evaluations: Of the model.
-        nature: The weakest of the bounds at the points; the averages over the points have the error
-            of quasi-Monte Carlo besides.
+        bounds: Bounds at each point.
     """
 
-    alpha: tuple[float, ...]
-    outputs: tuple[str, ...]
-    lower: Array
-    upper: Array
-    evaluations: int
-    nature: Nature = Nature.ATTAINED
+    bounds: Sequence[Bounds]
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the model."""
+        return sum(one.evaluations for one in self.bounds)
+
+    @property
+    def nature(self) -> Nature:
+        """The weakest of the points; averages have the error of quasi-Monte Carlo besides."""
+        return min((one.nature for one in self.bounds), key=list(Nature).index)
 
     def mean(self, output: str = "y") -> tuple[Array, Array]:
         """Bounds of the mean on every level, two arrays (levels,)."""
@@ -87,9 +90,9 @@ class IntervalResponse:
         return np.quantile(lower, at, axis=0).T, np.quantile(upper, at, axis=0).T
 
     def _ends(self, output: str) -> tuple[Array, Array]:
-        chosen("output", output, self.outputs)
-        column = self.outputs.index(output)
-        return self.lower[..., column], self.upper[..., column]
+        """Ends at every point, two arrays (points, levels)."""
+        ends = np.array([one.bounds(output) for one in self.bounds])
+        return ends[:, 0], ends[:, 1]
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,6 @@ class IntervalQuasiMonteCarlo:
     seed: int = 0
     method: Method = field(default_factory=Reduced)
 
-    name = "interval quasi-Monte Carlo"
-
     def __post_init__(self) -> None:
         real("points", self.points, positive=True, whole=True)
         real("seed", self.seed, whole=True)
@@ -120,7 +121,6 @@ class IntervalQuasiMonteCarlo:
         inputs: Mapping[str, FuzzyNumber | float],
         *,
         alpha: Sequence[float],
-        vectorised: bool = False,
         known: Known | None = None,
     ) -> IntervalResponse:
         """Bound the response at every point and level.
@@ -130,7 +130,6 @@ class IntervalQuasiMonteCarlo:
             random: The random inputs.
             inputs: The fuzzy inputs, which may be none; a plain number is crisp.
             alpha: Rising levels within 0 to 1.
-            vectorised: Whether the function takes arrays.
             known: Facts about the function.
 
         Raises:
@@ -140,36 +139,18 @@ class IntervalQuasiMonteCarlo:
 
         apart = bool(random) and not set(random) & set(inputs)
         require(apart, "random inputs", tuple(random), "one or more, none of them fuzzy")
-        alpha = Domain({"u": Crisp(0.0)}, alpha).alpha
-        u: Array = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed)).random(self.points)
-        numbers = [_numbers(one, u[:, i], alpha) for i, one in enumerate(random.values())]
-        results = [
-            propagate(
-                function,
-                {**dict(zip(random, drawn, strict=True)), **inputs},
-                self.method,
-                alpha=alpha,
-                vectorised=vectorised,
-                known=known,
-                progress=False,
+        sobol = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed))
+        results = []
+        for u in sobol.random(self.points):
+            drawn = {x: one.at(p, alpha) for (x, one), p in zip(random.items(), u, strict=True)}
+            results.append(
+                propagate(
+                    function,
+                    {**drawn, **inputs},
+                    self.method,
+                    alpha=alpha,
+                    known=known,
+                    progress=False,
+                )
             )
-            for drawn in zip(*numbers, strict=True)
-        ]
-        return IntervalResponse(
-            tuple(alpha),
-            results[0].outputs,
-            np.array([one.lower for one in results]),
-            np.array([one.upper for one in results]),
-            sum(one.evaluations for one in results),
-            min((one.nature for one in results), key=list(Nature).index),
-        )
-
-
-def _numbers(one: RandomInput, u: Array, alpha: Sequence[float]) -> list[PiecewiseLinear]:
-    """Quantiles at each point as a fuzzy number, nested to round-off, constant beyond levels."""
-    ends = np.array([one.interval(u, level) for level in alpha])  # (levels, 2, points)
-    low = np.maximum.accumulate(ends[:, 0])
-    high = np.maximum(np.minimum.accumulate(ends[:, 1]), low[-1])
-    wide = sorted({0.0, *alpha, 1.0})
-    rows = [[np.interp(wide, alpha, side[:, k]) for side in (low, high)] for k in range(len(u))]
-    return [PiecewiseLinear(tuple(wide), tuple(least), tuple(most)) for least, most in rows]
+        return IntervalResponse(results)

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.refused import FailedError
-from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.interaction import pulled
 
@@ -24,8 +24,8 @@ _CORNERS = 6  # inputs up to which a look includes all corners
 class LevelSearch:
     """One level under search, in unit coordinates of the inputs that have a width."""
 
-    def __init__(self, memo: Memo, domain: Domain, level: int) -> None:
-        self.memo, self.domain, self.level = memo, domain, level
+    def __init__(self, campaign: Campaign, domain: Domain, level: int) -> None:
+        self.campaign, self.domain, self.level = campaign, domain, level
         self.alpha = domain.alpha[level]
         self.lower, self.upper = (ends[level] for ends in domain.boxes)
         self.moving = np.flatnonzero(self.upper > self.lower)
@@ -69,8 +69,8 @@ class LevelSearch:
         both = np.concatenate([corners, spread]) if inputs <= _CORNERS else spread
         allowed = both[self.slack(both) >= 0]
         if len(allowed):
-            self.memo(self.points(allowed))
-        if not self.domain.inside(self.memo.samples.points)[self.level].any():
+            self.campaign(self.points(allowed))
+        if not self.domain.inside(self.campaign.samples.points)[self.level].any():
             what = f"no point of the cut at α = {self.alpha:g} fulfils its interactions"
             raise FailedError(what, "widen them, or take fewer")
         return spread[self.slack(spread) >= 0]
@@ -80,13 +80,13 @@ class LevelSearch:
         inside = self.slack(unit) >= 0
         worth: Array = np.full(len(unit), np.inf)
         if inside.any():
-            values = self.memo(self.points(unit[inside]))
+            values = self.campaign(self.points(unit[inside]))
             worth[inside] = sign * values.array[:, values.column(output)]
         return np.where(np.isnan(worth), np.inf, worth)
 
     def best(self, output: str, sign: float, count: int) -> Array:
         """The best few samples in the cut that lie apart, in unit coordinates."""
-        samples = self.memo.samples
+        samples = self.campaign.samples
         inside = self.domain.inside(samples.points)[self.level]
         unit = self.unit(samples.points[inside])
         values = sign * samples.values.array[inside, samples.values.column(output)]
@@ -132,13 +132,13 @@ class LevelSearch:
 
     def scale(self, output: str) -> float:
         """Unit of an output for optimisers: its range over all samples, or 1."""
-        values = self.memo.samples.values
+        values = self.campaign.samples.values
         own = values.array[:, values.column(output)]
         span = float(np.nanmax(own) - np.nanmin(own))
         return span if span >= np.finfo(float).tiny else 1.0
 
     def descend(self, start: Array, output: str, sign: float, rounds: int = 50) -> Array:
-        """End of a descent by gradients inside the cut; its samples stay in the memo."""
+        """End of a descent by gradients inside the cut; its samples stay in the campaign."""
         from scipy.optimize import minimize
 
         scale = self.scale(output)
@@ -146,7 +146,7 @@ class LevelSearch:
         def objective(unit: Array) -> tuple[float, Array]:
             steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
             points = self.points(np.concatenate([unit[None], unit + np.diag(steps)]))
-            values = self.memo(points)
+            values = self.campaign(points)
             worth = np.nan_to_num(sign / scale * values.array[:, values.column(output)], nan=1e6)
             return float(worth[0]), (worth[1:] - worth[0]) / steps
 
@@ -157,13 +157,13 @@ class LevelSearch:
         room = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
         end = minimize(objective, start, method="SLSQP", constraints=[room], **settings)
         place = pulled(np.clip(end.x, 0, 1), start, self.slack)
-        self.memo(self.points(place[None]))
+        self.campaign(self.points(place[None]))
         return place
 
 
-def cuts(memo: Memo, domain: Domain) -> Iterator[LevelSearch]:
+def cuts(campaign: Campaign, domain: Domain) -> Iterator[LevelSearch]:
     """Cuts that have a width, from the narrowest on, with the share done reported."""
     for level in reversed(range(len(domain.alpha))):
-        cut = LevelSearch(memo, domain, level)
+        cut = LevelSearch(campaign, domain, level)
         if len(cut.moving):
             yield cut

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.result import Bounds
-from alphacut.fuzzy.samples.model import Model
 from alphacut.fuzzy.sets.boxes import Domain
 
 
@@ -16,5 +16,5 @@ class Method(Protocol):
     def name(self) -> str:
         """The word for it in a case file."""
 
-    def run(self, model: Model, domain: Domain) -> Bounds:
-        """Bounds of every output of the model on every level."""
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
+        """Bounds of every output on every level."""

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Known, Signs
 from alphacut.fuzzy.refused import chosen
-from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
 
 _PROBES = 4  # of a box, besides its extreme corners and the modal point
@@ -49,31 +49,31 @@ class Effects:
         )
 
 
-def verify(model: Memo, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
+def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
     """Find the sign of every effect on every level, from the widest box up.
 
     Args:
-        model: The model with what is known of it.
+        campaign: The model with what is known of it.
         domain: Inputs and levels.
         outputs: Outputs that matter; all if none is named.
     """
-    columns = model(domain.modal[None]).columns
+    columns = campaign(domain.modal[None]).columns
     for name in outputs:
         chosen("output", name, columns)
     outputs = outputs or columns
-    signs = model.known.stated(domain.names, outputs)
+    signs = campaign.known.stated(domain.names, outputs)
     proved = signs != 0
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(proved.any(axis=0)):
-        model(_changed(domain.modal, signs, lowers[0], uppers[0], int(column)))
+        campaign(_changed(domain.modal, signs, lowers[0], uppers[0], int(column)))
     rows = []
     for row in range(len(lowers)):
         lower, upper = lowers[row], uppers[row]
         signs, proved = signs.copy(), proved.copy()
         signs[:, upper == lower], proved[:, upper == lower] = 1, True
-        _prove(signs, proved, model.known, outputs, lower, upper)
+        _prove(signs, proved, campaign.known, outputs, lower, upper)
         if (signs == 0).any():
-            seen = _Box(model, outputs, lower, upper).seen(domain.modal[None], signs)
+            seen = _Box(campaign, outputs, lower, upper).seen(domain.modal[None], signs)
             signs = np.where(signs == 0, seen, signs)
         rows.append((signs, proved))
     return Effects(outputs, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
@@ -106,7 +106,7 @@ def _prove(
 class _Box:
     """One level's box under inspection."""
 
-    model: Memo
+    campaign: Campaign
     outputs: tuple[str, ...]
     lower: Array
     upper: Array
@@ -153,5 +153,5 @@ class _Box:
 
     def _values(self, points: Array) -> Array:
         """The outputs that matter at the points, shape (n, outputs)."""
-        values = self.model(points)
+        values = self.campaign(points)
         return values.array[:, [values.column(name) for name in self.outputs]]

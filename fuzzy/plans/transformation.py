@@ -18,12 +18,12 @@ from math import prod
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Known, Signs
+from alphacut.fuzzy.plans.design import Design, of_samples, proving
 from alphacut.fuzzy.plans.monotonicity import Effects, verify
-from alphacut.fuzzy.refused import RefusedError, chosen
+from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.result import Bounds, Ends
-from alphacut.fuzzy.samples.design import Design, proving
-from alphacut.fuzzy.samples.model import Memo, Model
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
@@ -102,15 +102,13 @@ class _Transformation:
             domain, [np.array(list(product(*grid))) for grid in self.grids(domain)]
         )
 
-    def run(self, model: Model, domain: Domain) -> Bounds:
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Evaluate the samples and rearrange them into α-cuts."""
         domain.require_free(self.name)
-        afford(self.size(domain), model, self.name)
+        afford(self.size(domain), campaign, self.name)
         design = self.points(domain)
-        bounds = design.bounds(model(design.points), self.name)
-        assert bounds.samples is not None
-        proved = corners_suffice(domain, bounds.outputs, model.known)
-        return proving(bounds, bounds.samples, proved, model.known)
+        bounds = design.bounds(campaign(design.points), self.name)
+        return proving(bounds, campaign, corners_suffice(domain, bounds.outputs, campaign.known))
 
 
 def corners_suffice(domain: Domain, outputs: Sequence[str], known: Known) -> Mask:
@@ -120,12 +118,12 @@ def corners_suffice(domain: Domain, outputs: Sequence[str], known: Known) -> Mas
     return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
 
 
-def afford(samples: float, model: Model, method: str) -> None:
+def afford(samples: float, campaign: Campaign, method: str) -> None:
     """Refuse a design that the budget does not carry, before any sample is run."""
-    if samples > model.left:
-        cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
-        cure += " fewer levels, state signs (Known) for Signed, or take Automatic"
-        raise RefusedError("budget", f"{model.left:,} evaluations", f"{samples:,.0f} or more", cure)
+    cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
+    cure += " fewer levels, state signs (Known) for Signed, or take Automatic"
+    left, allowed = f"{campaign.left:,} evaluations", f"{samples:,.0f} or more"
+    require(samples <= campaign.left, "budget", left, allowed, cure)
 
 
 @dataclass(frozen=True)
@@ -162,19 +160,19 @@ class Extended(_Transformation):
             chosen("monotone input", name, names)
         return set(names) - set(self.monotone or ())
 
-    def run(self, model: Model, domain: Domain) -> Bounds:
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
         if self.monotone is not None:
-            return super().run(model, domain)
+            return super().run(campaign, domain)
         domain.require_free(self.name)
-        memo = Memo(model)
-        effects = verify(memo, domain, self.outputs)
-        classes = (effects.signs[0] != 0) | model.known.monotone_in(domain.names, effects.outputs)
+        effects = verify(campaign, domain, self.outputs)
+        known = campaign.known.monotone_in(domain.names, effects.outputs)
+        classes = (effects.signs[0] != 0) | known
         pairs = zip(domain.names, classes.all(axis=0), strict=True)
         plan = replace(self, monotone=tuple(name for name, holds in pairs if holds))
         design = plan.points(domain)
-        afford(len(design.points), memo, self.name)
-        return _verified(design, memo, effects, self.name)
+        afford(len(design.points), campaign, self.name)
+        return _verified(design, campaign, effects, self.name)
 
 
 @dataclass(frozen=True)
@@ -193,14 +191,13 @@ class Signed:
 
     name = "signed"
 
-    def run(self, model: Model, domain: Domain) -> Bounds:
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
         domain.require_free(self.name)
-        memo = Memo(model)
-        effects = verify(memo, domain, self.outputs)
-        afford(_size(effects, domain), memo, self.name)
+        effects = verify(campaign, domain, self.outputs)
+        afford(_size(effects, domain), campaign, self.name)
         design = Design.from_levels(domain, self._points(effects, domain))
-        return _verified(design, memo, effects, self.name)
+        return _verified(design, campaign, effects, self.name)
 
     def _points(self, effects: Effects, domain: Domain) -> list[Array]:
         """Corners that the signs name, times the general method's points of other inputs."""
@@ -211,21 +208,19 @@ class Signed:
         ]
 
 
-def _verified(design: Design, memo: Memo, effects: Effects, method: str) -> Bounds:
+def _verified(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
     """Bounds from the samples of a design, proved where all signs are stated or verified."""
-    corners = design.bounds(memo(design.points), method, evaluations=len(memo))
+    corners = design.bounds(campaign(design.points), method)
     proved = np.isin(corners.outputs, np.array(effects.outputs)[effects.proved.all(axis=(0, 2))])
-    judged = proving(corners, memo.samples, proved, memo.known)
-    every = Design.from_samples(design.domain, memo.samples.points)
-    bounds = every.bounds(memo.samples.values, method)
-    notes = (*effects.notes(design.domain), *judged.notes)
+    judged = proving(corners, campaign, proved)
+    bounds = of_samples(design.domain, campaign.samples, method)
     return replace(
         bounds,
         nature=judged.nature,
         natures=judged.natures,
         basis=judged.basis,
         inner=Ends(bounds.lower, bounds.upper),
-        notes=notes,
+        notes=effects.notes(design.domain),
     )
 
 

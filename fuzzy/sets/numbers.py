@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -105,29 +105,37 @@ def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
     return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, between))
 
 
-def _ordered(kind: str, values: Sequence[float], order: str) -> None:
-    """Refuse values that are no finite numbers or not in order."""
-    numbers = [real(kind, value) for value in values]
-    require((np.diff(numbers) >= 0).all(), kind, numbers, order)
+@dataclass(frozen=True)
+class _Corners(FuzzyNumber):
+    """Base of numbers with straight flanks: their fields are the corners in rising order."""
+
+    word: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        names = [one.name for one in fields(self)]
+        corners = [real(self.word, getattr(self, name)) for name in names]
+        order = " <= ".join(names)
+        require((np.diff(corners) >= 0).all(), self.word, corners, order)
+
+    @cached_property
+    def cuts(self) -> Cuts:
+        """Support and modal interval."""
+        corners = [getattr(self, one.name) for one in fields(self)]
+        left, right = corners[(len(corners) - 1) // 2], corners[len(corners) // 2]
+        return Cuts((0.0, 1.0), (corners[0], left), (corners[-1], right))
 
 
 @dataclass(frozen=True)
-class Crisp(FuzzyNumber):
+class Crisp(_Corners):
     """A single value of membership 1."""
 
     value: float
 
-    def __post_init__(self) -> None:
-        _ordered("crisp number", [self.value], "")
-
-    @property
-    def cuts(self) -> Cuts:
-        """The value itself at every level."""
-        return Cuts((0.0, 1.0), (self.value,) * 2, (self.value,) * 2)
+    word = "crisp number"
 
 
 @dataclass(frozen=True)
-class Interval(FuzzyNumber):
+class Interval(_Corners):
     """A crisp interval: membership 1 between its ends, 0 outside.
 
     Raises:
@@ -137,17 +145,11 @@ class Interval(FuzzyNumber):
     lower: float
     upper: float
 
-    def __post_init__(self) -> None:
-        _ordered("interval", [self.lower, self.upper], "lower <= upper")
-
-    @property
-    def cuts(self) -> Cuts:
-        """The interval itself at every level."""
-        return Cuts((0.0, 1.0), (self.lower,) * 2, (self.upper,) * 2)
+    word = "interval"
 
 
 @dataclass(frozen=True)
-class Triangular(FuzzyNumber):
+class Triangular(_Corners):
     """Triangular fuzzy number.
 
     Args:
@@ -163,17 +165,11 @@ class Triangular(FuzzyNumber):
     modal: float = field()  # declared anew: the base class derives it from the cuts
     upper: float
 
-    def __post_init__(self) -> None:
-        _ordered("triangle", [self.lower, self.modal, self.upper], "lower <= modal <= upper")
-
-    @property
-    def cuts(self) -> Cuts:
-        """Support and modal value."""
-        return Cuts((0.0, 1.0), (self.lower, self.modal), (self.upper, self.modal))
+    word = "triangle"
 
 
 @dataclass(frozen=True)
-class Trapezoidal(FuzzyNumber):
+class Trapezoidal(_Corners):
     """Fuzzy interval with straight flanks.
 
     Args:
@@ -191,14 +187,7 @@ class Trapezoidal(FuzzyNumber):
     right: float
     upper: float
 
-    def __post_init__(self) -> None:
-        corners = [self.lower, self.left, self.right, self.upper]
-        _ordered("trapezoid", corners, "lower <= left <= right <= upper")
-
-    @property
-    def cuts(self) -> Cuts:
-        """Support and modal interval."""
-        return Cuts((0.0, 1.0), (self.lower, self.left), (self.upper, self.right))
+    word = "trapezoid"
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ def ways(law, n):
     yield from ((claim, None) for claim in FREE)
     if np.abs(LAWS[law][1]).max() <= 1:
         yield "mean", None
-    if law in ("normal", "log-normal") and n > 1:
-        yield from ((claim, law) for claim in NAMED)
+    if n > 1:
+        yield from ((claim, law) for claim in NAMED.get(law, ()))
 
 
 def lacking(law, counts, repetitions, rng):

@@ -88,7 +88,7 @@ def test_an_output_and_its_extremes_over_time_are_read_by_name():
     assert (refused.value.value, refused.value.allowed) == ("z", "y")
 
 
-def test_text_drawing_and_dataset_say_nature_error_and_unit():
+def test_text_and_dataset_say_nature_error_and_unit():
     for time in (None, np.array([0.0, 1.0])):
         found = bounds(time=time, units=("mm",), evaluations=12)
         assert "bounds attained" in str(found)
@@ -97,5 +97,3 @@ def test_text_drawing_and_dataset_say_nature_error_and_unit():
         dataset = found.to_dataset()
         assert float(dataset.upper.max()) == 16
         assert dataset.nature.item() == "attained"
-        wide = replace(found, error=np.full(found.lower.shape, 2.0))
-        assert "error up to 2" in wide.plot().get_title()

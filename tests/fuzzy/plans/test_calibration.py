@@ -11,9 +11,7 @@ from alphacut.fuzzy import (
 )
 from alphacut.fuzzy.campaign.call import Call
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.alpha_cut_optimisation import attained
 from alphacut.fuzzy.plans.automatic import _Passes
-from alphacut.fuzzy.samples.model import Memo
 from alphacut.fuzzy.sets.boxes import Domain
 from tests.calibration.functions import FAMILIES, named, numbers, true_ends
 
@@ -63,12 +61,12 @@ def test_errors_of_the_default_cover_in_every_family():
 def judged(gain, *lacks):
     """Bounds of x² after passes that improved by `gain` and whose ends lack so much."""
     domain = Domain({"x": Interval(0, 1)}, (0.0,))
-    memo = Memo(Campaign(Call(lambda x: x * x, ("x",))))
-    memo(np.linspace(0, 1, 11)[:, None])
-    passes = _Passes(Automatic(tolerance=1e-3), memo, domain, ("y",))
+    campaign = Campaign(Call(lambda x: x * x, ("x",)))
+    campaign(np.linspace(0, 1, 11)[:, None])
+    passes = _Passes(Automatic(tolerance=1e-3), campaign, domain, ("y",))
     passes.gain = np.array([[gain]])
     passes.ends = {("y", 1.0): [(0, lack) for lack in lacks]}
-    return passes.judged(attained(memo, domain, "automatic", spent=False), spent=False)
+    return passes.judged(spent=False)
 
 
 def test_what_a_pass_improves_or_lacks_counts_twice():

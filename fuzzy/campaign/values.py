@@ -1,4 +1,4 @@
-"""Model as a plan sees it: an evaluation of many points with named outputs."""
+"""Named outputs of a model at many points."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.refused import FailedError, chosen, require
 
 Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
@@ -42,14 +40,11 @@ class Values:
 
     def output(self, name: str) -> Array:
         """One output at all points, shape (n, …)."""
-        chosen("output", name, (other for other, _ in self.layout))
-        start = 0
-        for other, shape in self.layout:
-            size = prod(shape)
-            if other == name:
-                break
-            start += size
-        return self.array[:, start : start + size].reshape(-1, *shape)
+        names, shapes = zip(*self.layout, strict=True)
+        chosen("output", name, names)
+        ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
+        place = names.index(name)
+        return np.split(self.array, ends, axis=1)[place].reshape(-1, *shapes[place])
 
     def column(self, name: str) -> int:
         """Index of a column."""
@@ -76,28 +71,6 @@ class Samples:
 
 class SpentError(FailedError):
     """The next evaluations would pass the budget; none of them is run."""
-
-
-class Model(Protocol):
-    """A model as plans call it."""
-
-    @property
-    def known(self) -> Known:
-        """Facts that the caller knows about the model."""
-
-    @property
-    def left(self) -> int:
-        """Evaluations that the budget still allows."""
-
-    def __call__(self, points: Array) -> Values:
-        """Outputs at the points, shape (n, inputs).
-
-        Raises:
-            SpentError: They would pass the budget.
-        """
-
-    def report(self, share: float) -> None:
-        """Report the completed fraction, 0 … 1."""
 
 
 def flatten(output: Output) -> tuple[Layout, Array]:
@@ -127,57 +100,3 @@ def _numbers(name: str, value: ArrayLike | None) -> Array:
     allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
     require(real_numbers, f"output {name}", shown, allowed)
     return np.asarray(array, float)
-
-
-class Memo:
-    """Wraps a model and keeps every sample.
-
-    Args:
-        model: The model to call at points not seen before.
-    """
-
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self._index: dict[bytes, int] = {}
-        self._points: list[Array] = []
-        self._rows: list[Array] = []
-        self._layout: Layout = ()
-        self._samples: Samples | None = None
-
-    @property
-    def known(self) -> Known:
-        """Facts that the caller knows about the model."""
-        return self._model.known
-
-    @property
-    def left(self) -> int:
-        """Evaluations that the budget still allows."""
-        return self._model.left
-
-    def report(self, share: float) -> None:
-        """Tell the share done, 0 … 1."""
-        self._model.report(share)
-
-    @property
-    def samples(self) -> Samples:
-        """All samples so far in the order of their first use."""
-        if self._samples is None:
-            values = Values(self._layout, np.array(self._rows))
-            self._samples = Samples(np.array(self._points), values)
-        return self._samples
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __call__(self, points: Array) -> Values:
-        """Outputs at the points, shape (n, inputs)."""
-        keys = [point.tobytes() for point in points]
-        fresh = {key: row for row, key in enumerate(keys) if key not in self._index}
-        if fresh:
-            new = points[list(fresh.values())]
-            values, self._samples = self._model(new), None
-            self._layout = values.layout
-            self._index |= {key: len(self._rows) + row for row, key in enumerate(fresh)}
-            self._points += list(new)
-            self._rows += list(values.array)
-        return Values(self._layout, np.array([self._rows[self._index[key]] for key in keys]))

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.fuzzy.knowledge.known import Known, contradiction, negligible
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.campaign.values import Samples, Values
+from alphacut.fuzzy.knowledge.known import contradiction, negligible
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Ends, Nature
-from alphacut.fuzzy.samples.model import Samples, Values
 from alphacut.fuzzy.sets.boxes import Domain
 
 
@@ -36,20 +37,12 @@ class Design:
         ends = np.cumsum([len(rows) for rows in points])[:-1]
         return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
 
-    @classmethod
-    def from_samples(cls, domain: Domain, points: Array) -> Design:
-        """Let every level use all points, shape (n, inputs), that lie in its cut."""
-        return cls(
-            domain, points, tuple(np.flatnonzero(inside) for inside in domain.inside(points))
-        )
-
-    def bounds(self, values: Values, method: str, *, evaluations: int | None = None) -> Bounds:
+    def bounds(self, values: Values, method: str) -> Bounds:
         """Retransformation: attained extremes of each level's samples and of every level above.
 
         Args:
             values: Outputs at `points`; NaN where a sample failed and was skipped.
             method: Name of the method.
-            evaluations: Of the model, those that verify among them; one a sample if not given.
         """
         lowest, highest = self._extremes(values.array), self._extremes(-values.array)
         columns = np.arange(values.array.shape[1])
@@ -64,8 +57,6 @@ class Design:
             outputs=values.columns,
             inputs=self.domain.inputs,
             method=method,
-            evaluations=len(self.points) if evaluations is None else evaluations,
-            samples=Samples(self.points, values),
         )
 
     def _extremes(self, values: Array) -> Rows:
@@ -82,28 +73,34 @@ class Design:
         return np.array(best[::-1])
 
 
-def proving(bounds: Bounds, samples: Samples, proved: Mask, known: Known) -> Bounds:
+def of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
+    """Bounds in which every level uses all samples that lie in its cut."""
+    levels = tuple(np.flatnonzero(inside) for inside in domain.inside(samples.points))
+    return Design(domain, samples.points, levels).bounds(samples.values, method)
+
+
+def proving(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
     """Bounds of the outputs that corners prove as guaranteed ones.
 
     Args:
         bounds: Attained at the corners that the knowledge names.
-        samples: All samples of the model.
+        campaign: All samples of the model, and what is known of it.
         proved: Outputs that the knowledge covers on every level, shape (outputs,).
-        known: The knowledge.
 
     Raises:
         RefusedError: A sample contradicts the knowledge.
     """
     if not proved.any():
         return bounds
+    samples, known = campaign.samples, campaign.known
     signs = known.stated(tuple(bounds.inputs), bounds.outputs)
     beyond = _beyond(bounds, samples)
+    words, allowed = "; ".join(known.words), "facts that hold over the whole supports"
     for column in np.flatnonzero(proved):
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
-        if beyond[column] or pair is not None:
-            cure = f"samples contradict it{_between(bounds, pair)}"
-            key, words = f"known of {bounds.outputs[column]}", "; ".join(known.words)
-            raise RefusedError(key, repr(words), "facts that hold over the whole supports", cure)
+        holds = pair is None and not beyond[column]
+        cure = f"samples contradict it{_between(bounds, pair)}"
+        require(holds, f"known of {bounds.outputs[column]}", repr(words), allowed, cure)
     natures = tuple(Nature.GUARANTEED if own else Nature.ATTAINED for own in proved)
     agree = f"which {len(samples.points):,} samples do not contradict"
     return replace(
@@ -117,8 +114,7 @@ def proving(bounds: Bounds, samples: Samples, proved: Mask, known: Known) -> Bou
 
 def _beyond(bounds: Bounds, samples: Samples) -> Mask:
     """Outputs of which a sample lies beyond the corners of its cut."""
-    domain = Domain(bounds.inputs, tuple(bounds.alpha))
-    every = Design.from_samples(domain, samples.points).bounds(samples.values, "")
+    every = of_samples(Domain(bounds.inputs, tuple(bounds.alpha)), samples, "")
     small = negligible(samples.values.array)
     low, high = every.lower < bounds.lower - small, every.upper > bounds.upper + small
     return np.asarray((low | high).any(axis=0))
