@@ -9,10 +9,10 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 37_068,
-    "files of the packages": 281,
+    "lines of the packages": 36_812,
+    "files of the packages": 280,
     "places of fmt: skip": 15,
-    "places that raise": 432,
+    "places that raise": 431,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
 TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
