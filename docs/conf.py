@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
     from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
@@ -77,13 +78,35 @@ def without_modules(
 def with_keys(
     _app: Sphinx, _what: str, _name: str, documented: object, _options: object, lines: list[str]
 ) -> None:
-    """Adds the keys of a section of a case to its description, from the model's own fields."""
+    """Adds the keys of a section of a case as a table, from the model's own fields."""
     from alphacut.case.keys import allowed
 
-    for key, field in getattr(documented, "model_fields", {}).items():
-        needed = " (needed)" if field.is_required() else ""
-        ends = f" Allowed: {values}." if (values := allowed(field)) else ""
-        lines += ["", f"``{key}``{needed}: {field.description or 'a section of its own'}.{ends}"]
+    fields = getattr(documented, "model_fields", {})
+    rows = [
+        (f"``{key}``", field.description or "section of its own", allowed(field), default(field))
+        for key, field in fields.items()
+    ]
+    if rows:
+        lines += ["", ".. list-table::", "   :header-rows: 1", "   :widths: 20 40 25 15", ""]
+    for row in [("key", "meaning", "allowed", "default")] * bool(rows) + rows:
+        lines += [f"   {' ' if place else '*'} - {cell}" for place, cell in enumerate(row)]
+    lines += [""]
+
+
+def default(field: FieldInfo) -> str:
+    """The default of a key in words."""
+    from alphacut.fuzzy import FuzzyNumber
+
+    if field.is_required():
+        return "none, it is needed"
+    values = field.default if isinstance(field.default, tuple) else (field.default,)
+    if any(value is None or hasattr(value, "model_fields") for value in values):
+        return ""
+    return ", ".join(
+        f"{value.modal:g}" if isinstance(value, FuzzyNumber) else str(value)
+        for value in values
+        if value != {}
+    )
 
 
 def without_signature(

@@ -42,6 +42,9 @@ class Tolerance:
     value: float
     unit: str = "m"
 
+    def __str__(self) -> str:
+        return f"{self.value:g} {self.unit}"
+
 
 def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
     if isinstance(value, Tolerance):
@@ -78,7 +81,7 @@ class Envelope(Section):
 
     fuzzy: Names = Field(
         description="inputs that are fuzzy; of a frame E, I, m or m1 …, l, c (columns),"
-        " k (stiffness), d, q0, v0, zeta, rayleigh_mass, rayleigh_stiffness"
+        " k (stiffness), d, q0, v0, zeta (damping_ratio), rayleigh_mass, rayleigh_stiffness"
     )
     alpha: Levels = Field(default=ALPHA, description="α-levels")
     method: EnvelopeMethod = Field(default="auto", description="method of the envelope")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,11 @@ from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import suggestion
+
+INPUTS = {"modulus": "E", "second_moment": "I", "masses": "m", "lengths": "l", "columns": "c"}
+INPUTS |= {"stiffness": "k", "dampers": "d", "displacements": "q0", "velocities": "v0"}
+INPUTS |= {"damping_ratio": "zeta"}
+"""Input that each key of a frame is, as `fuzzy` names it."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +58,13 @@ class Structure:
             members = self.frame.group(name) if self.frame else (name,)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
-            allowed = ", ".join(self.numbers)
-            raise RefusedError(key, name, allowed, suggestion(name, self.numbers)) from None
+            cure = f"that key is the input {INPUTS[name]}" if name in INPUTS else ""
+            cure = cure or suggestion(name, self.numbers)
+            raise RefusedError(key, name, ", ".join(self.numbers), cure) from None
         if not fuzzy:
-            raise RefusedError(key, name, "inputs that are fuzzy", "this one is one number")
+            keys = [of for of, short in INPUTS.items() if re.fullmatch(rf"{short}\d*", name)]
+            cure = f"{keys[0] if keys and self.frame else name} is one number"
+            raise RefusedError(key, name, "inputs that are fuzzy", cure)
         return fuzzy
 
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:

@@ -186,8 +186,8 @@ class Frame(Section):
         for key in LISTS:
             values = getattr(self, key) or (ZERO,)
             if len(values) not in (1, self.floors):
-                allowed = f"one value, or one for each of {self.floors} floors"
-                raise RefusedError(f"frame.{key}", f"{len(values)} values", allowed)
+                allowed = f"one value, or as many as frame.masses: {self.floors}"
+                raise RefusedError(f"frame.{key}", f"a list of {len(values)}", allowed)
         for key in ("lengths", "second_moment") if self.stiffness is None else ():
             if getattr(self, key) is None:
                 raise RefusedError(f"frame.{key}", None, "this key, or frame.stiffness")

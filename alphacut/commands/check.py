@@ -85,6 +85,8 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                 yield from rows_of(f"{place}.", one)
             elif isinstance(one, FuzzyNumber) and unit and section.names(key):
                 yield place, _numbers(one, unit.si), KINDS.get(type(one), "fuzzy")
+            elif key == "columns" and getattr(section, "stiffness", None) is None:
+                yield place, _numbers(one, ""), "default"
             elif isinstance(one, float) and unit and unit.si and section.names(key):
                 yield place, engineering(one, unit.si), "number"
 

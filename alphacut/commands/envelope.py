@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_common(parser)
     common.add_keys(parser, KEYS)
     common.add_modulus(parser)
-    parser.add_argument("--out", metavar="FILE.nc", help="write the envelopes as NetCDF")
+    parser.add_argument("--out", metavar="FILE.nc", help="NetCDF file for the envelopes")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:

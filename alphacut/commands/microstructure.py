@@ -21,7 +21,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     add_common(parser)
     add_workers(parser)
     parser.add_argument(
-        "--out", metavar="FOLDER", help="write radius.toml, microstructure.nc and figures here"
+        "--out", metavar="FOLDER", help="folder for radius.toml, microstructure.nc and figures"
     )
 
 

@@ -41,7 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="FILE.nc",
-        help="write α-cuts and samples as NetCDF; samples.db beside it goes on after a stop",
+        help="NetCDF file for α-cuts and samples; samples.db beside it goes on after a stop",
     )
 
 

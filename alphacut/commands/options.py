@@ -43,7 +43,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json",
         metavar="FILE",
-        help="write the result as JSON; - for standard output, with nothing else on it",
+        help="file for the result as JSON; - for standard output, with nothing else on it",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress and no table")
 

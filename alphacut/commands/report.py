@@ -20,9 +20,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the options of the command."""
     parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/paper")
     parser.add_argument(
-        "--out", metavar="FILE.html", help="where the page goes (default: FOLDER/report.html)"
+        "--out", metavar="FILE.html", help="file for the page (default: FOLDER/report.html)"
     )
-    parser.add_argument("--csv", metavar="FOLDER", help="write every result as a CSV file there")
+    parser.add_argument("--csv", metavar="FOLDER", help="folder for every table as a CSV file")
     add_quiet(parser)
 
 

@@ -28,7 +28,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the options of the command."""
     common.add_common(parser)
     common.add_workers(parser)
-    parser.add_argument("--out", metavar="FOLDER", help="where results go (default: results/NAME)")
+    parser.add_argument(
+        "--out", metavar="FOLDER", help="folder for results (default: results/NAME)"
+    )
     parser.add_argument("--fresh", action="store_true", help="compute everything anew")
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.follower_record import FollowerRecord, record_flow
 from alphacut.frame.structures.quantities import Output
@@ -23,11 +23,20 @@ TITLES = (
     "bounds left by the sweep, and the best of all graphs",
     "the discrete fuzzy mapping",
 )
+LINES: dict[str, Look] = {
+    "stored trajectory": {"color": GREY, "lw": 0.8},
+    "new trajectory": {"color": ORANGE, "lw": 1.3},
+    "guess, or bound left by the sweep": {"color": BLUE, "lw": 1.3},
+    "envelope": {"color": INK, "lw": 1.3},
+    "node that is treated": {"color": INK, "lw": 0.8, "ls": ":"},
+}
+"""Legend of all panels."""
 
 
 def follower(results: Results, task: EnvelopeTask) -> Figure:
     """Five panels: from the first guess to the envelope, for one output at the lowest level."""
     import matplotlib.pyplot as plt
+    from matplotlib.lines import Line2D
 
     walk, output = recorded(results, task)
     drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
@@ -41,8 +50,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     panels[0].plot(walk.time, walk.graphs[0], color=BLUE, lw=1.3)
     base(panels[1], walk, [0, *(step.new for step in first)], node=first[0].node, last=len(first))
     base(panels[2], walk, range(later.new + 1), node=later.node, last=1)
-    panels[2].plot(walk.time, walk.graphs[later.guess], color=BLUE, lw=1.3, label="guess")
-    panels[2].legend(loc="lower right", fontsize=8)
+    panels[2].plot(walk.time, walk.graphs[later.guess], color=BLUE, lw=1.3)
     base(panels[3], walk, range(len(walk.graphs)), node=None, last=0)
     for local, final in ((walk.local_lower, walk.lower), (walk.local_upper, walk.upper)):
         panels[3].plot(walk.time, local, color=BLUE, lw=1.0)
@@ -59,6 +67,8 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     panels[4].set_xlabel("time t (s)")
     for panel in panels[::2]:
         prefix_axis(panel, output, Output(output).unit)
+    lines = [Line2D([], [], label=words, **look) for words, look in LINES.items()]
+    drawn.legend(handles=lines, fontsize=8, loc="outside lower center", ncols=3)
     return drawn
 
 

@@ -37,15 +37,20 @@ def progress(title: str, *, quiet: bool = False) -> Iterator[Tick | None]:
 
 
 def _lines(title: str) -> Tick:
-    """A function that says the share done and the seconds left, at most every `EVERY` seconds."""
+    """A function that says the share done and the seconds left, at most every `EVERY` seconds.
+
+    The pace is that since the line before.
+    """
     begun = last = time.monotonic()
+    before = 0.0
 
     def tick(done: float) -> None:
-        nonlocal last
+        nonlocal last, before
         now = time.monotonic()
-        if now - last < EVERY or not 0.005 < done < 1:
+        if now - last < EVERY or not max(before, 0.005) < done < 1:
             return
-        last, spent = now, now - begun
-        say(f"{title}: {done:.0%} done after {spent:.0f} s, {spent * (1 - done) / done:.0f} s left")
+        left = (1 - done) * (now - last) / (done - before)
+        last, before = now, done
+        say(f"{title}: {done:.0%} done after {now - begun:.0f} s, about {left:.0f} s left")
 
     return tick

@@ -66,7 +66,7 @@ class Auto:
                 reasons.append(f"{proof.name}: {error}")
                 continue
             if self.tolerance is None or (proved.error <= self._allowed(flow)).all():
-                return _noted(proved, "; ".join([f"{proof.name}: a proof", *reasons]))
+                return _noted(proved, "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
         why = f"unproved: {'; '.join(reasons)}"
         try:

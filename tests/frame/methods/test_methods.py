@@ -142,7 +142,7 @@ def test_auto_takes_the_proof_else_the_search_else_the_follower_and_says_why():
     swing = {"l": Interval(0.99, 1.01)}
     cases = (
         (CHAIN, two, 1e-3, Nature.GUARANTEED, "proof"),
-        (each, two, None, Nature.GUARANTEED, "dual: a proof; proof: a damping ratio for each"),
+        (each, two, None, Nature.GUARANTEED, "dual succeeded; proof: a damping ratio for each"),
         (each, two, 1e-9, Nature.ESTIMATED, "search; unproved: proof: a damping ratio for each"),
         (FRAME, many, 1e-3, Nature.ESTIMATED, "search; unproved: dual: dashpots couple the modes"),
         (frame.pendulum(), swing, 1e-3, Nature.ESTIMATED, "improved-graph-follower: not linear"),
