@@ -53,7 +53,7 @@ mathjax2_config = {
 }
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True, "imported-members": True, "inherited-members": True}
+autodoc_default_options = {"members": True, "imported-members": True}
 
 
 def copy_mathjax(app: Sphinx) -> None:
@@ -83,7 +83,7 @@ def with_keys(
 
     fields = getattr(documented, "model_fields", {})
     rows = [
-        (f"``{key}``", field.description or "section of its own", allowed(field), default(field))
+        (f"``{key}``", described(field), allowed(field), default(field))
         for key, field in fields.items()
     ]
     if rows:
@@ -93,12 +93,17 @@ def with_keys(
     lines += [""]
 
 
+def described(field: FieldInfo) -> str:
+    """The description of a key in reStructuredText."""
+    return (field.description or "section of its own").replace("`", "``")
+
+
 def default(field: FieldInfo) -> str:
     """The default of a key in words."""
     from alphacut.fuzzy import FuzzyNumber
 
     if field.is_required():
-        return "none, it is needed"
+        return "required"
     values = field.default if isinstance(field.default, tuple) else (field.default,)
     if any(value is None or hasattr(value, "model_fields") for value in values):
         return ""

@@ -50,36 +50,38 @@ def propagate(
 ) -> Bounds:
     """Fuzzy outputs of a function of fuzzy inputs.
 
+    ``propagate(lambda x, y: x * y, {"x": Triangular(1, 2, 4), "y": Interval(3, 5)})`` is enough.
+    The other arguments are for functions that are slow, many-valued or better known.
+
     Args:
-        function: Gets the inputs by name and returns a number, an array, or a mapping of names to
-            either. With `shared` it gets a list of points (mappings of names to numbers) that agree
-            in those inputs and returns a list of outputs; with `vectorised` it gets arrays, shape
-            (n,), and returns arrays whose first axis is n.
-        inputs: Fuzzy number of each input; a plain number is crisp. Inputs are independent, also
-            where one number object stands for two. Claims are joined (`jointly`).
-        method: How the boxes of the inputs are searched; `Automatic` if not given.
+        function: Takes the inputs by name; returns a number, an array, or a mapping of names to
+            either.
+        inputs: Fuzzy number of each input; a plain number is crisp. They vary independently.
+            Numbers that claim a coverage are joined (`jointly`).
+        method: Search of the boxes, such as ``General()``; `Automatic` if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs; methods that cannot respect them refuse.
-        known: Facts about the function, such as the signs of its effects, on which guaranteed
-            bounds rest.
+        known: Facts on which guaranteed bounds rest, such as the signs of the inputs' effects.
         budget: Evaluations that the call may take, stored ones among them. Methods that know their
             samples beforehand refuse to begin; a search ends, and says so.
-        units: Unit of each output by name, which every text, table and drawing then shows.
+        units: Unit of each output by name, for texts, tables and drawings.
         on_failure: "raise" ends the call where a sample failed, after all others have been run;
             "skip" leaves such samples out: the bounds are then attained only.
-        shared: Inputs whose equality lets samples share one call.
-        vectorised: Whether the function takes arrays.
-        workers: Processes of this machine; the result is the same for any number. They import the
-            main script, so its calls must stand under `if __name__ == "__main__":` and the function
-            in a file.
+        shared: Inputs whose equality lets samples share one call. The function then takes a list of
+            mappings of names to numbers that agree in them, and returns a list of outputs.
+        vectorised: Whether the function takes arrays, shape (n,), and returns arrays whose first
+            axis is n.
+        workers: Processes of this machine; the result is the same for any number. The function must
+            stand in a file, and the call under ``if __name__ == "__main__":``.
         executor: Any `concurrent.futures` executor, instead of `workers`.
-        store: Where samples are kept (or its path): a campaign that was stopped, however, resumes
-            from it.
-        identity: What a sample depends on besides its inputs (case, options, versions), as JSON can
-            say it; a store needs it, not empty. The store cannot see that the function changed: say
-            so here, by a version or a hash of its text.
+        store: Path of a file that keeps every sample: a call that was stopped goes on from there.
+        identity: What a sample depends on besides its inputs (case, options, versions), as JSON. A
+            store needs it, as it cannot see that the function changed.
         progress: Called with the share done. If not given, a bar appears on a terminal after
             a second; False shows none.
+
+    Returns:
+        Range and nature of every output on every level.
 
     Raises:
         RefusedError: An argument is wrong, or the budget does not carry the method.

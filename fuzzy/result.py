@@ -1,16 +1,4 @@
-"""Bounds: what every method of fuzzy analysis returns, for numbers and for motions over time.
-
-The three natures promise, of each output, level (and time):
-
-- attained: values of the function itself, at points in the box which `lower_at` and `upper_at`
-  name. The true range is at least as wide, and may be wider. Where a scheme computed the values
-  (time steps, a mesh), they hold to `error`, which is the scheme's; else `error` is 0.
-- estimated: each true bound lies within `error` of the bound stated, as far as a pass that is
-  independent of the search, or its held-out points, can tell. Nothing is proved.
-- guaranteed: the true range lies inside, which is proved from knowledge that `basis` names: stated
-  by the caller, or verified. `error` is the distance to what is attained; NaN where that is not
-  known.
-"""
+"""Bounds: the result of every method of fuzzy analysis, for numbers and for motions over time."""
 
 from __future__ import annotations
 
@@ -51,9 +39,9 @@ class Nature(StrEnum):
     def sentence(self) -> str:
         """Promise of the nature."""
         return {
-            "attained": "values at points in the box; the true range may reach further",
-            "estimated": "attained, with an error that an independent pass estimated",
-            "guaranteed": "the true range is proved to lie inside, from knowledge that is named",
+            "attained": "Some inputs reach these bounds; the true range may be wider.",
+            "estimated": "The true bounds lie within the error, as an independent pass tells.",
+            "guaranteed": "No value in the α-cut lies outside these bounds; this is proved.",
         }[self]
 
 
@@ -66,32 +54,41 @@ class Ends(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Bounds:
-    """α-cuts of the outputs of a function of fuzzy inputs, over time where there is one.
+    """Ranges of the outputs of a function of fuzzy inputs, an α-cut a level, over time if there is.
+
+    `print` shows them, `bounds(name)` gives the ends of an output, `number(name)` a fuzzy number,
+    `plot(name)` a drawing. The nature of an output says what its ends are worth:
+
+    - attained: `lower_at` and `upper_at` are inputs that reach them. The true range may be wider.
+      Values of a scheme, such as time steps, hold to its `error`.
+    - estimated: each true end lies within `error` of the one stated, as far as an independent pass
+      can tell. Nothing is proved.
+    - guaranteed: the true range is proved to lie inside, from what `basis` names. `error` is the
+      gap to what is attained, inside the ends; NaN where that is not known.
 
     Args:
         alpha: Levels, rising within [0, 1], shape (A,).
         lower: Lower ends, in `units`, shape (A, m), or (A, T, m) over time.
         upper: Upper ends, same shape.
-        lower_at: Inputs where the lower ends are attained, in their own units, shape (…, m, n); NaN
-            where that is not known.
+        lower_at: Inputs that reach the lower ends, in their own units, shape (…, m, n); NaN where
+            they are not known.
         upper_at: The same for the upper ends.
-        error: See the natures above, in `units`, not negative, shape of `lower`.
+        error: Error or gap, as the nature says, in `units`, 0 or more, shape of `lower`.
         nature: Nature of all outputs, the weakest where `natures` differ.
         outputs: Names of the outputs, m of them.
         inputs: Fuzzy numbers by name, n of them, in the order of the last axis of `lower_at`.
-        units: Unit of each output; none where empty.
         method: Name of the method, the word that a case file has for it.
+        units: Unit of each output; empty for none.
         evaluations: All evaluations of the model, those that verify or estimate among them.
         seconds: Wall time, in s.
-        natures: Nature of each output; all are `nature` where empty.
-        basis: Knowledge on which a guarantee rests, as "the signs of E hold, as stated by the
-            caller"; what a scheme or an estimate rests on.
+        natures: Nature of each output; empty where all are `nature`.
+        basis: Knowledge that a guarantee or an estimate rests on.
         time: Nodes, shape (T,), in s; None where there is no time.
-        inner: Of guaranteed bounds those attained, if any, less the scheme's error.
-        outer: Of other bounds the proved ones, if any.
-        notes: What the method saw on its way, one sentence each.
-        budget: Evaluations that were allowed; 0 where there was no such limit.
-        calls: Of the model, each for the samples that share a set-up.
+        inner: Attained ends inside guaranteed ones, less the scheme's error; None for none.
+        outer: Proved ends outside others; None for none.
+        notes: Remarks of the method, one sentence each.
+        budget: Evaluations that were allowed; 0 for no limit.
+        calls: Calls of the model, each for the samples that share a set-up.
         reused: Evaluations that were taken from a store.
         samples: Points and values that the bounds were taken from; None where none are kept.
 
@@ -307,10 +304,11 @@ class Bounds:
         low, high, error = self.minimum[:, column], self.maximum[:, column], self.error[..., column]
         nature = self.nature_of(self.outputs[column])
         differs = f", {nature}" if nature != self.nature else ""
+        words = "gap to attained" if nature is Nature.GUARANTEED else "error"
         worst = error if self.time is None else error.max(axis=1)
         for row in zip(self.alpha, low, high, worst, strict=True):
             alpha, *ends, miss = (_digits(x) for x in row)
-            yield f"{self.named[column]}, α = {alpha}: {' … '.join(ends)}, error {miss}{differs}"
+            yield f"{self.named[column]}, α = {alpha}: {' … '.join(ends)}, {words} {miss}{differs}"
 
     def to_dataset(self) -> xarray.Dataset:
         """Bounds over (alpha, time, output), where they are attained over (…, parameter)."""

@@ -35,9 +35,9 @@ def section(title: str, *content: Markup) -> Markup:
     return fragment("section", title, [piece for piece in content if piece])
 
 
-def table(head: Sequence[str], rows: Rows, *, numbers: int = 1) -> Markup:
-    """A table; from column `numbers` on everything is a number, aligned to the right."""
-    return fragment("table", head, rows, numbers) if rows else Markup("")
+def table(head: Sequence[str], rows: Rows) -> Markup:
+    """A table; all columns but the first hold numbers, aligned to the right."""
+    return fragment("table", head, rows, 1) if rows else Markup("")
 
 
 def paragraphs(*texts: str) -> Markup:

@@ -23,12 +23,6 @@ Table = tuple[Row, list[Row]]
 """Titles of the columns, and the rows."""
 AVERAGES = {"cylinders": "eq. 16", "axes": "eq. 16", "isotropic": "isotropic", "spheres": "spheres"}
 """Averages of the stiffness that E and ν are of."""
-NATURES = {
-    Nature.GUARANTEED: "No value in the α-cut lies outside these bounds; this is proved.",
-    Nature.ESTIMATED: "The true bounds lie within the error, as an independent pass tells.",
-    Nature.ATTAINED: "The bounds are reached; the true range may be wider.",
-}
-"""Meaning of each nature, for the page."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
 """Label of the bounds that hold for isotropic composites, at the modal values."""

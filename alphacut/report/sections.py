@@ -17,7 +17,6 @@ from alphacut.questions.table import QUESTIONS
 from alphacut.report.html import code, folded, fragment, paragraphs, picture, section, table
 from alphacut.report.results import (
     ANSWERS,
-    NATURES,
     answers,
     drivers,
     extremes,
@@ -37,7 +36,7 @@ TERMS = {
     "Peak": "Largest magnitude of an output over the motion.",
     "Possibility": "Degree of the highest α-cut in which something happens. 0: it cannot.",
     "Necessity": "One less the possibility of the contrary. 1: it must happen.",
-    **{str(nature).capitalize(): meaning for nature, meaning in NATURES.items()},
+    **{str(nature).capitalize(): nature.sentence for nature in Nature},
 }
 """Terms of the page with their meaning."""
 
@@ -126,9 +125,10 @@ class Page:
             for row, alpha in enumerate(cuts["alpha"])
         ]
         words = "The bounds are those of the image as it was segmented, in plane strain."
+        shares = (f"{name} {_percent(share)}" for name, share in part["fractions"].items())
         return section(
             "How stiff is the image?",
-            paragraphs(words, *_fractions(part.get("fractions", {})), width_text(part) + "."),
+            paragraphs(words, f"Of the area: {', '.join(shares)}.", width_text(part) + "."),
             self._drawn("image"),
             folded("α-cuts", table(("α", "E from, GPa", "E to, GPa"), rows)),
         )
@@ -188,7 +188,7 @@ class Page:
             )
             for name, study in studies.items()
         ]
-        meaning = (f"{str(one).capitalize()}: {NATURES[one]}" for one in natures)
+        meaning = (f"{str(one).capitalize()}: {one.sentence}" for one in natures)
         return section(
             "How does the structure move?", fragment("plot"), paragraphs(words, *meaning), *tables
         )
@@ -249,14 +249,3 @@ def _references(part: Document) -> list[tuple[str, str]]:
         for key, words in known.items()
         if key in of
     ]
-
-
-def _fractions(part: object) -> tuple[str, ...]:
-    """Shares of the area of the phases."""
-    if isinstance(part, list):
-        part = {f"phase {place}": share for place, share in enumerate(part, start=1)}
-    if not isinstance(part, dict) or not part:
-        return ()
-    return (
-        "Of the area: " + ", ".join(f"{x} {_percent(share)}" for x, share in part.items()) + ".",
-    )

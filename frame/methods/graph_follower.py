@@ -71,13 +71,17 @@ class Followed:
 
 @dataclass(frozen=True)
 class GraphFollower:
-    """The method and its switches.
+    """Graph Follower: envelopes of any structure from few trajectories ("graphs").
+
+    At each node Taylor models of the trajectories computed so far point to the inputs that move the
+    output furthest. Where they promise enough, the trajectory of those inputs is computed as well.
+    Pass it to `envelope` as ``method=GraphFollower()``.
 
     Args:
-        order: Degree κ of the Taylor model, 1 or 2.
-        tolerance: Predicted gain above which a new graph is computed, in units of the (first)
+        order: Degree κ of the Taylor models, 1 or 2.
+        tolerance: Promised gain above which a new trajectory is computed, in the unit of the first
             output.
-        budget: Most graphs to compute; None for no limit.
+        budget: Most trajectories to compute; None for no limit.
         record: Keep every step.
 
     Raises:
