@@ -100,18 +100,21 @@ def described(field: FieldInfo) -> str:
 
 def default(field: FieldInfo) -> str:
     """The default of a key in words."""
-    from alphacut.fuzzy import FuzzyNumber
-
     if field.is_required():
         return "required"
     values = field.default if isinstance(field.default, tuple) else (field.default,)
     if any(value is None or hasattr(value, "model_fields") for value in values):
         return ""
-    return ", ".join(
-        f"{value.modal:g}" if isinstance(value, FuzzyNumber) else str(value)
-        for value in values
-        if value != {}
-    )
+    return ", ".join(_in_words(value) for value in values if value != {})
+
+
+def _in_words(value: object) -> str:
+    from alphacut.case.motion import Tolerance
+    from alphacut.fuzzy import FuzzyNumber
+
+    if isinstance(value, FuzzyNumber):
+        return f"{value.modal:g}"
+    return f"{value.value:g} {value.unit}" if isinstance(value, Tolerance) else str(value)
 
 
 def without_signature(

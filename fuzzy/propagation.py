@@ -51,7 +51,6 @@ def propagate(
     """Fuzzy outputs of a function of fuzzy inputs.
 
     ``propagate(lambda x, y: x * y, {"x": Triangular(1, 2, 4), "y": Interval(3, 5)})`` is enough.
-    The other arguments are for functions that are slow, many-valued or better known.
 
     Args:
         function: Takes the inputs by name; returns a number, an array, or a mapping of names to

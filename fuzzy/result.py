@@ -56,8 +56,8 @@ class Ends(NamedTuple):
 class Bounds:
     """Ranges of the outputs of a function of fuzzy inputs, an α-cut a level, over time if there is.
 
-    `print` shows them, `bounds(name)` gives the ends of an output, `number(name)` a fuzzy number,
-    `plot(name)` a drawing. The nature of an output says what its ends are worth:
+    `print` shows them, `bounds(name)` gives the ends of an output, `number(name)` a fuzzy number.
+    The nature of an output says what its ends are worth:
 
     - attained: `lower_at` and `upper_at` are inputs that reach them. The true range may be wider.
       Values of a scheme, such as time steps, hold to its `error`.

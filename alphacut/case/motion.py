@@ -42,9 +42,6 @@ class Tolerance:
     value: float
     unit: str = "m"
 
-    def __str__(self) -> str:
-        return f"{self.value:g} {self.unit}"
-
 
 def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
     if isinstance(value, Tolerance):

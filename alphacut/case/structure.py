@@ -58,9 +58,9 @@ class Structure:
             members = self.frame.group(name) if self.frame else (name,)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
-            cure = f"that key is the input {INPUTS[name]}" if name in INPUTS else ""
-            cure = cure or suggestion(name, self.numbers)
-            raise RefusedError(key, name, ", ".join(self.numbers), cure) from None
+            allowed = ", ".join(self.numbers)
+            cure = suggestion(INPUTS.get(name, name), self.numbers)
+            raise RefusedError(key, name, allowed, cure) from None
         if not fuzzy:
             keys = [of for of, short in INPUTS.items() if re.fullmatch(rf"{short}\d*", name)]
             cure = f"{keys[0] if keys and self.frame else name} is one number"

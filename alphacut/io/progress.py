@@ -37,10 +37,7 @@ def progress(title: str, *, quiet: bool = False) -> Iterator[Tick | None]:
 
 
 def _lines(title: str) -> Tick:
-    """A function that says the share done and the seconds left, at most every `EVERY` seconds.
-
-    The pace is that since the line before.
-    """
+    """A function that says the share done and, at the present pace, left, every `EVERY` seconds."""
     begun = last = time.monotonic()
     before = 0.0
 

@@ -5,22 +5,19 @@ from __future__ import annotations
 import base64
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, own_files, read_dataset, read_summary
 from alphacut.report.html import HERE, environment
 from alphacut.report.results import nature_of
 from alphacut.report.safe import cleaned, plain_name
 from alphacut.report.sections import Page
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def report(folder: Path) -> str:
@@ -64,12 +61,14 @@ def plot(name: str, study: Document, folder: Path) -> Document:
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
     bands = {side: dataset[side] for side in ("lower", "upper")}
-    bands["error"] = _error(dataset)
+    nature = nature_of(study["nature"])
+    proved = nature is Nature.GUARANTEED  # its error is inside
+    bands["error"] = dataset["lower"] * 0.0 if proved else dataset["error"]
     return {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study['fuzzy'])}",
         "fuzzy": len(study["fuzzy"]),
-        "nature": str(nature_of(study["nature"])),
+        "nature": str(nature),
         "alpha": dataset["alpha"].values.tolist(),
         "outputs": outputs,
         "units": [Output(output).unit for output in outputs],
@@ -82,12 +81,6 @@ def plot(name: str, study: Document, folder: Path) -> Document:
             for side, band in bands.items()
         },
     }
-
-
-def _error(dataset: xarray.Dataset) -> xarray.DataArray:
-    """Error outside the bounds; none outside guaranteed ones."""
-    proved = str(dataset.attrs.get("nature", "")).startswith("guaranteed")
-    return dataset["lower"] * 0.0 if proved or "error" not in dataset else dataset["error"]
 
 
 def packed(row: Array) -> str:
