@@ -76,8 +76,7 @@ def propagate(
         store: Path of a file that keeps every sample: a call that was stopped goes on from there.
         identity: What a sample depends on besides its inputs (case, options, versions), as JSON. A
             store needs it, as it cannot see that the function changed.
-        progress: Called with the share done. If not given, a bar appears on a terminal after
-            a second; False shows none.
+        progress: Called with the share done; a bar on a terminal if not given, False for none.
 
     Returns:
         Range and nature of every output on every level.

@@ -49,9 +49,8 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],
     }
     text = text_table(("key", "value", "kind"), rows)
-    text += (
-        f"first natural period: {period:.4g} s, at the most plausible values\n" if period else ""
-    )
+    if period:
+        text += f"first natural period: {period:.4g} s, at the most plausible values\n"
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
         text += f"record: {len(record.acceleration)} samples, peak {peak}\n"

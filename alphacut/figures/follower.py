@@ -30,7 +30,6 @@ LINES: dict[str, Look] = {
     "envelope": {"color": INK, "lw": 1.3},
     "node that is treated": {"color": INK, "lw": 0.8, "ls": ":"},
 }
-"""Legend of all panels."""
 
 
 def follower(results: Results, task: EnvelopeTask) -> Figure:

@@ -75,7 +75,6 @@ class GraphFollower:
 
     At each node Taylor models of the trajectories computed so far point to the inputs that move the
     output furthest. Where they promise enough, the trajectory of those inputs is computed as well.
-    Pass it to `envelope` as ``method=GraphFollower()``.
 
     Args:
         order: Degree κ of the Taylor models, 1 or 2.
