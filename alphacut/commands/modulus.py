@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import itertools
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from alphacut.case.load import load
 from alphacut.commands import options as common
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import write_dataset
 from alphacut.io.provenance import attributes
 from alphacut.io.text_table import text_table
-from alphacut.io.units import between, rounded
+from alphacut.io.units import between, ends
 from alphacut.report.results import ISOTROPIC, fibre_label, nature_of, width_text
 from alphacut.stages import cell, image, modulus
 from alphacut.stages.store import Stage
@@ -88,20 +86,14 @@ def stage_of(content: Content, petsc: Mapping[str, str]) -> Stage:
 def image_table(document: Document) -> str:
     """The proved α-cuts as a table, and the phases."""
     cuts = document["cuts"]
-    ends = (cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"])
+    sides = (cuts["E_GPa"]["lower"], cuts["E_GPa"]["upper"])
     rows = [
-        (f"{a:g}", *printed((low, high), nature_of(nature)), nature)
-        for a, low, high, nature in zip(cuts["alpha"], *ends, cuts["nature"], strict=True)
+        (f"{a:g}", *ends(low, high, nature_of(nature), 7), nature)
+        for a, low, high, nature in zip(cuts["alpha"], *sides, cuts["nature"], strict=True)
     ]
     table = text_table(("α", "lower E, GPa", "upper E, GPa", "nature"), rows)
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
     return table + "".join(shares) + width_text(document) + "\n"
-
-
-def printed(ends: Sequence[float], nature: Nature) -> Iterator[str]:
-    """Ends of ranges with seven digits, each lower one before its upper one."""
-    for end, side in zip(ends, itertools.cycle(("lower", "upper"))):
-        yield f"{rounded(end, side, nature, 7):#.7g}"
 
 
 def fibres(document: Document) -> str:
@@ -121,13 +113,14 @@ def fibres(document: Document) -> str:
 def summary(document: Document) -> str:
     """The α-cuts as a table, and what they cost."""
     columns = [document[key][side] for key in ("E_GPa", "nu_cuts") for side in ("lower", "upper")]
+    nature = nature_of(document["nature"])
     rows = [
-        (f"{alpha:g}", *printed(ends, nature_of(document["nature"])))
-        for alpha, *ends in zip(document["alpha"], *columns, strict=True)
+        (f"{alpha:g}", *ends(low, high, nature, 7), *ends(least, most, nature, 7))
+        for alpha, low, high, least, most in zip(document["alpha"], *columns, strict=True)
     ]
     head = ("α", "lower E, GPa", "upper E, GPa", "lower ν", "upper ν")
-    ends = document["references"].get("hashin_shtrikman_E_GPa")
-    bounds = f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else ""
+    known = document["references"].get("hashin_shtrikman_E_GPa")
+    bounds = f"{ISOTROPIC}: {known[0]:.4f} … {known[1]:.4f} GPa\n" if known else ""
     error = sum(document["error"].values())
     return (
         text_table(head, rows)

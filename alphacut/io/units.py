@@ -113,15 +113,20 @@ def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
     return (math.ceil(value * scale - slack) if up else math.floor(value * scale + slack)) / scale
 
 
+def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
+    """Both ends of a range with so many digits, or more where those would cross."""
+    crisp = high - low <= 1e-9 * abs(high)
+    lower = low if crisp else rounded(low, "lower", nature, digits)
+    upper = low if crisp else rounded(high, "upper", nature, digits)
+    if lower > upper:  # inwards past each other
+        return ends(low, high, nature, digits + 1)
+    words = (f"{end:#.{digits}g}".rstrip(".").replace("-", MINUS) for end in (lower, upper))
+    return next(words), next(words)
+
+
 def between(low: float, high: float, nature: Nature, digits: int = 4) -> str:
     """A range rounded as its nature allows; one number where both ends are the same."""
-    if high - low <= 1e-9 * abs(high):
-        return f"{low:.{digits}g}".replace("-", MINUS)
-    ends = rounded(low, "lower", nature, digits), rounded(high, "upper", nature, digits)
-    if ends[0] > ends[1]:  # inwards past each other
-        return between(low, high, nature, digits + 1)
-    words = " … ".join(dict.fromkeys(f"{end:.{digits}g}" for end in ends))
-    return words.replace("-", MINUS)
+    return " … ".join(dict.fromkeys(ends(low, high, nature, digits)))
 
 
 def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:

@@ -138,8 +138,8 @@ def motion(summary: Document) -> Table:
 def nominal(peak: Document, factor: float, nature: Nature) -> str:
     """A peak on the highest level: one number, or an interval wider than a hundredth of it."""
     low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
-    near = high - low <= 0.01 * abs(high)
-    return f"{(low + high) / 2:.4g}" if near else between(low, high, nature, 3)
+    middle, near = (low + high) / 2, high - low <= 0.01 * abs(high)
+    return between(middle, middle, nature) if near else between(low, high, nature, 3)
 
 
 def scales(output: str, peak: Document, structure: Document) -> Iterator[tuple[str, float]]:

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from alphacut.figures.captions import INPUTS, caption, in_words
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.units import between, rounded
+from alphacut.io.units import between, ends
 from alphacut.questions.question import Question
 from alphacut.questions.table import QUESTIONS
 from alphacut.report.html import code, folded, fragment, paragraphs, picture, section, table
@@ -100,7 +100,7 @@ class Page:
     def _modulus(self, part: Document) -> Markup:
         columns = [part["E_GPa"], *([part["nu_cuts"]] if "nu_cuts" in part else [])]
         cuts = [
-            (f"{alpha:g}", *(_end(one, side, row, part) for one in columns for side in one))
+            (f"{alpha:g}", *(end for one in columns for end in _cut(one, row, part)))
             for row, alpha in enumerate(part["alpha"])
         ]
         head = ("α", "E from, GPa", "E to, GPa", "ν from", "ν to")[: 1 + 2 * len(columns)]
@@ -121,7 +121,7 @@ class Page:
     def _image(self, part: Document) -> Markup:
         cuts = part["cuts"]
         rows = [
-            (f"{alpha:g}", *(_end(cuts["E_GPa"], side, row, part) for side in ("lower", "upper")))
+            (f"{alpha:g}", *_cut(cuts["E_GPa"], row, part))
             for row, alpha in enumerate(cuts["alpha"])
         ]
         words = "The bounds are those of the image as it was segmented, in plane strain."
@@ -226,8 +226,8 @@ def _ends(value: object) -> list[float]:
     return [float(x) for x in value] if isinstance(value, list) else [float(str(value))]
 
 
-def _end(ends: Document, side: str, row: int, part: Document) -> str:
-    return f"{rounded(ends[side][row], side, nature_of(part['nature']), 5):.5g}"
+def _cut(of: Document, row: int, part: Document) -> tuple[str, str]:
+    return ends(of["lower"][row], of["upper"][row], nature_of(part["nature"]), 5)
 
 
 def _widest(ends: Document) -> str:

@@ -99,7 +99,7 @@ def envelope(data: xarray.Dataset, output: str) -> Table:
     one, unit = data.sel(output=output), Output(output).unit
     nature = nature_of(data.attrs["nature"])
     error = "gap to attained" if nature is Nature.GUARANTEED else "error"
-    columns = {"time [s]": one["time"].values}
+    columns = {"time [s]": [*map(float, one["time"].values)]}
     for level in one["alpha"].values:
         at = one.sel(alpha=level)
         for band in ("lower", "upper", "error"):

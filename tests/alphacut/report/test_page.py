@@ -121,11 +121,11 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
     limits = {"drift1": {"limit": 0.02, "verdict": "not exceeded from α = 0.05 up"}}
     head, rows = motion({**peaks_of(**ends), "decision": {"limits": limits}})
     assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit", "exceeded")
-    assert rows[0][:5] == ("drift1, mm", "11", "10.5 … 11.5", "10.37 … 12.01", "0.2")
+    assert rows[0][:5] == ("drift1, mm", "11.00", "10.5 … 11.5", "10.37 … 12.01", "0.2")
     assert rows[0][5:] == ("20", "no")
-    assert rows[1][:4] == ("  % of storey", "0.275", "0.262 … 0.288", "0.2592 … 0.3001")
+    assert rows[1][:4] == ("  % of storey", "0.2750", "0.262 … 0.288", "0.2592 … 0.3001")
     assert rows[2][:2] == ("a3, g", "0.2039")
-    assert rows[4][:4] == ("  % of weight", "2", "1 … 3", "1 … 4")
+    assert rows[4][:4] == ("  % of weight", "2.000", "1.00 … 3.00", "1.000 … 4.000")
 
 
 def test_what_drives_the_peak_is_one_line_of_the_largest_shares():
