@@ -213,24 +213,22 @@ def identified(document: Document | None) -> Iterator[str]:
         yield f"mode {mode['mode']}: {words} Hz predicted, measured {where}"
 
 
-def extremes(study: Document) -> list[Row]:
+def extremes(study: Document) -> Table:
     """Least and greatest value of each output at the lowest level, with the error beside them."""
     units = {name: Output(name).unit for name in study["min"]}
     values = ((study[side][x], units[x]) for side in ("min", "max") for x in units)
-    largest, errors, nature = (
-        largest_by_unit(values),
-        study.get("error", {}),
-        nature_of(study["nature"]),
-    )
-    return [
+    largest, nature = largest_by_unit(values), nature_of(study["nature"])
+    error = "gap inside" if nature is Nature.GUARANTEED else "error"
+    rows = [
         (
             name,
             *(
                 engineering(rounded(study[x][name], side, nature), unit, beside=largest[unit])
                 for x, side in (("min", "lower"), ("max", "upper"))
             ),
-            engineering(errors[name], unit, digits=2) if name in errors else "not estimated",
+            engineering(study["error"][name], unit, digits=2),
             str(nature),
         )
         for name, unit in units.items()
     ]
+    return ("output", "least", "greatest", f"{error} up to", "nature"), rows

@@ -180,11 +180,10 @@ class Page:
         periods = ", ".join(f"{2 * math.pi / one:.3g}" for one in omega[:4])
         words = f"First natural periods: {periods} s." if periods else ""
         natures = dict.fromkeys(nature_of(study["nature"]) for study in studies.values())
-        head = ("output", "least", "greatest", "error up to", "nature")
         tables = [
             folded(
                 f"{name}: {study['method']}, fuzzy {', '.join(study['fuzzy'])}",
-                table(head, extremes(study)),
+                table(*extremes(study)),
             )
             for name, study in studies.items()
         ]
