@@ -127,7 +127,7 @@ class StoreyFrame:
             size = np.size(values)
             one = size == 1 and name in ("second_moment", "damping_ratio")
             if name in SYMBOLS and not one and size not in (0, n):
-                raise RefusedError(name, f"a list of {size}", f"one value a floor, {n} from below")
+                raise RefusedError(name, f"a list of {size}", f"{n}, as masses has, from below")
         if self.damper_placement not in ("ground", "storey"):
             raise RefusedError("damper_placement", self.damper_placement, "ground, storey")
 

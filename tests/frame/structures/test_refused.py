@@ -30,7 +30,7 @@ SPRINGS = StoreyFrame((2e4, 1e4), (3.0, 2.5), stiffness=(1e6, 1e6))
         (COLUMNS, {"masses": (2e4, "1 t")}, "masses is '1 t'; allowed: a number, in SI units"),
         (COLUMNS, {"modulus": 0.0}, "modulus is 0; allowed: positive"),
         (COLUMNS, {"modulus": None}, "modulus is missing; allowed: lengths, modulus and"),
-        (COLUMNS, {"lengths": (3.0,)}, "lengths is a list of 1; allowed: one value a floor, 2"),
+        (COLUMNS, {"lengths": (3.0,)}, "lengths is a list of 1; allowed: 2, as masses has"),
         (COLUMNS, {"dampers": (5, -5)}, "dampers is -5; allowed: 0 or greater"),
         (COLUMNS, {"damping_ratio": 1.0}, "damping_ratio is 1; allowed: 0 or greater and below 1"),
         (COLUMNS, {"damping_ratio": (0.1,) * 3}, "damping_ratio is a list of 3"),
