@@ -65,7 +65,7 @@ def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str) -> 
     for end in (lowest["lower"] - error, lowest["upper"] + error):
         axes.plot(time, end, color=look.GREY, lw=0.7, ls="--")
     unit = Output(str(lowest["output"].values)).unit
-    return f", error up to {engineering(float(error.max()), unit, digits=2)} (dashed)"
+    return f", ± {engineering(float(error.max()), unit, digits=2)} (dashed)"
 
 
 def time_axes(axes: Axes, time: Array, output: str) -> None:

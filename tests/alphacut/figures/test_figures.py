@@ -64,7 +64,7 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
         )
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
     assert ends == [-1.25, 1.25][:lines]
-    assert ("error up to 250 mm" in words) == bool(lines)
+    assert ("± 250 mm" in words) == bool(lines)
 
 
 def test_means_of_shares_are_weighted_with_the_width():
