@@ -9,7 +9,7 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 36_812,
+    "lines of the packages": 36_807,
     "files of the packages": 280,
     "places of fmt: skip": 15,
     "places that raise": 431,
