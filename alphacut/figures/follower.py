@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, prefix_axis
+import numpy as np
+
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
-from alphacut.frame.methods.follower_record import FollowerRecord, record_flow
+from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.results import Results
@@ -37,26 +40,43 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     import matplotlib.pyplot as plt
     from matplotlib.lines import Line2D
 
-    walk, output = recorded(results, task)
+    walk, column = recorded(results, task)
+    time, graphs = walk.storage.flow.time, np.array(walk.storage.graphs)[..., column]
+    guess, new = walk.guess[0, :, column], walk.new[0, :, column]  # by node and side
+    lower, upper = graphs.min(0), graphs.max(0)
     drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
     panels = [named[letter] for letter in "12345"]
-    new = [step for step in walk.steps if step.new >= 0]
-    first = [step for step in new if step.node == new[0].node]
-    later = next(
-        (step for step in new if step.node > 0.5 * len(walk.time) and step.guess > 0), new[-1]
-    )
-    base(panels[0], walk, [0], node=first[0].node, last=0)
-    panels[0].plot(walk.time, walk.graphs[0], color=BLUE, lw=1.3)
-    base(panels[1], walk, [0, *(step.new for step in first)], node=first[0].node, last=len(first))
-    base(panels[2], walk, range(later.new + 1), node=later.node, last=1)
-    panels[2].plot(walk.time, walk.graphs[later.guess], color=BLUE, lw=1.3)
-    base(panels[3], walk, range(len(walk.graphs)), node=None, last=0)
-    for local, final in ((walk.local_lower, walk.lower), (walk.local_upper, walk.upper)):
-        panels[3].plot(walk.time, local, color=BLUE, lw=1.0)
-        panels[3].plot(walk.time, final, color=INK, lw=1.3)
-    panels[4].fill_between(walk.time, walk.lower, walk.upper, color=BLUE, alpha=0.2, lw=0)
-    for final in (walk.lower, walk.upper):
-        panels[4].plot(walk.time, final, color=INK, lw=1.3)
+    places = np.argwhere(new >= 0)
+    start = places[0, 0]
+    first = new[start][new[start] >= 0]
+    late = [at for at in places.tolist() if at[0] > 0.5 * len(time) and guess[*at] > 0]
+    later = tuple(late[0] if late else places[-1])
+
+    def base(panel: Axes, shown: Iterable[int], node: int | None, last: int) -> None:
+        """Stored graphs in grey, the newest `last` in orange, and the node under treatment."""
+        rows = list(shown)
+        for index, row in enumerate(rows):
+            fresh = index >= len(rows) - last
+            colour, width = (ORANGE, 1.3) if fresh else (GREY, 0.4)
+            panel.plot(time, graphs[row], color=colour, lw=width)
+        if node is not None:
+            panel.axvline(time[node], color=INK, lw=0.8, ls=":")
+
+    base(panels[0], [0], start, 0)
+    panels[0].plot(time, graphs[0], color=BLUE, lw=1.3)
+    base(panels[1], [0, *first], start, len(first))
+    base(panels[2], range(new[later] + 1), later[0], 1)
+    panels[2].plot(time, graphs[guess[later]], color=BLUE, lw=1.3, label="guess")
+    panels[2].legend(loc="lower right", fontsize=8)
+    base(panels[3], range(len(graphs)), None, 0)
+    nodes = np.arange(len(time))[:, None]
+    seen = np.stack([graphs[guess, nodes], graphs[np.where(new < 0, guess, new), nodes]])
+    for local, final in ((seen[..., 0].min(0), lower), (seen[..., 1].max(0), upper)):
+        panels[3].plot(time, local, color=BLUE, lw=1.0)
+        panels[3].plot(time, final, color=INK, lw=1.3)
+    panels[4].fill_between(time, lower, upper, color=BLUE, alpha=0.2, lw=0)
+    for final in (lower, upper):
+        panels[4].plot(time, final, color=INK, lw=1.3)
     for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
         panel.set_title(
             f"{f'Fig. {20 + number}' if results.is_paper else number}: {title}",
@@ -64,6 +84,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
             fontsize=9,
         )
     panels[4].set_xlabel("time t (s)")
+    output = walk.storage.flow.outputs[column]
     for panel in panels[::2]:
         prefix_axis(panel, output, Output(output).unit)
     lines = [Line2D([], [], label=words, **look) for words, look in LINES.items()]
@@ -71,22 +92,8 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     return drawn
 
 
-def base(
-    panel: Axes, walk: FollowerRecord, graphs: range | list[int], *, node: int | None, last: int
-) -> None:
-    """Stored graphs in grey, the newest `last` of them in orange, and the node under treatment."""
-    shown = list(graphs)
-    for index, graph in enumerate(shown):
-        fresh = index >= len(shown) - last
-        panel.plot(
-            walk.time, walk.graphs[graph], color=ORANGE if fresh else GREY, lw=1.3 if fresh else 0.4
-        )
-    if node is not None:
-        panel.axvline(walk.time[node], color=INK, lw=0.8, ls=":")
-
-
-def recorded(results: Results, task: EnvelopeTask) -> tuple[FollowerRecord, str]:
-    """A run of the Graph Follower that keeps every step, and the output it followed."""
+def recorded(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
+    """A run of the Graph Follower that keeps its graphs, and the column of the output drawn."""
     structure = results.structure
     assert structure is not None
     cuts = boxes(structure.inputs(task.fuzzy), (0.0,))
@@ -101,7 +108,7 @@ def recorded(results: Results, task: EnvelopeTask) -> tuple[FollowerRecord, str]
     output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
         fine = share * task.section.gain * task.tolerance(structure).value
-        walk = record_flow(flow, output=output, tolerance=fine)
-        if any(step.new >= 0 for step in walk.steps):
+        walk = GraphFollower(tolerance=fine, record=True).follow(flow)
+        if (walk.new[0, :, output] >= 0).any():
             break
-    return walk, flow.outputs[output]
+    return walk, output

@@ -22,11 +22,6 @@ def gain(g: Array, H: Array, x: Array) -> Array:
     return np.asarray((slope * x).sum(-1))
 
 
-def linear_maximum(g: Array, lower: Array, upper: Array) -> Array:
-    """The corner that maximises g·x, shape (N, d) (κ = 1)."""
-    return np.where(g > 0, upper, lower)
-
-
 def local_maximum(
     g: Array, H: Array, lower: Array, upper: Array, start: Array | None = None, *, rounds: int = 6
 ) -> Array:
@@ -129,6 +124,6 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
 
 
 def _best_of_starts(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    starts = [np.zeros_like(g), linear_maximum(g, lower, upper)]
+    starts = [np.zeros_like(g), np.where(g > 0, upper, lower)]
     optima = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
     return np.asarray(optima[np.arange(len(g)), gain(g, H, optima).argmax(1)])

@@ -10,41 +10,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.calculus.box_quadratic import gain, linear_maximum, local_maximum
+from alphacut.frame.calculus.box_quadratic import local_maximum
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
 from alphacut.frame.methods.independent import SAFETY, beyond, parted
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-
-
-class FollowerStep(NamedTuple):
-    """Record of one node for one bound (Figs. 21 to 23).
-
-    Args:
-        level: Index of the α-cut.
-        node: Index of the time node.
-        output: Index of the output.
-        side: +1 upper bound, −1 lower bound.
-        guess: Index of the best stored graph, the initial guess.
-        new: Index of the new graph, or −1 when the guess stays.
-        predicted: The bound that the Taylor model promises.
-    """
-
-    level: int
-    node: int
-    output: int
-    side: int
-    guess: int
-    new: int
-    predicted: float
 
 
 @dataclass(eq=False)
@@ -56,16 +34,18 @@ class Followed:
             (−output, output).
         best: Index of the graph that attains each, shape (A, T, m, 2).
         left: What Taylor models still promise at most, same shape.
+        guess: Index of the best stored graph when a node was reached, same shape (Figs. 21 to 23).
+        new: Index of the graph computed there, or −1 where the guess stays, same shape.
         storage: All graphs.
-        steps: The record, where it was asked for.
         exhausted: Whether the budget ended the search.
     """
 
     bounds: Array
     best: Index
     left: Array
+    guess: Index
+    new: Index
     storage: Storage
-    steps: list[FollowerStep] = field(default_factory=list)
     exhausted: bool = False
 
 
@@ -80,8 +60,8 @@ class GraphFollower:
         order: Degree κ of the Taylor models, 1 or 2.
         tolerance: Promised gain above which a new trajectory is computed, in the unit of the first
             output.
-        budget: Most trajectories to compute; None for no limit.
-        record: Keep every step.
+        budget: Most graphs to compute; None for no limit.
+        record: Keep the graphs themselves.
 
     Raises:
         RefusedError: A switch is out of its range.
@@ -132,7 +112,8 @@ class GraphFollower:
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
         levels = len(flow.boxes.alpha)
         shape = (levels, *storage.top.shape)
-        out = Followed(np.empty(shape), np.empty(shape, np.int64), np.zeros(shape), storage)
+        best, guess, new = (np.full(shape, start) for start in (0, 0, -1))
+        out = Followed(np.empty(shape), best, np.zeros(shape), guess, new, storage)
         for done, level in enumerate(reversed(range(levels))):
             self._sweep(out, level, progress, done / levels)
             # post-processing: the best of all graphs at every node (Fig. 24)
@@ -155,34 +136,27 @@ class GraphFollower:
                 out.exhausted = True
                 out.left[level] = np.maximum(promise - storage.top, 0.0)
                 return
-            guess = storage.best[node].flatten()
-            tried, new = self._tried(storage, node, promise, target)
-            if new:
-                won = storage.add(np.array(new))
+            out.guess[level, node] = storage.best[node]
+            points = self._new(out, level, node, promise, target)
+            if points:
+                won = storage.add(np.array(points))
                 ahead = tuple(place[won[0] > node] for place in won)
                 self._ask(storage, ahead, box, promise, target)
-            if self.record:
-                _note(out, level, node, guess, tried)
         limit = self.tolerance * storage.flow.scale[:, None]
         out.left[level] = np.clip(promise - storage.top, 0.0, limit)
 
-    def _tried(
-        self, storage: Storage, node: int, promise: Array, target: Array
-    ) -> tuple[dict[int, tuple[int, float]], list[Array]]:
-        """New graphs for bounds of a node, and what was promised for each, as in `FollowerStep`."""
+    def _new(
+        self, out: Followed, level: int, node: int, promise: Array, target: Array
+    ) -> list[Array]:
+        """Parameters of the new graphs for the bounds of a node."""
+        storage, points = out.storage, list[Array]()
         limit = self.tolerance * storage.flow.scale[:, None]
-        tried: dict[int, tuple[int, float]] = {}
-        new: list[Array] = []
-        for k in np.flatnonzero(promise[node] > storage.top[node] + limit):
-            point = target[node, k // 2, k % 2]
-            fresh = not storage.holds(point) and all(
-                np.abs(point - other).max() > 1e-9 for other in new
-            )
-            graph = len(storage) + len(new) if fresh else -1
-            tried[int(k)] = graph, float(promise[node, k // 2, k % 2])
-            if fresh:
-                new.append(point)
-        return tried, new
+        for place in np.argwhere(promise[node] > storage.top[node] + limit):
+            point = target[node, *place]
+            if not storage.holds(point) and all(np.abs(point - x).max() > 1e-9 for x in points):
+                out.new[level, node, *place] = len(storage) + len(points)
+                points.append(point)
+        return points
 
     def _ask(
         self,
@@ -193,21 +167,6 @@ class GraphFollower:
         target: Array,
     ) -> None:
         """Sets what the Taylor models of the best graphs promise at places, and at which points."""
-        side = 2.0 * places[2] - 1
-        _, first, second = storage.held.models(places)
-        g, H = side[:, None] * first, side[:, None, None] * second
-        at = storage.points[storage.best[places]]
-        low, high = box[0] - at, box[1] - at
-        # optima of eq. 22
-        x = local_maximum(g, H, low, high) if self.order == 2 else linear_maximum(g, low, high)
-        promised = gain(g, H if self.order == 2 else 0 * H, x)
-        promise[places], target[places] = storage.top[places] + promised, np.clip(at + x, *box)
-
-
-def _note(
-    out: Followed, level: int, node: int, guess: Index, tried: dict[int, tuple[int, float]]
-) -> None:
-    for k, best in enumerate(guess):
-        side = 2 * (k % 2) - 1
-        graph, value = tried.get(k, (-1, float("nan")))
-        out.steps.append(FollowerStep(level, node, k // 2, side, int(best), graph, side * value))
+        bend = float(self.order > 1)
+        promise[places], optima = storage.promised(places, box, local_maximum, bend=bend)
+        target[places] = np.clip(optima, *box)

@@ -1,14 +1,15 @@
-"""Storage of computed graphs: parameters, and the best at every place with its derivatives."""
+"""Storage of computed graphs: parameters, and the best at every place with its Taylor model."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.box_quadratic import gain
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.methods.held_models import HeldModels
 
 Index = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 Places = tuple[Array, ...]
@@ -26,7 +27,8 @@ class Storage:
         graphs: They, each of shape (T, m), where they are kept.
         top: The best value at each place.
         best: Which graph has it, the first where several do.
-        held: Derivatives of that graph.
+        first: First derivatives of that graph's output, shape (T, m, 2, d).
+        second: Second ones, shape (T, m, 2, d, d).
         steepest: Largest slope of any graph along a coordinate, shape (m,).
     """
 
@@ -36,21 +38,22 @@ class Storage:
     graphs: list[Array] = field(default_factory=list)
     top: Array = field(init=False)
     best: Index = field(init=False)
-    held: HeldModels = field(init=False)
+    first: Array = field(init=False)
+    second: Array = field(init=False)
     steepest: Array = field(init=False)
 
     def __post_init__(self) -> None:
         d, shape = len(self.flow.boxes.names), (len(self.flow.time), len(self.flow.outputs), 2)
-        self.points, self.top = np.empty((0, d)), np.full(shape, -np.inf)
-        self.steepest = np.zeros(shape[1])
-        self.best, self.held = np.zeros(shape, np.int64), HeldModels.empty(shape, d)
+        self.points, self.steepest = np.empty((0, d)), np.zeros(shape[1])
+        self.top, self.best = np.full(shape, -np.inf), np.zeros(shape, np.int64)
+        self.first, self.second = np.zeros((*shape, d)), np.zeros((*shape, d, d))
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def holds(self, point: Array) -> bool:
-        """True if the graph of `point` is stored."""
-        return bool((np.abs(self.points - point).max(1, initial=0.0) < 1e-9).any())
+    def holds(self, point: Array, near: float = 1e-9) -> bool:
+        """True if the graph of `point` is stored, or one as near."""
+        return bool((np.abs(self.points - point).max(1, initial=0.0) < near).any())
 
     def add(self, points: Array) -> Places:
         """Computes and stores the graphs at unit coordinates (S, d); places where one is best."""
@@ -62,9 +65,38 @@ class Storage:
             better = np.flatnonzero(signed > top)
             top[better], holder[better] = signed[better], s
         won = np.flatnonzero(holder >= 0)
-        self.best.reshape(-1)[won] = len(self) + holder[won]
-        self.held.keep(jet, holder.reshape(self.top.shape))
+        places = np.unravel_index(won, self.top.shape)
+        where = holder[won], *places[:2]
+        self.best[places] = len(self) + holder[won]
+        self.first[places] = np.moveaxis(jet.first, 0, -1)[where]
+        self.second[places] = np.moveaxis(jet.second, (0, 1), (-2, -1))[where]
         self.points = np.vstack([self.points, points])
         if self.record:
             self.graphs += list(jet.value)
-        return np.unravel_index(won, self.top.shape)
+        return places
+
+    def promised(
+        self,
+        places: Places,
+        box: tuple[Array, Array],
+        maximise: Callable[..., Array],
+        *,
+        bend: float = 1.0,
+        reach: Array | float = np.inf,
+    ) -> tuple[Array, Array]:
+        """Optima of the Taylor models of the best graphs at K places (eq. 22).
+
+        Args:
+            places: Where.
+            box: Lower and upper ends of the parameters, each (d,).
+            maximise: Maximum of g·x + x·H·x/2 over boxes, from g, H and their ends.
+            bend: Factor on second derivatives.
+            reach: Distance from each graph's parameters up to which its model is trusted.
+
+        Returns:
+            What they promise, shape (K,), and at which unit coordinates, shape (K, d).
+        """
+        side, at = 2.0 * places[2] - 1, self.points[self.best[places]]
+        g, H = side[:, None] * self.first[places], bend * side[:, None, None] * self.second[places]
+        x = maximise(g, H, np.maximum(box[0] - at, -reach), np.minimum(box[1] - at, reach))
+        return self.top[places] + gain(g, H, x), at + x

@@ -1,6 +1,6 @@
 """Graph Follower in rounds: Taylor models of all nodes propose graphs in batches.
 
-The same idea as `frame.graph_follower` (storage, Taylor models, tolerance, post-processing), turned
+The same idea as `graph_follower` (storage, Taylor models, tolerance, post-processing), turned
 around: instead of one node after the other, every round asks the models of the best graphs at all
 nodes, takes the proposal that promises most in each window of time, and advances these graphs
 together as arrays. Nodes before and after a discovery profit alike, which is what backward sweeps
@@ -16,10 +16,11 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.methods.graph_storage import Places, Storage
 from alphacut.frame.methods.independent import SAFETY, beyond, parted
-from alphacut.frame.methods.pursuit import Pursuit
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, share
 from alphacut.fuzzy.refused import RefusedError
@@ -27,6 +28,10 @@ from alphacut.fuzzy.result import Nature
 
 MOST = 64e6
 """Most numbers of Taylor models computed at a time: 512 MB."""
+TRIES = 40
+"""Proposals looked at per window of time."""
+SPACING = 0.02
+"""Distance in unit coordinates between graphs of one batch."""
 APART = 100_003
 """Points of the sequence between those that two seeds spread."""
 
@@ -75,14 +80,15 @@ class ImprovedFollower:
         better = second.bounds > first.bounds
         bounds = np.where(better, second.bounds, first.bounds)
         where = np.where(better[..., None], second.where, first.where)
-        promised = np.maximum(first.correction, second.correction) + np.maximum(
-            first.open_gain, second.open_gain
-        )
+        limit = self.tolerance * flow.scale[:, None]
+        closed = [np.where(one.left <= limit, one.left, 0.0) for one in (first, second)]
+        open_ = [np.where(one.left > limit, one.left, 0.0) for one in (first, second)]
+        promised = np.maximum(*closed) + np.maximum(*open_)
         apart = around(np.abs(second.bounds - first.bounds).max(-1))
         missed, count = beyond(flow, bounds)
         small = self.tolerance / 2 * flow.scale
         error = SAFETY * (promised.max(-1) + small + apart + missed[:, None])
-        parts = parted(np.maximum(first.steepest, second.steepest), bounds[0])
+        parts = parted(np.maximum(first.storage.steepest, second.storage.steepest), bounds[0])
         notes = (f"stopped at the budget of {self.budget} trajectories",)
         return flow.envelope(
             bounds,
@@ -90,40 +96,103 @@ class ImprovedFollower:
             None if parts else error,
             method=self.name,
             nature=Nature.ATTAINED if parts else Nature.ESTIMATED,
-            evaluations=len(first.points) + len(second.points) + count,
+            evaluations=len(first.storage) + len(second.storage) + count,
             seconds=time.perf_counter() - begun,
             facts={"gain": self.tolerance, "order": 2},
-            notes=notes * bool(first.open_gain.any() or second.open_gain.any()),
+            notes=notes * bool(np.any(open_)),
         )
 
-    def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursuit:
+    def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursued:
         """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
-        levels = len(flow.boxes.alpha)
-        out = Pursuit.empty(flow, self.tolerance, self.reach)
-        d, places = len(flow.boxes.names), len(flow.time) * len(flow.outputs)
+        levels, storage = len(flow.boxes.alpha), Storage(flow)
+        d, places = len(flow.boxes.names), storage.top.size // 2
+        bounds, left = np.zeros((2, levels, *storage.top.shape))
+        out = Pursued(bounds, np.zeros((*bounds.shape, d)), left, storage)
         at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, self.batch))
         for done, level in enumerate(reversed(range(levels))):
-            lower, upper = flow.boxes.unit(level)
-            out.enter(lower, upper)
+            search = _Level(storage, flow.boxes.unit(level), self.tolerance, self.reach)
             limit = self.budget * (done + 1) // levels
-            points = self._start(flow, lower, upper, out)[: max(1, limit - len(out.points))]
+            points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // at_once)):
-                    out.take(chunk)
+                    search.ask(storage.add(chunk))
                 if progress:
-                    progress(min(1.0, len(out.points) / self.budget))
-                points = out.proposals(min(self.batch, limit - len(out.points)))
-            out.leave(level)
+                    progress(min(1.0, len(storage) / self.budget))
+                points = search.proposals(min(self.batch, limit - len(storage)))
+            # post-processing of the level
+            out.bounds[level], out.where[level] = storage.top, storage.points[storage.best]
+            out.left[level] = np.maximum(search.promise - storage.top, 0.0)
         return out
 
-    def _start(self, flow: UnitFlow, lower: Array, upper: Array, out: Pursuit) -> Array:
-        modal = flow.boxes.to_unit(flow.boxes.modal)[None]
+    def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
+        boxes = storage.flow.boxes
+        modal = boxes.to_unit(boxes.modal)[None]
         if not (upper > lower).any():
-            return modal if not len(out.points) else np.zeros((0, len(lower)))
+            return modal[: 0 if len(storage) else 1]
         middle, half = (lower + upper) / 2, (upper - lower) / 2
-        skip = 1 + len(out.points) + APART * self.seed
+        skip = 1 + len(storage) + APART * self.seed
         spread = chebyshev_points(len(lower), self.spread, skip=skip)
         return np.vstack([modal, middle + half * spread])
+
+
+@dataclass(frozen=True, eq=False)
+class Pursued:
+    """Outcome of one pass.
+
+    Args:
+        bounds: Attained bounds of (−output, output), shape (A, T, m, 2).
+        where: Their unit coordinates, shape (A, T, m, 2, d).
+        left: What the models still promise, shape (A, T, m, 2); more than the tolerance where the
+            budget ended the search.
+        storage: All graphs.
+    """
+
+    bounds: Array
+    where: Array
+    left: Array
+    storage: Storage
+
+
+class _Level:
+    """What the models of stored graphs promise in one box, and where."""
+
+    def __init__(
+        self, storage: Storage, box: tuple[Array, Array], tolerance: float, reach: float
+    ) -> None:
+        self.storage, self.box, self.tolerance = storage, box, tolerance
+        self.reach = reach * np.maximum((box[1] - box[0]) / 2, 1e-300)
+        self.promise = storage.top.copy()
+        self.target = np.zeros((*storage.top.shape, len(box[0])))
+        if len(storage):
+            self.ask(np.indices(storage.top.shape).reshape(3, -1))
+
+    def ask(self, places: Places) -> None:
+        """Ask the models that hold the bounds of places about more."""
+        if len(places[0]) and (self.box[1] > self.box[0]).any():
+            few = len(self.box[0]) <= 4
+            optima = self.storage.promised(
+                places, self.box, global_maximum if few else local_maximum, reach=self.reach
+            )
+            self.promise[places], self.target[places] = optima
+
+    def proposals(self, count: int) -> Array:
+        """Most promising points of every window of time, apart from others, (≤ count, d)."""
+        chosen, top = list[Array](), self.storage.top
+        windows = np.array_split(np.arange(len(top)), max(1, min(count, len(top))))
+        for window in windows:
+            gains = (self.promise - top)[window] / self.storage.flow.scale[:, None]
+            for k in np.argsort(-gains, axis=None)[:TRIES]:
+                t, o, side = np.unravel_index(k, gains.shape)
+                place = (window[t], o, side)
+                if gains[t, o, side] <= self.tolerance:
+                    break
+                point = np.clip(self.target[place], *self.box)
+                if self.storage.holds(point, near=1e-7):
+                    self.promise[place] = top[place]  # the model promised too much
+                elif all(np.abs(point - other).max() > SPACING for other in chosen):
+                    chosen.append(point)
+                    break
+        return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
 
 
 def around(apart: Array) -> Array:
