@@ -66,7 +66,6 @@ class Learned:
             "narrowed": dict(after.narrowed),
             "units": {name: of_storey_frame(name).unit for name in after.names},
             "agreement": after.height,
-            "not_learned": [x.words for x in after.directions if not x.learned],
             "held_out": [_predicted(*pair) for pair in self.held],
             "claim": str(after.claim),
         }

@@ -123,7 +123,7 @@ class LagrangianFlow(March):
         d = len(self.names) if derivatives else 0
         tapes = (self._newton, *(self._deep if d else self._plain))
         rest = [x for name, x in self.system.parameters.items() if name not in self.names]
-        inputs = np.hstack([points, np.tile(rest, (len(points), 1))])
+        inputs = np.hstack([points, np.tile(rest, (len(points), 1))]).copy("C")
         lengths = np.array(TRIPLE_JUMP if self.scheme == "composition4" else (1.0,)) * self.step
         nodes = (len(points), len(self.time))
         out = [np.empty((*nodes, *(d,) * order, len(self.outputs))) for order in range(3)]

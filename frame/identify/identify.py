@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
-from alphacut.frame.identify.directions import Direction, directions
-from alphacut.frame.identify.enclosure import Enclosure, enclosure
+from alphacut.frame.identify.enclosure import enclosure
 from alphacut.frame.identify.measured import Measurement
 from alphacut.frame.identify.possibility import Agreement, widest
 from alphacut.frame.identify.samples import walk
@@ -70,7 +69,6 @@ class Identified:
         upper: Upper ends.
         best: Parameters that agree best by least squares, shape (d,).
         height: Possibility of `best`, and the least level whose set is proved empty (1 if none is).
-        directions: Directions of the logarithms of the parameters, most learned first.
     """
 
     agreement: Agreement
@@ -79,7 +77,6 @@ class Identified:
     upper: Array
     best: Array
     height: tuple[float, float]
-    directions: tuple[Direction, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -196,15 +193,13 @@ def identify(
             f" a storey frame with such parameters is refuted (by chance with P <= {levels[0]:g})",
             "widen the priors, or check masses and numbers of modes",
         )
-    last = boxes[-1]
-    boxes += [last] * (len(levels) - len(boxes))
-    best = agreement.best(last.lower, last.upper)
+    boxes += [boxes[-1]] * (len(levels) - len(boxes))
+    best = agreement.best(*boxes[-1])
     point = agreement.chain.nominal * np.exp(best)
     height = float(agreement.possibility(point[None])[0])
-    lower = _outward(np.stack([box.lower for box in boxes]), agreement, -1)
-    upper = _outward(np.stack([box.upper for box in boxes]), agreement, +1)
-    lost = directions(agreement, best)
-    return Identified(agreement, levels, lower, upper, point, (height, empty), lost)
+    lower, upper = (np.stack(side) for side in zip(*boxes, strict=True))
+    ends = _outward(lower, agreement, -1), _outward(upper, agreement, +1)
+    return Identified(agreement, levels, *ends, point, (height, empty))
 
 
 def _refuse(
@@ -232,16 +227,16 @@ def _prior_cut(number: FuzzyNumber, alpha: float, agreement: Agreement) -> Cut:
     return number.cut(agreement.own_level(alpha) if isinstance(number, Claimed) else alpha)
 
 
-def _boxes(agreement: Agreement, levels: Array, passes: int) -> tuple[list[Enclosure], float]:
-    """Boxes of log parameters by level until one is empty, and that level."""
-    boxes: list[Enclosure] = []
-    nominal = agreement.chain.nominal
+def _boxes(
+    agreement: Agreement, levels: Array, passes: int
+) -> tuple[list[tuple[Array, Array]], float]:
+    """Ends of log parameters by level until none agree, and that level."""
+    boxes: list[tuple[Array, Array]] = []
     for level in map(float, levels):
         cuts = [_prior_cut(x, level, agreement) for x in agreement.prior.values()]
-        lower, upper = np.log(np.array(cuts).T / nominal)
+        lower, upper = np.log(np.array(cuts).T / agreement.chain.nominal)
         if boxes:
-            lower = np.maximum(lower, boxes[-1].lower)
-            upper = np.minimum(upper, boxes[-1].upper)
+            lower, upper = np.maximum(lower, boxes[-1][0]), np.minimum(upper, boxes[-1][1])
         modes = [*agreement.measured.cuts(level, agreement.own_level(level))]
         box = None
         if (lower <= upper).all():

@@ -39,11 +39,12 @@ class LinearProgram:
         """Proved lower bound of cᵀx over the set; infinite where the set is proved empty."""
         ends = np.column_stack([self.lower, self.upper])
         result = linprog(objective, A_ub=self.rows, b_ub=self.right, bounds=ends, method="highs")
-        if result.status == 2:
-            return np.inf if self.empty() else self._box(objective)
-        if result.status != 0:
-            return self._box(objective)
-        return self._proved(objective, np.minimum(result.ineqlin.marginals, 0.0))
+        if result.status == 2 and self.empty():
+            return np.inf
+        multipliers = np.zeros(len(self.right))  # which leave the bound over the box
+        if result.status == 0:
+            multipliers = np.minimum(result.ineqlin.marginals, 0.0)
+        return self._proved(objective, multipliers)
 
     def empty(self) -> bool:
         """True if it is proved that no point fulfils all rows."""
@@ -56,9 +57,6 @@ class LinearProgram:
         )
         cost = np.append(np.zeros(len(self.lower)), 1.0)
         return relaxed.least(cost) > 0
-
-    def _box(self, objective: Array) -> float:
-        return self._proved(objective, np.zeros(len(self.right)))
 
     def _proved(self, objective: Array, multipliers: Array) -> float:
         rest = objective - self.rows.T @ multipliers

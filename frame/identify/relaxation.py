@@ -17,6 +17,7 @@ from scipy.sparse import csr_array
 from alphacut.frame.identify.chain import Chain, chain_modes, eigenvalue_ranges
 from alphacut.frame.identify.linear_bounds import LinearProgram
 from alphacut.frame.identify.measured import MeasuredMode, ModeCut
+from alphacut.frame.structures.storey import chain as chain_matrix
 from alphacut.fuzzy.arrays import Array
 
 Linear = dict[int, float]
@@ -121,13 +122,13 @@ class Relaxation:
     parameters: tuple[Linear, ...]
     shapes: Mapping[tuple[int, int], Linear]
 
-    def least(self, expression: Linear, sign: float = 1.0) -> float:
-        """Proved lower bound of sign · expression, without its constant."""
+    def ends(self, expression: Linear) -> tuple[float, float]:
+        """Proved ends of an expression that is not constant."""
         objective = np.zeros(len(self.program.lower))
         for at, a in expression.items():
             if at != CONSTANT:
-                objective[at] = sign * a
-        return self.program.least(objective)
+                objective[at] = a
+        return self.program.least(objective), -self.program.least(-objective)
 
 
 def relaxation(
@@ -146,137 +147,115 @@ def relaxation(
         modes: Measured modes and their cuts at a level.
         amplitudes: Known ends of amplitudes that were not measured, by mode and floor.
     """
-    rows = Rows()
-    logs = [rows.variable(low, high) for low, high in zip(lower, upper, strict=True)]
-    stiffness = [rows.exponential(_sum(logs, powers)) for powers in chain.stiffness_powers]
-    mass = [rows.exponential(_sum(logs, powers)) for powers in chain.mass_powers]
-    least, most = eigenvalue_ranges(chain, lower, upper)
+    over = _Chains(chain, lower, upper)
     shapes: dict[tuple[int, int], Linear] = {}
     for mode, cut in modes:
-        low, high = max(cut.low, least[mode.mode - 1]), min(cut.high, most[mode.mode - 1])
+        low = max(cut.low, over.least[mode.mode - 1])
+        high = min(cut.high, over.most[mode.mode - 1])
         if low > high:
             return None
-        _frequency_rows(rows, chain, stiffness, mass, (lower, upper), (least, most), mode, cut)
-        if mode.reference:
-            ends = _all_amplitudes(rows, chain, stiffness, mass, high, cut)
-            if ends is None:
-                continue
+        over.require_frequency(mode.mode - 1, cut)
+        ends = over.amplitudes(high, cut) if mode.reference else None
+        if ends is not None:
             known = {f: amplitudes.get((mode.mode, f), end) for f, end in ends.items()}
-            shape = {f: rows.variable(*known[f]) for f in sorted(known)}
+            shape = {f: over.rows.variable(*known[f]) for f in sorted(known)}
             shapes |= {(mode.mode, f): shape[f] for f in shape if f not in cut.shape}
-            _shape_rows(rows, chain, stiffness, mass, shape, rows.variable(low / high, 1.0), high)
-    return Relaxation(rows.program(), tuple(logs), shapes)
+            over.require_balance(shape, over.rows.variable(low / high, 1.0), high)
+    return Relaxation(over.rows.program(), tuple(over.logs), shapes)
 
 
-def _sum(logs: list[Linear], powers: Array) -> Linear:
-    result: Linear = {}
-    for log, power in zip(logs, powers, strict=True):
-        if power:
-            result = total(result, log, float(power))
-    return result or {CONSTANT: 0.0}
+class _Chains:
+    """All chains of a box: variables of their stiffnesses and masses, ends of their spectrum."""
 
+    def __init__(self, chain: Chain, lower: Array, upper: Array) -> None:
+        self.chain, self.rows = chain, Rows()
+        self.logs = [self.rows.variable(*ends) for ends in zip(lower, upper, strict=True)]
+        self.stiffness = [self._exponential(powers) for powers in chain.stiffness_powers]
+        self.mass = [self._exponential(powers) for powers in chain.mass_powers]
+        self.least, self.most = eigenvalue_ranges(chain, lower, upper)
+        low, high = chain.ranges(lower, upper)
+        self.low, self.high = np.exp(low), np.exp(high)  # factors of stiffness and mass, (2, n)
 
-def _shape_rows(
-    rows: Rows,
-    chain: Chain,
-    stiffness: list[Linear],
-    mass: list[Linear],
-    shape: Mapping[int, Linear],
-    share: Linear,
-    eigenvalue: float,
-) -> None:
-    """Balance of forces at each floor; λ is `share` of its greatest value `eigenvalue`."""
-    n, unit = len(mass), float(chain.stiffness.mean())
-    below: Linear = {CONSTANT: 0.0}
-    shears = []
-    for z in range(n):
-        drift = total(shape[z + 1], below, -1.0)
-        shears.append(scaled(rows.product(stiffness[z], drift), chain.stiffness[z] / unit))
-        below = shape[z + 1]
-    for z in range(n):
-        inertia = rows.product(share, rows.product(mass[z], shape[z + 1]))
-        force = scaled(inertia, eigenvalue * chain.mass[z] / unit)
-        rows.equal(total(shears[z], shears[z + 1], -1.0) if z + 1 < n else shears[z], force)
+    def _exponential(self, powers: Array) -> Linear:
+        """Factor of a stiffness or mass."""
+        exponent: Linear = {CONSTANT: 0.0}
+        for log, power in zip(self.logs, powers, strict=True):
+            if power:
+                exponent = total(exponent, log, float(power))
+        return self.rows.exponential(exponent)
 
+    def require_balance(
+        self, shape: Mapping[int, Linear], share: Linear, eigenvalue: float
+    ) -> None:
+        """Balance of forces at each floor; λ is `share` of its greatest value `eigenvalue`."""
+        rows, chain, n = self.rows, self.chain, len(self.mass)
+        unit, below = float(chain.stiffness.mean()), {CONSTANT: 0.0}
+        shears = []
+        for z in range(n):
+            drift = total(shape[z + 1], below, -1.0)
+            force = rows.product(self.stiffness[z], drift)
+            shears.append(scaled(force, chain.stiffness[z] / unit))
+            below = shape[z + 1]
+        for z in range(n):
+            inertia = rows.product(share, rows.product(self.mass[z], shape[z + 1]))
+            force = scaled(inertia, eigenvalue * chain.mass[z] / unit)
+            rows.equal(total(shears[z], shears[z + 1], -1.0) if z + 1 < n else shears[z], force)
 
-def _all_amplitudes(
-    rows: Rows,
-    chain: Chain,
-    stiffness: list[Linear],
-    mass: list[Linear],
-    eigenvalue: float,
-    cut: ModeCut,
-) -> dict[int, tuple[float, float]] | None:
-    """Ends of all amplitudes; None where those of floors between measured ones cannot be bounded.
+    def amplitudes(self, eigenvalue: float, cut: ModeCut) -> dict[int, tuple[float, float]] | None:
+        """Ends of all amplitudes; None where those between measured floors cannot be bounded.
 
-    Floors between two measured ones are a chain between moved supports, whose matrix K − λ M is
-    positive definite while λ stays below its own least frequency.
-    """
-    n, amplitudes = len(mass), dict(cut.shape)
-    k = np.array([rows.range(x) for x in stiffness]) * chain.stiffness[:, None]
-    m = np.array([rows.range(x) for x in mass]) * chain.mass[:, None]
-    pins = [0, *sorted(cut.shape)]
-    ends = {0: 0.0} | {floor: float(np.abs(cut.shape[floor]).max()) for floor in cut.shape}
-    for pin, following in zip(pins, [*pins[1:], n + 1], strict=True):
-        floors = list(range(pin + 1, min(following, n + 1)))
-        if not floors:
-            continue
-        size = len(floors)
-        A = np.zeros((size, size))
-        for i, floor in enumerate(floors):
-            A[i, i] = k[floor - 1, 0] - eigenvalue * m[floor - 1, 1]
-            A[i, i] += k[floor, 0] if floor < n else 0.0
-            if i + 1 < size:
-                A[i, i + 1] = A[i + 1, i] = -k[floor, 0]
-        least = float(np.linalg.eigvalsh(A)[0]) * (1 - 1e-12)
-        if least <= 0:
-            return None
-        right = k[pin, 1] * ends[pin]
-        if following <= n:
-            right = float(np.hypot(right, k[following - 1, 1] * ends[following]))
-            if size == 1:
-                right = k[pin, 1] * ends[pin] + k[following - 1, 1] * ends[following]
-        amplitudes |= {floor: (-right / least, right / least) for floor in floors}
-    return amplitudes
+        Floors between two measured ones are a chain between moved supports, whose matrix K − λ M
+        is positive definite while λ stays below its own least frequency.
+        """
+        n, amplitudes = len(self.mass), dict(cut.shape)
+        k = np.array([self.rows.range(x) for x in self.stiffness]) * self.chain.stiffness[:, None]
+        m = np.array([self.rows.range(x) for x in self.mass]) * self.chain.mass[:, None]
+        pins = [0, *sorted(cut.shape)]
+        ends = {0: 0.0} | {floor: float(np.abs(cut.shape[floor]).max()) for floor in cut.shape}
+        for pin, following in zip(pins, [*pins[1:], n + 1], strict=True):
+            floors = np.arange(pin, min(following, n + 1) - 1)  # from 0
+            if not len(floors):
+                continue
+            soft = np.append(k[:, 0], 0.0)[np.append(floors, floors[-1] + 1)]
+            A = chain_matrix(soft[:-1]) - eigenvalue * np.diag(m[floors, 1])
+            A[-1, -1] += soft[-1]
+            least = float(np.linalg.eigvalsh(A)[0]) * (1 - 1e-12)
+            if least <= 0:
+                return None
+            above = k[following - 1, 1] * ends[following] if following <= n else 0.0
+            pulls = k[pin, 1] * ends[pin], above
+            reach = float(sum(pulls) if len(floors) == 1 else np.hypot(*pulls)) / least
+            amplitudes |= {int(floor) + 1: (-reach, reach) for floor in floors}
+        return amplitudes
 
-
-def _frequency_rows(
-    rows: Rows,
-    chain: Chain,
-    stiffness: list[Linear],
-    mass: list[Linear],
-    box: tuple[Array, Array],
-    spectrum: tuple[Array, Array],
-    mode: MeasuredMode,
-    cut: ModeCut,
-) -> None:
-    """Two rows by the Rayleigh quotient of the shape at the middle of the box."""
-    (least, most), k = spectrum, mode.mode - 1
-    below = most[k - 1] if k else -np.inf
-    above = least[k + 1] if k + 1 < len(least) else np.inf
-    low, high = chain.ranges(*box)
-    centre = (np.exp(low) + np.exp(high)) / 2
-    values, vectors = chain_modes(chain.stiffness * centre[0], chain.mass * centre[1])
-    shape, value = vectors[:, k], values[k]
-    drift = np.diff(shape, prepend=0.0)
-    strain, inertia = chain.stiffness * drift**2, chain.mass * shape**2
-    quotient = (
-        float(strain @ np.exp(low[0]) / (inertia @ np.exp(high[1]))),
-        float(strain @ np.exp(high[0]) / (inertia @ np.exp(low[1]))),
-    )
-    if not below < min(least[k], quotient[0]) or not max(most[k], quotient[1]) < above:
-        return
-    half = (np.exp(high) - np.exp(low)) / 2
-    shears = half[0] * np.abs(chain.stiffness * drift)
-    residual = shears + np.append(shears[1:], 0.0) + value * half[1] * np.abs(chain.mass * shape)
-    residual += 1e-12 * value * np.abs(chain.mass * shape) + 1e-13 * np.abs(chain.stiffness).max()
-    size = residual**2 @ (1 / (chain.mass * np.exp(low[1]))) / (inertia @ np.exp(low[1]))
-    over = size / (quotient[0] - below) if k else 0.0
-    under = size / (above - quotient[1])
-    unit = float(inertia.sum() * value)
-    for end, sign in ((cut.low - over, -1.0), (cut.high + under, 1.0)):
-        row: Linear = {}
-        for z in range(len(mass)):
-            row = total(row, stiffness[z], sign * float(strain[z]) / unit)
-            row = total(row, mass[z], -sign * end * float(inertia[z]) / unit)
-        rows.at_most(row, 1e-12)
+    def require_frequency(self, k: int, cut: ModeCut) -> None:
+        """Two rows by the Rayleigh quotient of the shape of mode k at the middle of the box."""
+        chain, low, high = self.chain, self.low, self.high
+        below = self.most[k - 1] if k else -np.inf
+        above = self.least[k + 1] if k + 1 < len(self.least) else np.inf
+        centre, half = (low + high) / 2, (high - low) / 2
+        values, vectors = chain_modes(chain.stiffness * centre[0], chain.mass * centre[1])
+        shape, value = vectors[:, k], values[k]
+        drift = np.diff(shape, prepend=0.0)
+        strain, inertia = chain.stiffness * drift**2, chain.mass * shape**2
+        quotient = (
+            float(strain @ low[0] / (inertia @ high[1])),
+            float(strain @ high[0] / (inertia @ low[1])),
+        )
+        if not below < min(self.least[k], quotient[0]) or not (
+            max(self.most[k], quotient[1]) < above
+        ):
+            return
+        shears, force = half[0] * np.abs(chain.stiffness * drift), np.abs(chain.mass * shape)
+        residual = shears + np.append(shears[1:], 0.0) + value * half[1] * force
+        residual += 1e-12 * value * force + 1e-13 * np.abs(chain.stiffness).max()
+        size = residual**2 @ (1 / (chain.mass * low[1])) / (inertia @ low[1])
+        over = size / (quotient[0] - below) if k else 0.0
+        under = size / (above - quotient[1])
+        unit = float(inertia.sum() * value)
+        for end, sign in ((cut.low - over, -1.0), (cut.high + under, 1.0)):
+            row: Linear = {}
+            for z in range(len(self.mass)):
+                row = total(row, self.stiffness[z], sign * float(strain[z]) / unit)
+                row = total(row, self.mass[z], -sign * end * float(inertia[z]) / unit)
+            self.rows.at_most(row, 1e-12)

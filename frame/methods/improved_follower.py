@@ -164,7 +164,7 @@ class _Level:
         self.promise = storage.top.copy()
         self.target = np.zeros((*storage.top.shape, len(box[0])))
         if len(storage):
-            self.ask(np.indices(storage.top.shape).reshape(3, -1))
+            self.ask(tuple(np.indices(storage.top.shape).reshape(3, -1)))
 
     def ask(self, places: Places) -> None:
         """Ask the models that hold the bounds of places about more."""

