@@ -18,7 +18,6 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.certificate.frontier import Frontier
-from alphacut.frame.certificate.piece import Piece, Problems
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
@@ -95,13 +94,20 @@ class BranchAndBound:
 class Tree:
     """Boxes of one domain and the problems that share them.
 
+    A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
+
     Args:
         model: The modal model.
         lower: Lower ends of the domain, shape (d,).
         upper: Upper ends.
         optima: N problems with their best points, which improve.
-        numbers: Their numbers, see `Problems`, shape (N,).
-        problems: All problems of the model by number; those without a place in `optima` are idle.
+        numbers: Their numbers, shape (N,).
+        remainder: Of quadratic Taylor models over the domain.
+        best: Side × output at the best points so far, of all problems of the model by number; those
+            without a place in `optima` are idle.
+        point: These points, shape (…, d).
+        jets: Value, gradient and Hessian (upper triangle) of the outputs there, shape (…, q).
+        gap: What the bounds may lie above the best values by.
     """
 
     model: ModalModel
@@ -109,7 +115,11 @@ class Tree:
     upper: Array
     optima: Optima
     numbers: Array
-    problems: Problems
+    remainder: Remainder
+    best: Array
+    point: Array
+    jets: Array
+    gap: float
 
     @classmethod
     def of(cls, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float) -> Tree:
@@ -118,8 +128,8 @@ class Tree:
         numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
         remainder, total = Remainder.of(model, lower, upper), 2 * m * len(model.time)
         points, jets = np.zeros((total, d)), np.zeros((total, 1 + d + d * (d + 1) // 2))
-        problems = Problems(model.time, remainder, np.zeros(total), points, jets, gap)
-        tree = cls(model, lower, upper, optima, numbers, problems)
+        of_all = remainder, np.zeros(total), points, jets
+        tree = cls(model, lower, upper, optima, numbers, *of_all, gap)
         tree._renew(np.arange(len(numbers)))
         return tree
 
@@ -127,38 +137,66 @@ class Tree:
         """Boxes and items still open after one examination of all boxes of a frontier."""
 
         def of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
-            return self._piece(frontier, *part).examined(self.problems)
+            return self.examine(frontier, *part)
 
-        if workers == 1:
-            results = list(map(of, frontier.pieces(PIECE)))
-        else:
-            with ThreadPoolExecutor(workers) as pool:
-                results = list(pool.map(of, frontier.pieces(PIECE)))
+        with ThreadPoolExecutor(workers) as pool:
+            results = list(pool.map(of, frontier.pieces(PIECE)))
         code, value, _ = (np.concatenate(part) for part in zip(*results, strict=True))
-        higher = np.flatnonzero(value > self.problems.best[frontier.problem] + HIGHER)
+        higher = np.flatnonzero(value > self.best[frontier.problem] + HIGHER)
         if len(higher):
             self._improve(frontier, higher[np.argsort(value[higher])], value)
         return frontier.children(code)
 
     def proved(self, frontier: Frontier) -> Array:
         """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
-        whole = self.problems.best + self.problems.gap
+        whole = self.best + self.gap
         for part in frontier.pieces(PIECE):
-            bound = self._piece(frontier, *part).examined(self.problems)[2]
+            bound = self.examine(frontier, *part)[2]
             np.maximum.at(whole, frontier.problem[part[1]], bound)
         return whole[self.numbers]
 
+    def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
+        """Codes, side × output at the centres and upper bounds of some items; see `kernel`."""
+        from alphacut.frame.certificate.kernel import examine  # Numba takes time to import
+
+        model, over, d = self.model, self.remainder, len(self.lower)
+        n, m = model.count, len(model.outputs)
+        centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
+        box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
+        node, column = np.divmod(problem, 2 * m)
+        fresh = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
+        begin = np.flatnonzero(fresh)  # of rows, each a box at a node
+        row_box, row_node = box[begin], node[begin]
+        jets = model.together.jets(centre).swapaxes(0, 1)  # (q, B, n + P n m)
+        rate, share = jets[..., :n], jets[..., n:].reshape(*jets.shape[:2], -1, n, m)
+        waves = np.stack([np.stack(w, 1) for w in model.waves(rate[0, row_box], row_node)], 1)
+        starts = np.searchsorted(row_box, np.arange(len(centre) + 1)), np.append(begin, len(box))
+        flat = [x.reshape(d**order, -1) for order, x in enumerate(over.share)]
+        bounds = over.tensor, over.margin, over.rate[2].reshape(d * d, -1)
+        bounds += over.rate[3].reshape(d**3, -1), flat[0][0], *flat[1:]
+        shares, rates = _in_planes(share[0, :, 0]), _in_planes(rate[1 : 1 + d].swapaxes(0, 1))
+        outcome: tuple[Array, Array, Array] = examine(
+            (*starts, row_node, column),
+            (centre, radius, edges, _tables(rate, share, d), shares, rates),
+            _in_planes(waves).reshape(len(begin), -1),
+            model.time,
+            tuple(np.ascontiguousarray(x, float) for x in bounds),
+            (self.best, self.point, self.jets),
+            self.gap,
+            model.load is None,
+        )
+        return outcome
+
     def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
         """Take over the centres of items, the best last, and refine them."""
-        place = np.zeros(len(self.problems.best), np.int64)
+        place = np.zeros(len(self.best), np.int64)
         place[self.numbers] = np.arange(len(self.numbers))
         which = place[frontier.problem[items]]
         centre = frontier.geometry(self.lower, self.upper)[0]
         self.optima.point[which] = centre[frontier.box[items]]
         self.optima.value[which] = value[items]
         which = np.unique(which)
-        small = self.problems.gap / 100
-        refine(self.model, self.optima, which, self.lower, self.upper, small)
+        refine(self.model, self.optima, which, self.lower, self.upper, self.gap / 100)
         self._renew(which)
 
     def _renew(self, which: Array) -> None:
@@ -167,26 +205,35 @@ class Tree:
         point = optima.point[which]
         f, g, H = self.model.at(point, optima.node[which], optima.output[which])
         row, column = np.triu_indices(g.shape[1])
-        self.problems.best[own], self.problems.point[own] = optima.value[which], point
-        self.problems.jets[own] = np.column_stack([f, g, H[:, row, column]])
+        self.best[own], self.point[own] = optima.value[which], point
+        self.jets[own] = np.column_stack([f, g, H[:, row, column]])
 
-    def _piece(self, frontier: Frontier, boxes: slice, items: slice) -> Piece:
-        """Boxes and items of a frontier with their derivatives and waves."""
-        outputs = len(self.model.outputs)
-        centre, radius, edges = frontier.take(boxes).geometry(self.lower, self.upper)
-        box, problem = frontier.box[items] - boxes.start, frontier.problem[items]
-        node, column = np.divmod(problem, 2 * outputs)
-        fresh = np.append(True, (np.diff(box) != 0) | (np.diff(node) != 0))
-        begin = np.flatnonzero(fresh)
-        row_box, row_node = box[begin], node[begin]
-        jets, started = self.model.together.jets(centre), self.model.started
-        rows, count = np.searchsorted(row_box, np.arange(len(centre) + 1)), self.model.count
-        forced = self._forced(jets[:, 0, :count], row_box, row_node)
-        place = centre, radius, edges, rows, np.append(begin, len(box))
-        return Piece(*place, row_node, column, jets, count, started, forced)
 
-    def _forced(self, rate: Array, box: Array, node: Array) -> Array | None:
-        """Waves under a load of boxes `box` (R,) with eigenvalues (B, n) at nodes, (R, 3, n)."""
-        if (load := self.model.load) is None:
-            return None
-        return np.stack(load.response(rate[box], node), 1)
+def _tables(rate: Array, C: Array, d: int) -> Array:
+    """Factors of waves in values, gradients and Hessians, shape (B, m, 6 P n, q).
+
+    Along the third axis are all parts, orders of the waves and modes, each with its real and its
+    imaginary part.
+
+    Args:
+        rate: Eigenvalues with derivatives, shape (q, B, n).
+        C: Shares of the motion's P parts likewise, shape (q, B, P, n, m).
+        d: Number of parameters.
+    """
+    rate = rate[..., None, :, None]
+    out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
+    out[:, :, 0] = np.moveaxis(C, 0, -1)
+    for i in range(d):
+        out[:, :, 1, ..., 1 + i] = C[0] * rate[1 + i]
+    for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
+        x, y = rate[1 + i], rate[1 + j]
+        out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
+        out[:, :, 2, ..., a] = C[0] * x * y
+    both = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
+    flat = both.reshape(len(out), -1, *out.shape[-2:])
+    return np.ascontiguousarray(flat.swapaxes(1, 2))
+
+
+def _in_planes(x: Array) -> Array:
+    """Complex numbers as pairs of reals along a last axis."""
+    return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)

@@ -40,18 +40,17 @@ class Frontier:
     def __len__(self) -> int:
         return len(self.box)
 
-    def take(self, boxes: slice) -> Frontier:
-        """Some of the boxes without their items."""
-        return Frontier(self.place[boxes], self.box[:0], self.problem[:0])
-
-    def geometry(self, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+    def geometry(
+        self, lower: Array, upper: Array, boxes: slice = slice(None)
+    ) -> tuple[Array, Array, Array]:
         """Centres and radii (B, d) in the domain, and which faces are its own (B, 2, d)."""
-        inner = np.maximum(self.place, 1)
+        place = self.place[boxes]
+        inner = np.maximum(place, 1)
         width = 2.0 ** -np.floor(np.log2(inner + 0.5))  # share of the domain
         begin = inner * width - 1
-        ends = [self.place == LOWER, self.place == UPPER]
+        ends = [place == LOWER, place == UPPER]
         share = np.select(ends, [0.0, 1.0], begin + width / 2)
-        radius = np.where(self.place < 0, 0.0, (upper - lower) / 2 * width)
+        radius = np.where(place < 0, 0.0, (upper - lower) / 2 * width)
         return (
             lower + (upper - lower) * share,
             radius,

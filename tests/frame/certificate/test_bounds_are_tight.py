@@ -111,12 +111,12 @@ def test_boxes_given_up_within_the_gap_are_in_the_bound() -> None:
 
 def least_closed(tree: Tree) -> np.ndarray:
     """Of each problem the least target below which its whole box is closed, shape (N,)."""
-    frontier, bounds = Frontier.whole(len(tree.lower), tree.numbers), tree.problems
-    piece = tree._piece(frontier, slice(0, 1), slice(0, len(frontier)))
-    low, high = (np.full(len(bounds.best), end) for end in (-2.5, 2.5))
+    frontier = Frontier.whole(len(tree.lower), tree.numbers)
+    low, high = (np.full(len(tree.best), end) for end in (-2.5, 2.5))
     for _ in range(30):
         target = (low + high) / 2
-        code = piece.examined(replace(bounds, best=target, gap=0.0))[0]
+        aimed = replace(tree, best=target, gap=0.0)
+        code = aimed.examine(frontier, slice(0, 1), slice(0, len(frontier)))[0]
         low, high = np.where(code, target, low), np.where(code, high, target)
     return high
 
