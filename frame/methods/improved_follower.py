@@ -154,7 +154,7 @@ class Pursued:
 
 
 class _Level:
-    """What the models of stored graphs promise in one box, and where."""
+    """Promises of the models of stored graphs in one box, and their places."""
 
     def __init__(
         self, storage: Storage, box: tuple[Array, Array], tolerance: float, reach: float
