@@ -10,12 +10,7 @@ import numpy as np
 from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
 from alphacut.frame.checks.admissible import require_admissible
 from alphacut.frame.checks.between_nodes import with_stray
-from alphacut.frame.checks.step_error import (
-    require_stable,
-    step_error,
-    step_error_at_bounds,
-    with_step_error,
-)
+from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Integrator, Midpoint
@@ -94,7 +89,6 @@ def envelope(
     steps = step_error(over)
     with showing(progress) as tick:
         bounds = way.run(over, tick)
-    steps = step_error_at_bounds(bounds, over, steps)
     bounds = _judged(with_step_error(bounds, over, steps), over, way)
     bounds = with_stray(bounds, over)
     return _on_levels(bounds, boxes(inputs, alpha).alpha, which)

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import singledispatch
 
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.checks.step_error import probes
-from alphacut.frame.dynamics.flow import Flow, LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.arrays import Array
 
-PARTS, MOST = 4, 64
-"""Parts of a step that are looked at in a linear structure; a general one is looked at halfway."""
 AT_ONCE = 16
 """Trajectories that are held at once."""
-PHASE = 0.8
-"""Most phase in rad that the fastest mode takes in a part, up to the most parts."""
 SAFETY = 1.5
 """Factor on the largest stray of the trajectories looked at."""
 FLOOR = 0.1
@@ -57,28 +49,10 @@ def stray(flow: Flow, points: Array) -> Array:
 
 def _off(flow: Flow, points: Array) -> Array:
     """Largest distance of trajectories from straight lines in each step, shape (T − 1, m)."""
-    fine, parts = _finer(flow, points)
+    finer, parts = flow.finer()
+    fine = finer.values(points)
     ends = fine[:, ::parts]
     share = (np.arange(1, parts) / parts)[:, None]
     inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
     straight = ends[:, :-1, None] * (1 - share) + ends[:, 1:, None] * share
     return np.asarray(np.abs(inner - straight).max((0, 2)))
-
-
-@singledispatch
-def _finer(flow: Flow, points: Array) -> tuple[Array, int]:
-    """Trajectories at nodes a part of a step apart, shape (S, parts (T − 1) + 1, m), and parts."""
-    return flow.values(points), 1
-
-
-@_finer.register
-def _(flow: LinearFlow, points: Array) -> tuple[Array, int]:
-    turn = float(frequencies(flow.system)[-1]) * flow.step
-    parts = int(np.clip(np.ceil(turn / PHASE), PARTS, MOST))
-    finer = replace(flow, step=flow.step / parts, integrator=Exact())
-    return finer.values(points), parts
-
-
-@_finer.register
-def _(flow: LagrangianFlow, points: Array) -> tuple[Array, int]:
-    return flow.halved().values(points), 2

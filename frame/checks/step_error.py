@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import singledispatch
 
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
-from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.dynamics.nonlinear import SCHEMES, LagrangianFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.modes import state_matrix
@@ -55,9 +52,9 @@ def step_error(flow: UnitFlow) -> Array:
     Raises:
         StepError: A scheme has left the motion.
     """
-    if exact(flow.flow):
+    if flow.flow.exact:
         return np.zeros((len(flow.time), len(flow.outputs)))
-    values, error = deviations(flow.flow, probes(flow.boxes))
+    values, error = flow.flow.deviations(probes(flow.boxes))
     so_far: Array = np.maximum.accumulate(error.max(0), axis=0)
     peak = np.abs(values).max((0, 1))
     for name, reached, least in zip(flow.outputs, so_far[-1], peak, strict=True):
@@ -65,51 +62,6 @@ def step_error(flow: UnitFlow) -> Array:
             what = f"step: its error, {reached:.2g}, passes the peak of {name}, {least:.2g}"
             raise StepError(what, "take a smaller step")
     return MARGIN * so_far
-
-
-def step_error_at_bounds(of: Envelope, flow: UnitFlow, steps: Array) -> Array:
-    """Errors of a linear scheme from the points at which bounds are reached besides, (T, m).
-
-    A structure may resonate between the corners, and the scheme at other parameters than the truth.
-
-    Args:
-        of: The envelope of the scheme's trajectories.
-        flow: These trajectories.
-        steps: From `step_error`, shape (T, m).
-    """
-    if exact(flow.flow) or not isinstance(flow.flow, LinearFlow):
-        return steps
-    at, d = np.stack([of.lower_at, of.upper_at]), len(of.parameters)
-    peaks = np.abs([of.lower, of.upper]).argmax(2)[:, :, None, :, None]
-    highest = np.take_along_axis(at, peaks, 2).reshape(-1, d)
-    others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
-    points = np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0)
-    _, error = deviations(flow.flow, points)
-    return np.asarray(np.maximum(steps, MARGIN * np.maximum.accumulate(error.max(0), axis=0)))
-
-
-def exact(flow: Flow) -> bool:
-    """True if trajectories have no error but rounding."""
-    return isinstance(flow, LinearFlow) and isinstance(flow.integrator, Exact)
-
-
-@singledispatch
-def deviations(flow: Flow, points: Array) -> tuple[Array, Array]:
-    """More accurate trajectories at `points` (S, d), and the flow's errors, (S, T, m)."""
-    values = flow.values(points)
-    return values, np.zeros_like(values)
-
-
-@deviations.register
-def _(flow: LinearFlow, points: Array) -> tuple[Array, Array]:
-    truth = replace(flow, integrator=Exact()).values(points)
-    return truth, np.abs(flow.values(points) - truth)
-
-
-@deviations.register
-def _(flow: LagrangianFlow, points: Array) -> tuple[Array, Array]:
-    fine, gain = flow.halved().values(points)[:, ::2], 2.0 ** SCHEMES[flow.scheme]
-    return fine, np.abs(flow.values(points) - fine) * gain / (gain - 1)
 
 
 def with_step_error(of: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
@@ -120,20 +72,28 @@ def with_step_error(of: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
         flow: These trajectories.
         steps: From `step_error`, shape (T, m).
     """
+    if isinstance(flow.flow, LinearFlow) and not flow.flow.exact:
+        steps = np.maximum(steps, _at_bounds(of, flow.flow))
     alike = [unit == flow.units[flow.reference] for unit in flow.units]
     error, basis = of.error + steps, of.basis
     if steps.any():
-        basis = (*basis, f"{scheme_of(flow.flow)} steps of {flow.time[1]:g} s")
+        basis = (*basis, f"{flow.flow.method} steps of {flow.time[1]:g} s")
     facts = {"step_error": float(steps[:, alike].max()), **of.facts}
     facts["estimated_error"] = float((error / flow.scale).max())
     return replace(of, error=error, basis=basis, facts=facts)
 
 
-def scheme_of(flow: Flow) -> str:
-    """Name of the time stepping."""
-    return (
-        flow.integrator.name if isinstance(flow, LinearFlow) else str(getattr(flow, "scheme", ""))
-    )
+def _at_bounds(of: Envelope, flow: LinearFlow) -> Array:
+    """Errors of a linear scheme from some points at which bounds are reached, (T, m).
+
+    A structure may resonate between the corners, and the scheme at other parameters than the truth.
+    """
+    at, d = np.stack([of.lower_at, of.upper_at]), len(of.parameters)
+    peaks = np.abs([of.lower, of.upper]).argmax(2)[:, :, None, :, None]
+    highest = np.take_along_axis(at, peaks, 2).reshape(-1, d)
+    others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
+    _, error = flow.deviations(np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0))
+    return np.asarray(MARGIN * np.maximum.accumulate(error.max(0), axis=0))
 
 
 def require_stable(flow: Flow, cuts: Boxes) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NoReturn, Protocol
+from typing import NoReturn
 
 import numpy as np
 
@@ -14,31 +14,8 @@ from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
-from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate
+from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, frequencies
 from alphacut.fuzzy.refused import FailedError, RefusedError
-
-
-class Flow(Protocol):
-    """Maps parameter sets to trajectories of the outputs."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The uncertain parameters, in the order of the columns of `points`."""
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-
-    @property
-    def time(self) -> Array:
-        """Nodes t_j, shape (T,), in s."""
-
-    def values(self, points: Array) -> Array:
-        """Trajectories at `points` (S, d), shape (S, T, outputs)."""
-
-    def taylor(self, points: Array) -> Jet:
-        """Trajectories with internal first and second derivatives, V = (S, T, outputs)."""
-
 
 MOST_NODES = 10_000_000
 """Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
@@ -62,6 +39,10 @@ def nodes(duration: float, step: float) -> Array:
     return np.arange(count + 1) * step
 
 
+PARTS, MOST = 4, 64
+"""Parts of a step that are looked at in a linear structure."""
+PHASE = 0.8
+"""Most phase in rad that the fastest mode takes in a part, up to the most parts."""
 WITHIN = "keep the parameters where the motion exists, such as positive masses"
 
 
@@ -69,13 +50,41 @@ class StepError(FailedError):
     """A step of the integrator did not converge."""
 
 
-class March(ABC):
-    """Base of flows that march from node to node."""
+class Flow(ABC):
+    """Base of mappings from parameter sets to trajectories of the outputs, node by node.
+
+    Args:
+        names: The uncertain parameters, in the order of the columns of points.
+        duration: Length of the simulation, in s.
+        step: Length of a step, in s.
+    """
 
     names: tuple[str, ...]
-
     duration: float
     step: float
+
+    @property
+    @abstractmethod
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+
+    @property
+    @abstractmethod
+    def method(self) -> str:
+        """Name of the time stepping."""
+
+    @property
+    def exact(self) -> bool:
+        """True if trajectories have no error but rounding."""
+        return False
+
+    @abstractmethod
+    def finer(self) -> tuple[Flow, int]:
+        """More accurate trajectories at nodes a part of a step apart, and how many parts."""
+
+    @abstractmethod
+    def deviations(self, points: Array) -> tuple[Array, Array]:
+        """More accurate trajectories at points (S, d), and the errors of these, (S, T, m)."""
 
     @cached_property
     def time(self) -> Array:
@@ -135,7 +144,7 @@ class March(ABC):
 
 
 @dataclass(frozen=True)
-class LinearFlow(March):
+class LinearFlow(Flow):
     """Trajectories of a linear structure by a one-step method.
 
     Args:
@@ -164,14 +173,35 @@ class LinearFlow(March):
         """Names of the observed quantities."""
         return self.system.outputs
 
+    @property
+    def method(self) -> str:
+        """Name of the time stepping."""
+        return self.integrator.name
+
+    @property
+    def exact(self) -> bool:
+        """True if trajectories have no error but rounding."""
+        return isinstance(self.integrator, Exact)
+
+    def finer(self) -> tuple[LinearFlow, int]:
+        """Exact trajectories at nodes a part of a step apart, and how many parts."""
+        turn = float(frequencies(self.system)[-1]) * self.step
+        parts = int(np.clip(np.ceil(turn / PHASE), PARTS, MOST))
+        return replace(self, step=self.step / parts, integrator=Exact()), parts
+
+    def deviations(self, points: Array) -> tuple[Array, Array]:
+        """Exact trajectories at points (S, d), and the errors of these, (S, T, m)."""
+        truth = replace(self, integrator=Exact()).values(points)
+        return truth, np.abs(self.values(points) - truth)
+
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        exact, ground = isinstance(self.integrator, Exact), self.system.ground
+        ground = self.system.ground
         h, steps = self.step, len(self.time) - 1
         start = concatenate([matrices.q0, matrices.v0], -2)
         if ground is None:
             step_map, load = self.integrator.step_map(matrices, h), None
-        elif exact:
+        elif self.exact:
             step_map, load = exact_response(matrices, ground, step=h, steps=steps)
         else:
             step_map = self.integrator.step_map(matrices, h)

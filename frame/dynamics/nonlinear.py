@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
-from alphacut.frame.dynamics.flow import March, StepError, nodes
+from alphacut.frame.dynamics.flow import Flow, StepError, nodes
 from alphacut.frame.structures.lagrangian import Equations, LagrangianSystem
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
@@ -26,7 +26,7 @@ Expressions = tuple[list[Any], list[Any], list[Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class LagrangianFlow(March):
+class LagrangianFlow(Flow):
     """Trajectories of a general system.
 
     Args:
@@ -61,12 +61,25 @@ class LagrangianFlow(March):
         """Names of the observed quantities."""
         return self.system.outputs
 
-    def halved(self) -> LagrangianFlow:
-        """The same with half the step; what is compiled is shared."""
+    @property
+    def method(self) -> str:
+        """Name of the time stepping."""
+        return self.scheme
+
+    def finer(self) -> tuple[LagrangianFlow, int]:
+        """The same with half the step, which is 2 parts; what is compiled is shared."""
         fine = replace(self, step=self.step / 2)
         shared = ("_newton", "_plain")
         fine.__dict__.update({name: getattr(self, name) for name in shared})
-        return fine
+        return fine, 2
+
+    def deviations(self, points: Array) -> tuple[Array, Array]:
+        """Trajectories of half the step at points (S, d), and the errors of these, (S, T, m).
+
+        The distance from half the step is extrapolated by the scheme's order.
+        """
+        fine, gain = self.finer()[0].values(points)[:, ::2], 2.0 ** SCHEMES[self.scheme]
+        return fine, np.abs(self.values(points) - fine) * gain / (gain - 1)
 
     @cached_property
     def _symbols(self) -> tuple[list[Any], list[Any]]:

@@ -15,7 +15,7 @@ import numpy as np
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.checks.between_nodes import stray
-from alphacut.frame.checks.step_error import MARGIN, deviations, exact
+from alphacut.frame.checks.step_error import MARGIN
 from alphacut.frame.dynamics.flow import Flow, LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.dynamics.nonlinear import LagrangianFlow
@@ -159,9 +159,9 @@ def _flow(
 
 def _off(flow: Flow, points: Array) -> Array:
     """Error of trajectories with a margin, from those at some points, shape (T, m)."""
-    if exact(flow):
+    if flow.exact:
         return np.zeros((len(flow.time), len(flow.outputs)))
-    return MARGIN * np.maximum.accumulate(deviations(flow, points)[1].max(0), axis=0)
+    return MARGIN * np.maximum.accumulate(flow.deviations(points)[1].max(0), axis=0)
 
 
 def _tried(cuts: Boxes, level: int, spread: int) -> Array:

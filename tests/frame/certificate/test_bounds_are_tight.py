@@ -14,7 +14,7 @@ from alphacut.frame.certificate.frontier import Frontier
 from alphacut.frame.certificate.kernel import stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
 from alphacut.frame.certificate.wave_bounds import _convolved, _largest, parts
-from alphacut.frame.checks.step_error import MARGIN, deviations, step_error
+from alphacut.frame.checks.step_error import MARGIN, step_error
 from alphacut.frame.dynamics.spectral import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
@@ -197,7 +197,7 @@ def test_an_error_of_time_stepping_does_not_fall_after_it_was_seen() -> None:
     frame = StoreyFrame((1.0,), (1.0,), 1 / 24, 1.0, q0=(1.0,))
     flow = LinearFlow(frame, ("E",), 40.0, 0.5, Midpoint())
     cuts = boxes({"E": Interval(0.999 / 24, 1.001 / 24)}, (0,))
-    raw = deviations(flow, cuts.modal[None])[1][0]
+    raw = flow.deviations(cuts.modal[None])[1][0]
     error = step_error(UnitFlow(flow, cuts))
     assert (np.diff(raw, axis=0) < 0).any()
     assert (np.diff(error, axis=0) >= 0).all()
