@@ -13,8 +13,8 @@ from alphacut.frame.checks.between_nodes import with_stray
 from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import INTEGRATORS, Exact, Integrator, Midpoint
-from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.dynamics.integrators import Exact, Integrator
+from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.graph_follower import GraphFollower
@@ -154,25 +154,13 @@ def _flow(
 ) -> UnitFlow:
     """The trajectories over the boxes of the inputs."""
     cuts = boxes(inputs, alpha)
-    flow: LagrangianFlow | LinearFlow
-    if isinstance(model, LagrangianSystem):
-        flow = LagrangianFlow(model, cuts.names, *nodes, str(integrator or "midpoint"))
-    else:
-        flow = LinearFlow(model, cuts.names, *nodes, _integrator(integrator, way))
+    if integrator is None:
+        proves = isinstance(way, Auto | Proof | DualProof | Search)
+        integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
+    flow = flow_of(model, cuts.names, *nodes, integrator)
     require_admissible(model, cuts)
     require_stable(flow, cuts)
     return UnitFlow(flow, cuts, relative)
-
-
-def _integrator(value: str | Integrator | None, way: Method) -> Integrator:
-    """The time stepping of a linear structure."""
-    if value is None:
-        return Exact() if isinstance(way, Auto | Proof | DualProof | Search) else Midpoint()
-    if not isinstance(value, str):
-        return value
-    if value not in INTEGRATORS:
-        raise RefusedError("integrator", value, ", ".join(INTEGRATORS))
-    return INTEGRATORS[value]
 
 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:

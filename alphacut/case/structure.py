@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from alphacut.frame import INTEGRATORS, LinearFlow, StoreyFrame
+from alphacut.frame import StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
-from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
@@ -88,7 +88,4 @@ class Structure:
         self, names: Sequence[str], duration: float, step: float, integrator: str | None = None
     ) -> Flow:
         """Trajectories as a function of parameters, by the midpoint rule by default."""
-        scheme, model = integrator or "midpoint", self.model
-        if isinstance(model, LagrangianSystem):
-            return LagrangianFlow(model, tuple(names), duration, step, scheme)
-        return LinearFlow(model, tuple(names), duration, step, INTEGRATORS[scheme])
+        return flow_of(self.model, names, duration, step, integrator or "midpoint")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,8 +11,10 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
-from alphacut.frame.dynamics.flow import Flow, StepError, nodes
+from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError, nodes
+from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.structures.lagrangian import Equations, LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
@@ -144,6 +147,27 @@ class LagrangianFlow(Flow):
             what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
         return Jet(out[0], np.moveaxis(out[1], 2, 0), np.moveaxis(out[2], (2, 3), (0, 1)))
+
+
+def flow_of(
+    model: LinearSystem | LagrangianSystem,
+    names: Sequence[str],
+    duration: float,
+    step: float,
+    integrator: str | Integrator = "midpoint",
+) -> Flow:
+    """Trajectories of any structure.
+
+    Raises:
+        RefusedError: The structure has no such parameter or integrator.
+    """
+    if isinstance(model, LagrangianSystem):
+        return LagrangianFlow(model, tuple(names), duration, step, str(integrator))
+    if isinstance(integrator, str):
+        if integrator not in INTEGRATORS:
+            raise RefusedError("integrator", integrator, ", ".join(INTEGRATORS))
+        integrator = INTEGRATORS[integrator]
+    return LinearFlow(model, tuple(names), duration, step, integrator)
 
 
 def variational(eq: Equations, own: list[Any], rest: list[Any]) -> Expressions:

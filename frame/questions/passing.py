@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peaks, require_limits
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 
 ANY = "any of them"
@@ -66,8 +65,7 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
     Raises:
         RefusedError: There is no limit, one is not positive, or it names no output.
     """
-    if not limits:
-        raise RefusedError("limits", None, "one limit or more, as {'q3': 0.1}")
+    require_limits(limits, peaks.outputs)
     each = {name: _one(peaks, name, float(limit)) for name, limit in limits.items()}
     if len(each) > 1:
         each[ANY] = _any(each, limits)
@@ -75,17 +73,12 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
 
 
 def _one(peaks: Peaks, output: str, limit: float) -> Passing:
-    if not limit > 0:
-        raise RefusedError(f"limit of {output}", limit, "a positive number")
     most, least, alpha = peaks.most(output), peaks.least(output), peaks.alpha
     possible = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
-    kept = (
-        _highest(alpha, np.broadcast_to(least.upper <= limit, alpha.shape)),
-        _excluded(alpha, least.lower > limit),
-    )
-    margin = limit - np.stack([most.upper, np.maximum(least.lower, 0.0)], axis=1)
-    necessary = 1 - kept[1], 1 - kept[0]
-    nature = peaks.natures[peaks.column(output)]
+    keeps = np.broadcast_to(least.upper <= limit, alpha.shape)
+    kept = _highest(alpha, keeps), _excluded(alpha, least.lower > limit)
+    margin = limit - np.stack([most.upper, least.lower], axis=1)
+    necessary, nature = (1 - kept[1], 1 - kept[0]), peaks.nature([output])
     return Passing(possible, necessary, margin, float(alpha[0]), nature)
 
 

@@ -7,6 +7,7 @@ so that a peak is as sure as its envelope; what the steps between nodes may add 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,24 +41,14 @@ class Peaks:
     reached: Array
     natures: tuple[Nature, ...]
 
-    def column(self, output: str) -> int:
-        """Index of an output.
-
-        Raises:
-            RefusedError: There is no such output.
-        """
-        if output not in self.outputs:
-            raise RefusedError("output", output, ", ".join(self.outputs))
-        return self.outputs.index(output)
-
     def most(self, output: str) -> Ends:
         """Ends between which the greatest peak in each cut lies; infinite where nothing excludes.
 
         Attained bounds exclude nothing: a motion that was not looked at may peak higher.
         """
-        k = self.column(output)
+        k = self.outputs.index(output)
         attained = self.natures[k] is Nature.ATTAINED
-        above = np.full(len(self.alpha), np.inf) if attained else self._above[:, k]
+        above = self.upper[:, k] + (np.inf if attained else self.error[:, k])
         return Ends(self.reached[:, k], above)
 
     def least(self, output: str) -> Ends:
@@ -65,14 +56,15 @@ class Peaks:
 
         Each cut holds the highest one, none of whose motions peaks above its greatest.
         """
-        k = self.column(output)
-        attained = self.natures[k] is Nature.ATTAINED
-        below = np.maximum(self.lower[:, k] - self.error[:, k], 0.0)
-        return Ends(np.zeros_like(below) if attained else below, self.most(output).upper[-1:])
+        k = self.outputs.index(output)
+        known = self.natures[k] is not Nature.ATTAINED
+        below = known * np.maximum(self.lower[:, k] - self.error[:, k], 0.0)
+        return Ends(below, self.most(output).upper[-1:])
 
-    @property
-    def _above(self) -> Array:
-        return self.upper + self.error
+    def nature(self, outputs: Iterable[str]) -> Nature:
+        """Weakest nature of some outputs' bounds."""
+        each = [self.natures[self.outputs.index(name)] for name in outputs]
+        return min(each, key=list(Nature).index)
 
 
 def peaks(envelope: Envelope) -> Peaks:
@@ -110,3 +102,18 @@ def within_steps(size: Array, between: Array | None) -> Array:
     out = size.copy()
     out[..., 1:, :] = np.maximum(size[..., 1:, :], size[..., :-1, :]) + between[1:]
     return out
+
+
+def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
+    """Refuse limits that are none, or not of these outputs.
+
+    Raises:
+        RefusedError: There is no limit, one is not positive, or it names no output.
+    """
+    if not limits:
+        raise RefusedError("limits", None, "one limit or more, as {'q3': 0.1}")
+    for name, limit in limits.items():
+        if name not in outputs:
+            raise RefusedError("limits", name, ", ".join(outputs))
+        if not limit > 0:
+            raise RefusedError(f"limit of {name}", limit, "a positive number")

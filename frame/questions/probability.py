@@ -16,11 +16,9 @@ from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.frame.checks.between_nodes import stray
 from alphacut.frame.checks.step_error import MARGIN
-from alphacut.frame.dynamics.flow import Flow, LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.dynamics.nonlinear import LagrangianFlow
+from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.questions.passing import ANY
-from alphacut.frame.questions.peaks import within_steps
+from alphacut.frame.questions.peaks import require_limits, within_steps
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
@@ -100,18 +98,22 @@ def probabilities(
         RefusedError: A parameter is both fuzzy and random, a limit is not positive or names no
             output, or a random parameter does not give `samples` finite values.
     """
-    sizes, columns = _limits(model, limits)
+    require_limits(limits, model.outputs)
     if both := sorted(set(fuzzy) & set(random)):
         raise RefusedError("random", ", ".join(both), "inputs that are not fuzzy as well")
     drawn = [_drawn(name, draw, rng, samples) for name, draw in random.items()]
     draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
     cuts = boxes(fuzzy, alpha)
-    flow = _flow(model, (*cuts.names, *random), duration, step)
+    scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
+    flow = flow_of(model, (*cuts.names, *random), duration, step, scheme)
     tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
     points = np.concatenate(tried)
     looked_at = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
-    between, off = stray(flow, few), _off(flow, few)
+    between, off = stray(flow, few), np.zeros((len(flow.time), len(flow.outputs)))
+    if not flow.exact:
+        off = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
+    columns, sizes = [list(model.outputs).index(x) for x in limits], np.array([*limits.values()])
     shares = []  # peaks over their limits: at least, at most, at most within steps
     for count, point in enumerate(points, start=1):
         size = np.abs(flow.values(np.hstack([np.tile(point, (len(draws), 1)), draws])))
@@ -122,24 +124,10 @@ def probabilities(
     every = np.moveaxis(np.array(shares), 1, 0)  # (three, points, draws, limits)
     level = np.repeat(np.arange(len(tried)), [len(some) for some in tried])
     events = [*np.moveaxis(every, -1, 0)] + ([every.max(-1)] if len(limits) > 1 else [])
-    scales = [*sizes, 1.0]
     return {
         name: _probability(event, level, cuts.alpha, scale, spreads=bool(random))
-        for name, event, scale in zip((*limits, ANY), events, scales, strict=False)
+        for name, event, scale in zip((*limits, ANY), events, (*sizes, 1.0), strict=False)
     }
-
-
-def _limits(
-    model: LinearSystem | LagrangianSystem, limits: Mapping[str, float]
-) -> tuple[Array, list[int]]:
-    """The limits, shape (L,), and the columns of their outputs."""
-    for name, limit in limits.items():
-        if name not in model.outputs:
-            raise RefusedError("limits", name, ", ".join(map(str, model.outputs)))
-        if not limit > 0:
-            raise RefusedError(f"limit of {name}", limit, "a positive number")
-    outputs = list(model.outputs)
-    return np.array([*limits.values()], float), [outputs.index(name) for name in limits]
 
 
 def _drawn(name: str, draw: Sampler, rng: np.random.Generator, samples: int) -> Array:
@@ -147,21 +135,6 @@ def _drawn(name: str, draw: Sampler, rng: np.random.Generator, samples: int) -> 
     if values.shape != (samples,) or not np.isfinite(values).all():
         raise RefusedError(f"values of {name}", values.shape, f"{samples} finite numbers")
     return values
-
-
-def _flow(
-    model: LinearSystem | LagrangianSystem, names: tuple[str, ...], duration: float, step: float
-) -> Flow:
-    if isinstance(model, LagrangianSystem):
-        return LagrangianFlow(model, names, duration, step)
-    return LinearFlow(model, names, duration, step, Exact())
-
-
-def _off(flow: Flow, points: Array) -> Array:
-    """Error of trajectories with a margin, from those at some points, shape (T, m)."""
-    if flow.exact:
-        return np.zeros((len(flow.time), len(flow.outputs)))
-    return MARGIN * np.maximum.accumulate(flow.deviations(points)[1].max(0), axis=0)
 
 
 def _tried(cuts: Boxes, level: int, spread: int) -> Array:

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from alphacut.frame.methods.auto import Auto
 from alphacut.frame.propagation import envelope
-from alphacut.frame.questions.peaks import Peaks, peaks
+from alphacut.frame.questions.peaks import Peaks, peaks, require_limits
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
@@ -66,7 +68,6 @@ def tolerances(
     *,
     duration: float,
     step: float,
-    method: str | None = None,
     most: float = 2.0,
     precision: float = 0.01,
     error: float = 1e-3,
@@ -80,7 +81,6 @@ def tolerances(
         limits: Largest magnitude allowed by output, in SI units.
         duration: Length of the motion, in s.
         step: Distance of nodes, in s.
-        method: Name of the method of the envelopes, auto unless given; it takes a tolerance.
         most: Largest scale that is tried.
         precision: Distance of both scales, relative to `most`, at which the search ends.
         error: Error of the peaks that is aimed at, as a share of each.
@@ -92,22 +92,14 @@ def tolerances(
     """
     if not (most > 0 and 0 < precision < 1):
         raise RefusedError("most and precision", (most, precision), "above 0; above 0 and below 1")
+    require_limits(limits, model.outputs)
+    motion = {"duration": duration, "step": step}
+    bounds = partial(envelope, model, **motion, alpha=[0.0], method=Auto(error), relative=True)
     tried: dict[float, _Step] = {}
 
     def step_at(scale: float) -> _Step:
         numbers = scaled(inputs, scale)
-        bounds = envelope(
-            model,
-            numbers,
-            duration=duration,
-            step=step,
-            alpha=[0.0],
-            method=method or "auto",
-            relative=True,
-            tolerance=error,
-            progress=False,
-        )
-        tried[scale] = _judged(peaks(bounds), limits)
+        tried[scale] = _judged(peaks(bounds(numbers, progress=False)), limits)
         if progress:
             progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
@@ -120,10 +112,9 @@ def tolerances(
     if clear is not None and passed < np.inf:
         clear = _halved(lambda scale: not step_at(scale).passed, clear, passed, near)
         passed = min(scale for scale, one in tried.items() if one.passed)
-    supports = {name: (x.support.lower, x.support.upper) for name, x in scaled(inputs, low).items()}
+    supports = {name: tuple(number.support) for name, number in scaled(inputs, low).items()}
     best = tried[low]
-    kept = low if best.kept else None
-    return Tolerances(kept, clear, passed, supports, best.nature, len(tried))
+    return Tolerances(low if best.kept else None, clear, passed, supports, best.nature, len(tried))
 
 
 class _Step(NamedTuple):
@@ -135,10 +126,10 @@ class _Step(NamedTuple):
 
 
 def _judged(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
-    ends = {name: peaks.most(name) for name in limits}
-    nature = min((peaks.natures[peaks.column(x)] for x in limits), key=list(Nature).index)
-    kept = all(ends[name].upper[0] <= limit for name, limit in limits.items())
-    return _Step(kept, any(ends[x].lower[0] > limit for x, limit in limits.items()), nature)
+    ends = [(peaks.most(name), limit) for name, limit in limits.items()]
+    kept = all(most.upper[0] <= limit for most, limit in ends)
+    passed = any(most.lower[0] > limit for most, limit in ends)
+    return _Step(kept, passed, peaks.nature(limits))
 
 
 def _halved(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
