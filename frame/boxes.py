@@ -104,25 +104,13 @@ class Boxes:
         """Physical points of unit coordinates (…, d), never outside the widest box."""
         return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
-    def in_unit(self, jet: Jet, *, anew: bool = True) -> Jet:
-        """Derivatives by the unit coordinates from those by the physical parameters.
-
-        Args:
-            jet: The latter.
-            anew: Whether its arrays stay as they are.
-        """
+    def in_unit(self, jet: Jet) -> Jet:
+        """A jet whose derivatives by the physical parameters become those by unit coordinates."""
         shape, r = (1,) * jet.value.ndim, self.radius
-        return Jet(
-            jet.value,
-            np.multiply(jet.first, r.reshape(-1, *shape), out=None if anew else jet.first),
-            np.multiply(
-                jet.second,
-                (r[:, None] * r).reshape(len(r), len(r), *shape),
-                out=None if anew else jet.second,
-            )
-            if len(jet.second)
-            else jet.second,
-        )
+        jet.first[:] *= r.reshape(-1, *shape)
+        if len(jet.second):
+            jet.second[:] *= (r[:, None] * r).reshape(len(r), len(r), *shape)
+        return jet
 
     def unit(self, level: int) -> tuple[Array, Array]:
         """Lower and upper ends of a level in unit coordinates."""
@@ -214,7 +202,7 @@ class UnitFlow:
 
     def taylor(self, unit: Array) -> Jet:
         """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
-        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)), anew=False)
+        return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))
 
     def envelope(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, log
 
 import numpy as np
@@ -17,7 +17,7 @@ from alphacut.frame.modal.analyses import analyse, needed_modes
 from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.modes import ModalError, Modes, require_single
+from alphacut.frame.structures.modes import ModalError, Modes, joined, require_single
 
 MANY = 6
 """Number of parameters up to which polynomials may replace trajectories; beyond, they only guide
@@ -53,13 +53,17 @@ def fit_modes(
     held = _held_out(d)
     truth, scale = flow.values(boxes.to_physical(held)), np.asarray(scale)
     allowed = tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:])
-    samples, best = _Samples(flow, boxes, needed_modes(flow, boxes, allowed, energy=energy)), None
-    reached: list[float] = []
+    chosen = needed_modes(flow, boxes, allowed, energy=energy)
+    best: ModalModel | None = None
+    known, reached = list[Modes](), list[float]()
     for degree in range(2, 13 if d <= MANY else 3):
         points = fit_points(d, degree)
         if len(held) + len(points) > budget or terms(d, degree) > MOST_TERMS:
             break
-        model = samples.fitted(points, degree)
+        count = sum(len(some.eigenvalue.value) for some in known)
+        if count < len(points):  # the points of lower degrees are among them
+            known.append(analyse(flow, boxes, points[count:], chosen))
+        model = _fitted(flow, boxes, points, joined(known), degree, chosen)
         error = np.abs(model.values(held) - truth).max(0)
         reached.append(float((error / scale).max()))
         if best is None or reached[-1] < (best.error / scale).max():
@@ -100,25 +104,6 @@ def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) ->
     )
 
 
-@dataclass(eq=False)
-class _Samples:
-    """Eigen-analyses at the points of rising degrees, each made once: the points are nested."""
-
-    flow: LinearFlow
-    boxes: Boxes
-    chosen: Array
-    known: Modes | None = None
-
-    def fitted(self, points: Array, degree: int) -> ModalModel:
-        """The model of a degree from analyses at `points`."""
-        count = 0 if self.known is None else self.known.eigenvalue.value.shape[0]
-        if count < len(points):
-            fresh = analyse(self.flow, self.boxes, points[count:], self.chosen)
-            self.known = fresh if self.known is None else self.known.joined(fresh)
-        assert self.known is not None
-        return _fitted(self.flow, self.boxes, points, self.known, degree, self.chosen)
-
-
 def fit_points(d: int, degree: int) -> Array:
     """Points of analysis for a total degree in d variables, shape (S, d)."""
     data = 1 + d + d * (d + 1) // 2
@@ -135,26 +120,27 @@ def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
     """
     unit = fit_points(len(model.boxes.names), model.degree)
     own = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
-    flat = (
-        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, own.load)
-    )
-    free, forced = (fit(unit, jet, model.degree) for jet in flat)
-    return free, forced
+    return _shares(unit, own, model.degree)
 
 
 def _fitted(
     flow: LinearFlow, boxes: Boxes, points: Array, own: Modes, degree: int, chosen: Array
 ) -> ModalModel:
-    flat = [
-        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, own.load)
-    ]
-    rate = fit(points, own.eigenvalue, degree)
-    ground, load = flow.system.ground, None
+    rate, ground, load = fit(points, own.eigenvalue, degree), flow.system.ground, None
+    free, forced = _shares(points, own, degree)
     if ground is not None:
-        load = LoadTables(ground, flow.time, rate, fit(points, flat[1], degree))
-    share = fit(points, flat[0], degree)
+        load = LoadTables(ground, flow.time, rate, forced)
     nothing = np.zeros((len(flow.time), len(flow.outputs)))
-    return ModalModel(flow, boxes, rate, share, load, chosen, own.of, nothing, 0)
+    return ModalModel(flow, boxes, rate, free, load, chosen, own.of, nothing, 0)
+
+
+def _shares(points: Array, own: Modes, degree: int) -> tuple[Polynomial, Polynomial]:
+    """Polynomials of what the initial state puts into n modes' m rows, and what the ground does."""
+    flat = (
+        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, own.load)
+    )
+    free, forced = (fit(points, jet, degree) for jet in flat)
+    return free, forced
 
 
 def _held_out(d: int) -> Array:

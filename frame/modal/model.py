@@ -112,7 +112,7 @@ class ModalModel:
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
         if self.load is not None and self.flow.system.ground is not None:
             steps = len(time) - 1
-            waves += responses(rate, self.flow.system.ground, self.flow.step, steps)
+            waves.append(responses(rate, self.flow.system.ground, self.flow.step, steps))
         shares = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
         wave = np.concatenate(waves, -1)
         return np.asarray(2 * (wave.real @ shares.real - wave.imag @ shares.imag))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,14 +45,15 @@ class Modes:
     load: Jet
     of: int
 
-    def joined(self, other: Modes) -> Modes:
-        """Those of both sets of parameters."""
-        return Modes(
-            concatenate([self.eigenvalue, other.eigenvalue], -2),
-            concatenate([self.coefficient, other.coefficient], -3),
-            concatenate([self.load, other.load], -3),
-            self.of,
-        )
+
+def joined(parts: Sequence[Modes]) -> Modes:
+    """Those of several sets of parameters."""
+    return Modes(
+        concatenate([part.eigenvalue for part in parts], -2),
+        concatenate([part.coefficient for part in parts], -3),
+        concatenate([part.load for part in parts], -3),
+        parts[0].of,
+    )
 
 
 def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
