@@ -47,47 +47,38 @@ class Enclosed:
     boxes: int
 
 
-@dataclass(frozen=True)
-class BranchAndBound:
-    """The enclosure and its effort.
+def enclosed(
+    model: ModalModel,
+    lower: Array,
+    upper: Array,
+    optima: Optima,
+    *,
+    gap: float,
+    budget: float = 4000,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Enclosed:
+    """Encloses all problems of `optima`, whose points are the best known so far.
 
     Args:
+        model: The modal model.
+        lower: Lower ends of the box, shape (d,).
+        upper: Upper ends.
+        optima: The problems with their best points.
         gap: Wanted difference between proved and attained bound, in units of the outputs.
         budget: Most boxes per problem on average; where it ends, the gap reported is wider.
+        workers: Threads; the result does not depend on their number.
+        progress: Called with the fraction done.
     """
-
-    gap: float = 5e-7
-    budget: float = 4000
-
-    def run(
-        self,
-        model: ModalModel,
-        lower: Array,
-        upper: Array,
-        optima: Optima,
-        *,
-        workers: int = 1,
-        progress: Progress | None = None,
-    ) -> Enclosed:
-        """Encloses all problems of `optima`, whose points are the best known so far.
-
-        Args:
-            model: The modal model.
-            lower: Lower ends of the box, shape (d,).
-            upper: Upper ends.
-            optima: The problems with their best points.
-            workers: Threads; the result does not depend on their number.
-            progress: Called with the fraction done.
-        """
-        tree = Tree.of(model, lower, upper, optima, self.gap)
-        frontier, size, used = Frontier.whole(len(lower), tree.numbers), len(tree.numbers), 0
-        while len(frontier) and used + len(frontier) <= self.budget * size:
-            used += len(frontier)
-            frontier = tree.examined(frontier, workers)
-            if progress:
-                progress(1 - len(np.unique(frontier.problem)) / size)
-        proved = tree.proved(frontier)  # what the budget left open keeps its own bound
-        return Enclosed(optima.point, optima.value, proved, used)
+    tree = Tree.of(model, lower, upper, optima, gap)
+    frontier, size, used = Frontier.whole(len(lower), tree.numbers), len(tree.numbers), 0
+    while len(frontier) and used + len(frontier) <= budget * size:
+        used += len(frontier)
+        frontier = tree.examined(frontier, workers)
+        if progress:
+            progress(1 - len(np.unique(frontier.problem)) / size)
+    proved = tree.proved(frontier)  # what the budget left open keeps its own bound
+    return Enclosed(optima.point, optima.value, proved, used)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.certificate.branch_and_bound import BranchAndBound, Enclosed
+from alphacut.frame.certificate.branch_and_bound import Enclosed, enclosed
 from alphacut.frame.certificate.remainder import Remainder, largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import parts
 from alphacut.frame.modal.first_pass import first_optima
 from alphacut.frame.modal.model import ModalModel
+from alphacut.fuzzy.progress_bar import Progress, share
 
 LEFT = 0.02
 """Share of the gap that Newton's method may leave."""
@@ -55,7 +55,7 @@ def certify(
     scale: Array | None = None,
     workers: int = 1,
     budget: float = 4000,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Certificate:
     """Encloses the bounds of all levels, the narrowest first.
 
@@ -83,44 +83,32 @@ def certify(
             f"certify: the gap {gap:.3g} is not above twice the model error, {limit:.3g}; ask"
             " for a wider gap or a lower tolerance"
         )
-    levels, enclosed = len(model.boxes.alpha), list[Enclosed]()
-    for done, level in enumerate(reversed(range(levels))):
-        share = None if progress is None else (lambda x, done=done: progress((done + x) / levels))
-        within = enclosed[-1] if enclosed else None
-        method = BranchAndBound(slack, budget)
-        enclosed.append(_level(model, level, within, method, workers=workers, progress=share))
+    levels, done = len(model.boxes.alpha), list[Enclosed]()
+    for level in reversed(range(levels)):
+        tick = share(progress, len(done) / levels, (len(done) + 1) / levels)
+        lower, upper = model.boxes.unit(level)
+        optima = first_optima(model, lower, upper, LEFT * slack)
+        if done:  # what the level inside attains is attained here too
+            kept = done[-1].value > optima.value
+            optima.value[kept], optima.point[kept] = done[-1].value[kept], done[-1].point[kept]
+        how = {"gap": slack, "budget": budget}
+        done.append(enclosed(model, lower, upper, optima, **how, workers=workers, progress=tick))
     shape = (levels, *error.shape, 2)
-    inner = np.stack([part.value for part in enclosed[::-1]]).reshape(shape)
-    outer = np.stack([part.proved for part in enclosed[::-1]]).reshape(shape)
+    inner, outer, at = (
+        np.stack([getattr(part, name) for part in done[::-1]]).reshape(*shape, *extra)
+        for name, extra in (("value", ()), ("proved", ()), ("point", (len(model.boxes.names),)))
+    )
     # what holds on a wider box holds on those inside it
     outer = np.minimum.accumulate(outer, axis=0) + error[..., None]
     between = _between(model) + _growth(model, error)
     return Certificate(
         (inner - (error + rounding)[..., None]) * unit,
-        np.stack([part.point for part in enclosed[::-1]]).reshape(*shape, -1),
+        at,
         outer * unit,
         between * scale,
-        sum(part.boxes for part in enclosed),
+        sum(part.boxes for part in done),
         scale,
     )
-
-
-def _level(
-    model: ModalModel,
-    level: int,
-    within: Enclosed | None,
-    method: BranchAndBound,
-    *,
-    workers: int,
-    progress: Callable[[float], None] | None,
-) -> Enclosed:
-    """Bounds of one level; what the level inside it attains is attained here too."""
-    lower, upper = model.boxes.unit(level)
-    optima = first_optima(model, lower, upper, LEFT * method.gap)
-    if within is not None:
-        kept = within.value > optima.value
-        optima.value[kept], optima.point[kept] = within.value[kept], within.point[kept]
-    return method.run(model, lower, upper, optima, workers=workers, progress=progress)
 
 
 def _between(model: ModalModel) -> Array:
@@ -135,20 +123,20 @@ def _between(model: ModalModel) -> Array:
     kink = np.zeros_like(curve)
     ground = model.flow.system.ground
     for part in parts(model, growth):
-        share = suprema(part.share, reach)[0].reshape(model.count, -1)
+        size = suprema(part.share, reach)[0].reshape(model.count, -1)
         wave = part.waves[0].copy()
         if part.forced and ground is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
             # within a step a wave is at most exp(|g| h) times what it is at the end
             wave *= np.exp(np.maximum(-growth, 0.0) * h)
-            size, slope, jump = ground.extremes
+            most, slope, jump = ground.extremes
             together = Polynomial(
                 part.share.index,
                 2 * part.share.coefficients.reshape(-1, model.count, curve.shape[1]).sum(1).real,
             )
-            curve += 2 * size * rate @ share + slope * suprema(together, reach)[0]
+            curve += 2 * most * rate @ size + slope * suprema(together, reach)[0]
             kink += jump * suprema(together, reach)[0]
         wave[1:] = np.maximum(wave[1:], wave[:-1])
-        curve += 2 * (wave * rate**2) @ share
+        curve += 2 * (wave * rate**2) @ size
     stray: Array = h**2 / 8 * curve + h / 4 * kink
     stray[0] = 0.0
     return stray

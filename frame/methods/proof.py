@@ -97,20 +97,36 @@ class Proof:
         parts: list[tuple[Boxes, Certificate]] = []
         for done, (boxes, model, error, gap) in enumerate(modelled):
             tick = share(progress, done / len(modelled), (done + 1) / len(modelled))
-            parts.append((boxes, self._certified(flow, model, error, gap, tick)))
-        analyses = sum(model.analyses for _, model, _, _ in modelled)
-        degree = max(model.degree for _, model, _, _ in modelled)
-        worst = max(float((error / flow.scale).max()) for _, _, error, _ in modelled)
-        envelope = _joined(flow, parts)
+            how = {"workers": self.workers or os.cpu_count() or 1, "budget": self.boxes}
+            proof = certify(
+                model, gap=gap, model_error=error, scale=flow.scale, **how, progress=tick
+            )
+            parts.append((boxes, proof))
+        inner, outer, at = _united(flow, parts)
+        error = (outer - inner).max(-1)
         facts = {
-            "model_error": worst,
-            "degree": degree,
-            "gap": float((envelope.error / flow.scale).max()),
+            "model_error": max(float((error / flow.scale).max()) for _, _, error, _ in modelled),
+            "degree": max(model.degree for _, model, _, _ in modelled),
+            "gap": float((error / flow.scale).max()),
             "boxes": sum(proof.boxes for _, proof in parts),
             "parts": len(parts),
         }
-        spent = time.perf_counter() - begun
-        return replace(envelope, evaluations=analyses, seconds=spent, facts=facts)
+        envelope = flow.envelope(
+            outer,
+            at,
+            error,
+            method=self.name,
+            nature=Nature.GUARANTEED,
+            evaluations=sum(model.analyses for _, model, _, _ in modelled),
+            seconds=time.perf_counter() - begun,
+            facts=facts,
+        )
+        return replace(
+            envelope,
+            basis=("the equations of motion hold",),
+            inner=Ends(-inner[..., 0], inner[..., 1]),
+            between=np.max([proof.between for _, proof in parts], axis=0),
+        )
 
     def _modelled(
         self, linear: LinearFlow, flow: UnitFlow, gaps: tuple[float, ...]
@@ -168,19 +184,6 @@ class Proof:
             "narrower or fewer fuzzy inputs, or a wider gap, can be proved",
         )
 
-    def _certified(
-        self, flow: UnitFlow, model: ModalModel, error: Array, gap: float, tick: Progress
-    ) -> Certificate:
-        return certify(
-            model,
-            gap=gap,
-            model_error=error,
-            scale=flow.scale,
-            workers=self.workers or os.cpu_count() or 1,
-            budget=self.boxes,
-            progress=tick,
-        )
-
 
 def _linear(flow: UnitFlow) -> LinearFlow:
     """The exact motion of a linear structure.
@@ -203,8 +206,8 @@ def _linear(flow: UnitFlow) -> LinearFlow:
     return linear
 
 
-def _joined(flow: UnitFlow, parts: list[tuple[Boxes, Certificate]]) -> Envelope:
-    """The union over parts; those that a level does not reach have fewer levels."""
+def _united(flow: UnitFlow, parts: list[tuple[Boxes, Certificate]]) -> tuple[Array, Array, Array]:
+    """Attained bounds and proved ones of the union, and where; some parts have fewer levels."""
     levels, d = len(flow.boxes.alpha), len(flow.boxes.names)
     shape = (levels, len(flow.time), len(flow.outputs), 2)
     inner, outer, at = np.full(shape, -np.inf), np.full(shape, -np.inf), np.zeros((*shape, d))
@@ -212,22 +215,6 @@ def _joined(flow: UnitFlow, parts: list[tuple[Boxes, Certificate]]) -> Envelope:
         own = slice(0, len(boxes.alpha))
         better = proof.bounds > inner[own]
         inner[own][better] = proof.bounds[better]
-        at[own][better] = boxes.to_physical(proof.at)[better]
+        at[own][better] = flow.boxes.to_unit(boxes.to_physical(proof.at))[better]
         outer[own] = np.maximum(outer[own], proof.outer)
-    return Envelope(
-        alpha=flow.boxes.alpha,
-        time=flow.time,
-        outputs=flow.outputs,
-        inputs=flow.boxes.inputs,
-        lower=-outer[..., 0],
-        upper=outer[..., 1],
-        lower_at=at[..., 0, :],
-        upper_at=at[..., 1, :],
-        error=(outer - inner).max(-1),
-        nature=Nature.GUARANTEED,
-        method=Proof.name,
-        units=flow.units,
-        basis=("the equations of motion hold",),
-        inner=Ends(-inner[..., 0], inner[..., 1]),
-        between=np.max([proof.between for _, proof in parts], axis=0),
-    )
+    return inner, outer, at
