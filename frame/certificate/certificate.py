@@ -11,8 +11,8 @@ from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.branch_and_bound import Enclosed, enclosed
 from alphacut.frame.certificate.remainder import Remainder, largest_growth, suprema
 from alphacut.frame.certificate.wave_bounds import parts
-from alphacut.frame.modal.first_pass import first_optima
 from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.modal.newton import first_optima
 from alphacut.fuzzy.progress_bar import Progress, share
 
 LEFT = 0.02

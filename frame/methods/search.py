@@ -3,10 +3,10 @@
 1. The polynomials of the modes' eigenvalues and shares that `Proof` uses; with more inputs than six
    they are quadratics, whose error does not matter: they only lead.
 2. First pass: a sample of the box starts Newton's method for every bound (node, output, side) on
-   the polynomials; what is best at one node is tried at the nodes around.
+   the polynomials.
 3. Exact motions: Newton's method goes on from there with values and gradients of eigen-analyses at
    the points themselves, so that every bound is attained. The curvature is that of the polynomials,
-   corrected by what the gradients show.
+   corrected by what the gradients show. What is best at one node is tried at the nodes around.
 4. Independent passes: for bounds drawn anew, fresh points, none of them from a pass before, start
    Newton's method on exact motions. What they find beyond the bounds is taken over, and tried at
    the nodes around. Passes go on until two after each other gain too little.
@@ -29,10 +29,9 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.exact_response import ExactResponse
-from alphacut.frame.modal.first_pass import exchange, first_optima
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.newton import refine
+from alphacut.frame.modal.newton import first_optima, refine
 from alphacut.frame.modal.optima import Optima, Response, best_of, fresh_points, trajectories
 from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
@@ -56,6 +55,8 @@ DRAWN = 1024
 FEW = (1, 8)
 """Fresh points out of which the best starts, beside the best of all: the best of many lies too
 often at a corner."""
+SHIFTS = (1, 2, 4, 8, 16)
+"""Distances of the nodes that try each other's points."""
 ROUNDS = 6
 """Rounds in which neighbours are tried, at most."""
 ROUGH = 0.3
@@ -124,15 +125,15 @@ class Search:
             "model_error": float((model.error / flow.scale).max()),
             "search_error": float((missed / scale).max()),
         }
-        cost = {"evaluations": model.analyses, "seconds": time.perf_counter() - begun}
         return flow.envelope(
             bounds,
             at,
             None if rough else error,
             method=self.name,
             nature=Nature.ATTAINED if rough else Nature.ESTIMATED,
+            evaluations=model.analyses,
+            seconds=time.perf_counter() - begun,
             facts=facts,
-            **cost,
         )
 
     def _level(
@@ -146,7 +147,8 @@ class Search:
     ) -> tuple[Optima, Array]:
         """Optima in a box, and what they may miss, shape (N,)."""
         optima = first_optima(_polynomials(way), lower, upper, SMALL * tolerance)
-        every, grid = np.arange(len(optima.value)), _grid(way, optima)
+        every = np.arange(len(optima.value))
+        grid = every.reshape(len(way.time), -1)  # node by node
         box = lower, upper, SMALL * tolerance
         if isinstance(way, ExactResponse):
             optima.value[:] = -np.inf
@@ -163,7 +165,7 @@ class Search:
         for count in range(self.passes):
             before = optima.value.copy()
             rng = np.random.default_rng((self.seed, count, len(every)))
-            self._pass(way, optima, box, DRAWN * 2**count, rng)
+            self._pass(way, optima, grid, box, DRAWN * 2**count, rng)
             gains.append((optima.value - before).reshape(len(grid), -1))
             tick(0.5 + 0.5 * (1 - 0.6 ** (count + 1)))
             if count and max(gain.max() for gain in gains[-2:]) <= QUIET * tolerance:
@@ -174,12 +176,13 @@ class Search:
         self,
         way: Response,
         optima: Optima,
+        grid: Rows,
         box: tuple[Array, Array, float],
         count: int,
         rng: np.random.Generator,
     ) -> None:
         """Solve `count` bounds anew from fresh points, and follow what is better."""
-        grid, m = _grid(way, optima), len(way.outputs)
+        m = len(way.outputs)
         size = int(np.clip(VALUES / (len(grid) * m), 64, FRESH))
         pool = fresh_points(rng, *box[:2], size)
         nodes = np.sort(rng.permutation(len(grid))[: max(1, count // (2 * m))])
@@ -205,22 +208,32 @@ def _polynomials(way: Response) -> ModalModel:
     return way.model if isinstance(way, ExactResponse) else way
 
 
-def _grid(way: Response, optima: Optima) -> Rows:
-    """Numbers of all bounds, node by node."""
-    return np.arange(len(optima.value)).reshape(len(way.time), -1)
-
-
 def _follow(
     way: Response, optima: Optima, grid: Rows, box: tuple[Array, Array, float], fresh: Mask
 ) -> None:
     """Try at every node what is fresh near by, and refine it, until nothing improves."""
     for _ in range(ROUNDS):
-        better = exchange(way, optima, grid, fresh)
+        better = _exchanged(way, optima, grid, fresh)
         if not len(better):
             return
         refine(way, optima, better, *box)
         fresh = np.zeros(len(optima.value), bool)
         fresh[better] = True
+
+
+def _exchanged(way: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
+    """Try at each node the fresh points of nodes near by; problems that improved.
+
+    Envelopes consist of segments of graphs (the idea of the Graph Follower).
+    """
+    better = []
+    for shift in SHIFTS:
+        count = max(len(grid) - shift, 0)
+        for here, there in ((shift, 0), (0, shift)):
+            to, of = (grid[k : k + count].ravel() for k in (here, there))
+            to, of = to[fresh[of]], of[fresh[of]]
+            better.append(optima.offer(way, optima.point[of], to))
+    return np.unique(np.concatenate(better))
 
 
 def _missed(gains: list[Array], outputs: int, quiet: float) -> Array:

@@ -6,8 +6,11 @@ import numpy as np
 
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.modal.optima import Optima, Response
+from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
 
+SAMPLES = 256
+"""Trajectories of the model that the first optima begin at."""
 PIECE = 6000
 """Problems treated together; more would leave the cache."""
 LEAST = 250
@@ -20,6 +23,23 @@ WIDTH = 2.0
 """Of the unit box."""
 ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
+
+
+def first_optima(model: Response, lower: Array, upper: Array, small: float) -> Optima:
+    """Optima of all nodes, outputs and sides in the box [lower, upper], from a sample of it.
+
+    Args:
+        model: The modal model.
+        lower: Lower ends, shape (d,).
+        upper: Upper ends.
+        small: What Newton's method may leave, in units of the outputs.
+    """
+    unit = np.vstack([np.zeros((1, len(lower))), chebyshev_points(len(lower), SAMPLES)])
+    points = (lower + upper) / 2 + (upper - lower) / 2 * unit
+    optima = best_of(points, trajectories(model, points), np.arange(len(model.time)))
+    if (upper > lower).any():
+        refine(model, optima, np.arange(len(optima.value)), lower, upper, small)
+    return optima
 
 
 def refine(
