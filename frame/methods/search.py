@@ -112,8 +112,7 @@ class Search:
             tick = share(progress, done / levels, (done + 1) / levels)
             within = solved[-1][0] if solved else None
             solved.append(self._level(way, *flow.boxes.unit(level), tolerance, within, tick))
-        shape = (levels, len(flow.time), len(flow.outputs), 2)
-        scale = flow.scale[:, None]
+        shape, scale = (levels, len(flow.time), len(flow.outputs), 2), flow.scale[:, None]
         values = [x.side * exact.value_at(x.point, x.node, x.output) for x, _ in solved[::-1]]
         bounds = np.maximum.accumulate(np.stack(values)[::-1])[::-1].reshape(shape) * scale
         at = np.stack([optima.point for optima, _ in solved[::-1]]).reshape(*shape, -1)
