@@ -40,11 +40,6 @@ class Envelope(Bounds):
         """Names of the inputs."""
         return tuple(self.inputs)
 
-    @property
-    def trajectories(self) -> int:
-        """All evaluations."""
-        return self.evaluations
-
     def to_dataset(self) -> xarray.Dataset:
         """The envelope as an xarray dataset with units; ready for NetCDF."""
         dataset = super().to_dataset()

@@ -95,7 +95,11 @@ def envelope(
 
 
 def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
-    """The envelope of a follower with the proof beside it, where one is affordable."""
+    """The envelope of a follower with the proof of the same motion beside it, if it is affordable.
+
+    Its error is then the largest distance from the proved bounds and from those that the proof
+    attains, between which the true ones lie.
+    """
     if not isinstance(way, GraphFollower | ImprovedFollower):
         return of
     if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > JUDGED:
@@ -105,26 +109,11 @@ def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
         proof = Proof(gap=way.tolerance / 4, boxes=1000).run(exact)
     except (UnprovedError, ModalError):
         return of
-    return beside(of, proof, over.scale)
-
-
-def beside(of: Envelope, proof: Envelope, scale: Array) -> Envelope:
-    """An envelope with the proved bounds of the exact motion, and its largest distance from them.
-
-    The true bound lies between the proved one and the one that the proof attains.
-
-    Args:
-        of: The envelope.
-        proof: Bounds of the same motion.
-        scale: Factor on a tolerance for each output, shape (m,).
-
-    Returns:
-        The envelope, whose bounds less this error lie inside the proved ones.
-    """
     apart = [np.abs(of.upper - ends.upper) for ends in (proof.proved, proof.attained)]
     apart += [np.abs(of.lower - ends.lower) for ends in (proof.proved, proof.attained)]
     error = np.max(apart, axis=0)
-    facts = {**of.facts, "gap": proof.facts["gap"], "estimated_error": float((error / scale).max())}
+    largest = float((error / over.scale).max())
+    facts = {**of.facts, "gap": proof.facts["gap"], "estimated_error": largest}
     return replace(of, outer=proof.proved, between=proof.between, error=error, facts=facts)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 
 Box = Mapping[str, tuple[float, float]]
@@ -83,12 +84,8 @@ def _(system: MatrixStructure, box: Box) -> dict[str, int]:
                     " are known polynomials"
                 )
             if kind == "damping":
-                least = (
-                    box.get(factor, (system.parameters[factor],))[0]
-                    if isinstance(factor, str)
-                    else factor
-                )
-                _require_dissipation(least, array)
+                lowest = system.parameters[factor] if isinstance(factor, str) else factor
+                _require_dissipation(box.get(str(factor), (lowest,))[0], array)
     return dict.fromkeys(box, 1)
 
 
@@ -115,9 +112,7 @@ def without_ratio(system: LinearSystem) -> LinearSystem:
     return replace(system, ratios=())
 
 
-def _require_dissipation(
-    factor: float, array: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-) -> None:
+def _require_dissipation(factor: float, array: Array) -> None:
     eigenvalues = np.linalg.eigvalsh(array)
     if factor < 0 or eigenvalues[0] < -1e-14 * np.abs(eigenvalues).max():
         raise UnprovedError(
@@ -141,9 +136,8 @@ def inverse_cube_degree(lower: float, upper: float) -> int:
     if share == 0:
         return 0
 
-    def needed(
-        reach: float,
-    ) -> int:  # the ellipse that crosses the axis where |x| has fallen to 1 − reach of the middle
+    def needed(reach: float) -> int:
+        # the ellipse that crosses the axis where |x| has fallen to 1 − reach of the middle
         axis = reach / share
         rho = axis + sqrt(axis * axis - 1)
         return ceil(log(2 / ((1 - reach) ** 3 * ROUND_OFF * (rho - 1))) / log(rho))
