@@ -9,6 +9,8 @@ from alphacut.frame.identify.measured import MeasuredMode, ModeCut
 from alphacut.frame.identify.relaxation import relaxation
 from alphacut.fuzzy.arrays import Array
 
+PASSES = 6
+"""Most passes over all ends."""
 SETTLED = 0.03
 """Share of the widths that a further pass must take off to be worth another one."""
 
@@ -18,7 +20,6 @@ def enclosure(
     lower: Array,
     upper: Array,
     modes: list[tuple[MeasuredMode, ModeCut]],
-    passes: int,
 ) -> tuple[Array, Array] | None:
     """Ends of the box, from one that holds all parameters that are possible; None if none agree.
 
@@ -27,10 +28,9 @@ def enclosure(
         lower: Lower ends of the log parameters over their nominal values, shape (d,).
         upper: Upper ends.
         modes: Measured modes and their cuts at a level.
-        passes: Most passes over all ends.
     """
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
-    for _ in range(passes):
+    for _ in range(PASSES):
         held = relaxation(chain, lower, upper, modes, amplitudes)
         if held is not None and held.shapes:
             amplitudes |= {key: held.ends(shape) for key, shape in held.shapes.items()}

@@ -29,7 +29,6 @@ from alphacut.fuzzy.sets.numbers import Cut
 from alphacut.fuzzy.sets.stepwise import outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
-PASSES = 6
 
 
 class RefutedError(FailedError):
@@ -46,7 +45,6 @@ class Prediction:
         lower: Least frequency at each level, proved, shape (A,), in Hz.
         upper: Greatest frequency.
         sampled: Frequencies of samples of the lowest level's set, shape (S,), in Hz.
-        used: True if the mode was measured and served to identify.
     """
 
     mode: int
@@ -54,7 +52,6 @@ class Prediction:
     lower: Array
     upper: Array
     sampled: Array
-    used: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,11 +147,8 @@ class Identified:
         drawn: Array = np.full((0, len(chain.mass)), np.nan)
         if self.height[0] >= self.alpha[0]:
             drawn = np.sqrt(chain.modes(self.samples(number, seed=seed))[0]) / (2 * np.pi)
-        used = {mode.mode: mode.frequency for mode in self.agreement.measured.modes}
         return tuple(
-            Prediction(
-                k + 1, self.alpha, hertz[:, 0, k], hertz[:, 1, k], drawn[:, k], k + 1 in used
-            )
+            Prediction(k + 1, self.alpha, hertz[:, 0, k], hertz[:, 1, k], drawn[:, k])
             for k in range(len(chain.mass))
         )
 
@@ -165,7 +159,6 @@ def identify(
     measured: Measurement,
     *,
     alpha: Sequence[float] = ALPHA,
-    passes: int = PASSES,
 ) -> Identified:
     """Parameters of a frame that agree with its measured natural modes.
 
@@ -175,7 +168,6 @@ def identify(
             "m1" …, in SI units.
         measured: The measured modes.
         alpha: Levels, rising within (0, 1].
-        passes: Most passes of the enclosure at a level.
 
     Raises:
         RefusedError: An input is no parameter of the natural modes, a mode or floor is not the
@@ -186,7 +178,7 @@ def identify(
     _refuse(frame, measured, numbers, alpha)
     agreement = Agreement(Chain.of(frame, tuple(numbers)), numbers, measured)
     levels = np.asarray(alpha, float)
-    boxes, empty = _boxes(agreement, levels, passes)
+    boxes, empty = _boxes(agreement, levels)
     if not boxes:
         raise RefutedError(
             f"no parameters in their priors agree with the measured modes at α = {levels[0]:g}:"
@@ -227,9 +219,7 @@ def _prior_cut(number: FuzzyNumber, alpha: float, agreement: Agreement) -> Cut:
     return number.cut(agreement.own_level(alpha) if isinstance(number, Claimed) else alpha)
 
 
-def _boxes(
-    agreement: Agreement, levels: Array, passes: int
-) -> tuple[list[tuple[Array, Array]], float]:
+def _boxes(agreement: Agreement, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
     """Ends of log parameters by level until none agree, and that level."""
     boxes: list[tuple[Array, Array]] = []
     for level in map(float, levels):
@@ -240,7 +230,7 @@ def _boxes(
         modes = [*agreement.measured.cuts(level, agreement.own_level(level))]
         box = None
         if (lower <= upper).all():
-            box = enclosure(agreement.chain, lower, upper, modes, passes)
+            box = enclosure(agreement.chain, lower, upper, modes)
         if box is None:
             return boxes, level
         boxes.append(box)

@@ -77,13 +77,6 @@ class Accelerogram:
             abs(float(a[-1])),
         )
 
-    def at(self, time: Array) -> Array:
-        """Acceleration at times (T,) in m/s²; where it jumps at the end, what it ends on."""
-        samples = np.arange(len(self.acceleration)) * self.step
-        close = np.minimum(time, samples[-1] * (1 + 1e-12))
-        ended = time > samples[-1] * (1 + 1e-12)
-        return np.where(ended, 0.0, np.interp(close, samples, self.acceleration))
-
 
 class LinearSystem(Protocol):
     """A linear structure whose matrices are smooth functions of named parameters."""

@@ -15,7 +15,7 @@ from alphacut.frame.certificate.kernel import stays_below
 from alphacut.frame.certificate.remainder import Remainder, largest_growth
 from alphacut.frame.certificate.wave_bounds import _convolved, _largest, parts
 from alphacut.frame.checks.step_error import MARGIN, step_error
-from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.dynamics.record_load import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, problems

@@ -25,7 +25,7 @@ from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth
 from alphacut.frame.certificate.wave_bounds import parts
-from alphacut.frame.dynamics.spectral import responses
+from alphacut.frame.dynamics.record_load import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.ground_response import left_out
 from alphacut.frame.modal.model import ModalModel
