@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, prefix_axis
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, prefix_axis
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.methods.graph_follower import Followed, GraphFollower
 from alphacut.frame.structures.quantities import Output
@@ -66,8 +66,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     panels[0].plot(time, graphs[0], color=BLUE, lw=1.3)
     base(panels[1], [0, *first], start, len(first))
     base(panels[2], range(new[later] + 1), later[0], 1)
-    panels[2].plot(time, graphs[guess[later]], color=BLUE, lw=1.3, label="guess")
-    panels[2].legend(loc="lower right", fontsize=8)
+    panels[2].plot(time, graphs[guess[later]], color=BLUE, lw=1.3)
     base(panels[3], range(len(graphs)), None, 0)
     nodes = np.arange(len(time))[:, None]
     seen = np.stack([graphs[guess, nodes], graphs[np.where(new < 0, guess, new), nodes]])

@@ -60,8 +60,8 @@ class GraphFollower:
         order: Degree κ of the Taylor models, 1 or 2.
         tolerance: Promised gain above which a new trajectory is computed, in the unit of the first
             output.
-        budget: Most graphs to compute; None for no limit.
-        record: Keep the graphs themselves.
+        budget: Most trajectories to compute; None for no limit.
+        record: Keep the trajectories themselves.
 
     Raises:
         RefusedError: A switch is out of its range.
