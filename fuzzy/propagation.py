@@ -108,7 +108,6 @@ def propagate(
         calls=campaign.calls,
         reused=campaign.reused,
         budget=budget,
-        notes=(*bounds.notes, *_wider_steps(domain)),
         seconds=perf_counter() - start,
     )
 
@@ -144,12 +143,3 @@ def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
         chosen("unit of", name, sorted(names))
     own = tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
     return own if units else ()
-
-
-def _wider_steps(domain: Domain) -> tuple[str, ...]:
-    """Note on levels at which a cut stands for a narrower one that is not known."""
-    numbers = domain.inputs.values()
-    between = [x for x in domain.alpha if any(number.known(x) != x for number in numbers)]
-    shown = ", ".join(f"{level:g}" for level in between)
-    note = f"at α = {shown} an input's cut is that of a level below, as its own is not known"
-    return (note,) if between else ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from numbers import Integral, Real
 
 import numpy as np
@@ -38,25 +38,36 @@ class FailedError(RuntimeError):
         super().__init__(what + (f"; {cure}" if cure else ""))
 
 
-def real(key: str, value: object, *, positive: bool = False, whole: bool = False) -> float:
+def real(
+    key: str,
+    value: object,
+    *,
+    positive: bool = False,
+    whole: bool = False,
+    least: float = -inf,
+    most: float = inf,
+) -> float:
     """A finite number; True and False are none.
 
     Args:
         key: Name of the argument.
         value: What stands for it.
         positive: Whether it must be greater than 0.
-        whole: Whether it must be a whole number; then 1 or more where `positive`, else 0 or more.
+        whole: Whether it must be a whole number, 0 or more.
+        least: Least one that has a meaning.
+        most: Greatest one.
 
     Raises:
         RefusedError: It is none.
     """
-    kind = Integral if whole else Real
+    least, kind = (max(least, 0), Integral) if whole else (least, Real)
     truth = type(value).__name__ in ("bool", "bool_")
     number = float(value) if isinstance(value, kind) and not truth else nan
-    if not isfinite(number) or (positive and number <= 0) or (whole and number < 0):
-        what = "whole numbers" if whole else "finite numbers"
-        least = " greater than 0" if positive else " of 0 or more" if whole else ""
-        raise RefusedError(key, repr(value), what + least)
+    allowed = "whole numbers" if whole else "finite numbers"
+    allowed += " greater than 0" if positive else f" from {least:g} on" if least > -inf else ""
+    allowed += f", up to {most:g}" if most < inf else ""
+    inside = isfinite(number) and least <= number <= most and (number > 0 or not positive)
+    require(inside, key, repr(value), allowed)
     return number
 
 

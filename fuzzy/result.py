@@ -14,6 +14,7 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, chosen, require
 from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.sets.numbers import rising
 from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ class Bounds:
     samples: Samples | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "alpha", np.asarray(self.alpha, float))
+        object.__setattr__(self, "alpha", np.array(rising(self.alpha)))
         self._check_shapes()
         self._check_values()
         self._check_proof()
@@ -143,10 +144,6 @@ class Bounds:
         require(each, "natures and units", (self.natures, self.units), "one an output")
 
     def _check_values(self) -> None:
-        alpha = self.alpha
-        inside = alpha.size > 0 and alpha[0] >= 0 and alpha[-1] <= 1
-        rising = inside and (np.diff(alpha) > 0).all()
-        require(rising, "alpha", alpha.tolist(), "levels that rise within [0, 1]")
         finite = (np.isfinite(self.lower) & np.isfinite(self.upper)).all()
         require(finite, "lower and upper", "not finite", "finite ends")
         plain = ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed)).all()
@@ -156,20 +153,19 @@ class Bounds:
         """Refuse bounds that contradict each other by more than their error and rounding."""
         near = self._near
         estimated = np.where(self._guaranteed, 0.0, np.nan_to_num(self.error))
-        if (self.lower > self.upper + near + estimated).any():
-            raise FailedError("a lower bound lies above its upper bound")
         wide = near + np.nan_to_num(self.error)
         both = (wide[1:] + wide[:-1])[: len(wide) - 1]
-        if ((np.diff(self.lower, axis=0) < -both) | (np.diff(self.upper, axis=0) > both)).any():
-            raise FailedError("the α-cuts are not nested")
         inner, outer = self.attained, self.proved
-        beyond = (inner.lower < outer.lower - near) | (inner.upper > outer.upper + near)
-        if beyond.any():
-            far = np.maximum(outer.lower - inner.lower, inner.upper - outer.upper)
-            worst = self.outputs[int(np.unravel_index(far.argmax(), far.shape)[-1])]
-            raise FailedError(
-                f"attained bounds of {worst} lie outside the proved ones, by up to {far.max():.3g}"
-            )
+        for what, beyond in (
+            ("lower bounds lie above upper ones", self.lower - self.upper - near - estimated),
+            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - both),
+            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - both),
+            ("attained bounds lie outside the proved ones", outer.lower - inner.lower - near),
+            ("attained bounds lie outside the proved ones", inner.upper - outer.upper - near),
+        ):
+            if (beyond > 0).any():
+                worst = self.outputs[int(np.nanargmax(beyond) % len(self.outputs))]
+                raise FailedError(f"{what}: of {worst}, by up to {np.nanmax(beyond):.3g}")
 
     @property
     def _near(self) -> Array:

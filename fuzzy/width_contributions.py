@@ -9,12 +9,12 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import chosen
-from alphacut.fuzzy.result import Bounds, Nature
+from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Shares:
     """Effect of each input, or group of inputs, on the width of a fuzzy result.
 
@@ -23,15 +23,11 @@ class Shares:
         width: Width with all inputs fuzzy, shape (…, outputs).
         lost: Width lost when one is fixed, shape (names, …, outputs). What is lost to all need not
             add up to the width: effects overlap.
-        outputs: Names of the outputs; empty where the propagation gives arrays.
-        nature: The weakest nature of the bounds, likewise.
     """
 
     names: tuple[str, ...]
     width: Array
     lost: Array
-    outputs: tuple[str, ...]
-    nature: str
 
     @property
     def share(self) -> Array:
@@ -42,19 +38,6 @@ class Shares:
         """
         share: Array = np.zeros_like(self.lost)
         return np.divide(self.lost, self.width, out=share, where=self.width > 0)
-
-    def __str__(self) -> str:
-        """A line for each output and input or group, the least and the greatest share."""
-        percent = 100 * self.share
-        head = "share of the width lost where the input is fixed, least … greatest over levels and"
-        rows = [
-            f"  {output}, {name}: {percent[i, ..., k].min():.3g} … {percent[i, ..., k].max():.3g} %"
-            for k, output in enumerate(self.outputs or map(str, range(self.width.shape[-1])))
-            for i, name in enumerate(self.names)
-        ]
-        return "\n".join([f"{head} times, by bounds {self.nature}", *rows])
-
-    __repr__ = __str__
 
 
 def width_shares(
@@ -83,8 +66,4 @@ def width_shares(
     runs = [propagation({**numbers, **crisp}) for crisp in ({}, *fixed)]
     ends = [(one.lower, one.upper) if isinstance(one, Bounds) else one for one in runs]
     whole, *narrower = (np.asarray(upper) - lower for lower, upper in ends)
-    named = [one for one in runs if isinstance(one, Bounds)]
-    nature = min((one.nature for one in named), key=list(Nature).index, default="")
-    outputs = runs[0].outputs if isinstance(runs[0], Bounds) else ()
-    lost = np.array([whole - width for width in narrower])
-    return Shares(tuple(members), whole, lost, outputs, nature)
+    return Shares(tuple(members), whole, np.array([whole - width for width in narrower]))

@@ -18,7 +18,7 @@ from time import perf_counter
 
 import numpy as np
 
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import real, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
@@ -41,13 +41,13 @@ class Study:
     Args:
         source: Source of the discs or spheres.
         limits: Lower and upper limit of r_n; None for those that keep `share`, up to `Shape.reach`.
-        share: Share of area to keep, with equal shares cut off at both ends; used without `limits`.
+        share: Share of area to keep, above 0, with equal shares cut off at both ends; used without
+            `limits`.
         seed: Seed of everything that is left to chance.
-        confidence: Level of the simultaneous bootstrap band, in (0, 1).
+        confidence: Level of the simultaneous bootstrap band, above 0, up to 0.9999.
         bootstrap: Number of resamples, at least 100.
         sampling: Whether the supports of a2 and a4 also hold the slopes' own bootstrap band, so
-            that fewer data make a fuzzier map. None: of measured particles, not of simulated ones,
-            whose number is a matter of choice.
+            that fewer data make a fuzzier map.
         distribution: Law of θ.
 
     Raises:
@@ -60,23 +60,16 @@ class Study:
     seed: int = 0
     confidence: float = 0.99
     bootstrap: int = 500
-    sampling: bool | None = None
+    sampling: bool = True
     distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
 
     def __post_init__(self) -> None:
         low, high = self.limits or (0.1, 0.9)
-        for name, meaningful, allowed in (
-            ("limits", 0 < low < high < 1, "two values in (0, 1), rising"),
-            ("share", 0 < self.share < 1, "values in (0, 1)"),
-            ("confidence", 0 < self.confidence < 1, "values in (0, 1)"),
-            ("bootstrap", self.bootstrap >= 100, "numbers from 100 on"),
-        ):
-            require(meaningful, f"microstructure.{name}", getattr(self, name), allowed)
-
-    @property
-    def holds_slopes(self) -> bool:
-        """True if the supports of a2 and a4 hold the slopes' own band."""
-        return isinstance(self.source, Measured) if self.sampling is None else self.sampling
+        allowed = "two values in (0, 1), rising"
+        require(0 < low < high < 1, "microstructure.limits", self.limits, allowed)
+        real("microstructure.share", self.share, positive=True, most=1)
+        real("microstructure.confidence", self.confidence, positive=True, most=0.9999)
+        real("microstructure.bootstrap", self.bootstrap, whole=True, least=100)
 
     @property
     def shape(self) -> Shape:
@@ -230,7 +223,7 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
         resamples=case.bootstrap,
         generator=np.random.default_rng(streams[1]),
     )
-    pbox = least_pbox(fit, kept, band, hold=slopes if case.holds_slopes else None)
+    pbox = least_pbox(fit, kept, band, hold=slopes if case.sampling else None)
     return kept, pbox, slopes, band
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import real, require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
@@ -52,13 +52,11 @@ class Section:
 def section_of(particles: Particles) -> Section:
     """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
     if particles.shape is not DISCS:
-        count = len(particles)
-        return Section(
-            particles, np.arange(count, dtype=np.intp), cell_volumes(particles), np.ones(count)
-        )
+        every = np.arange(len(particles), dtype=np.intp)
+        return Section(particles, every, cell_volumes(particles), np.ones(len(particles)))
     diagram = apollonius(particles)
-    whole = whole_cells(diagram)
-    return Section(particles, whole.disc, diagram.areas[whole.disc], whole.weight, diagram)
+    whole, weight = whole_cells(diagram)
+    return Section(particles, whole, diagram.areas[whole], weight, diagram)
 
 
 @dataclass(frozen=True)
@@ -77,8 +75,7 @@ class Simulated:
     packings: int = 20
 
     def __post_init__(self) -> None:
-        enough, allowed = self.packings >= FEWEST, f"numbers from {FEWEST} on"
-        require(enough, "packing.packings", self.packings, allowed)
+        real("packing.packings", self.packings, whole=True, least=FEWEST)
 
     @property
     def shape(self) -> Shape:

@@ -70,12 +70,6 @@ class Segmentation:
         return float(np.ptp(self.light))
 
     @property
-    def separation(self) -> float:
-        """Least distance of a class's level from a threshold, over the noise."""
-        distance = np.abs(self.levels[:, None] - np.array(self.thresholds)).min()
-        return float(distance / self.noise) if self.noise else np.inf
-
-    @property
     def middles(self) -> tuple[float, ...]:
         """Grey values half-way between the levels of neighbouring classes."""
         return tuple(float(value) for value in (self.levels[1:] + self.levels[:-1]) / 2)

@@ -154,10 +154,6 @@ class Store:
         row = self._rows.get((model, point))
         return row and row.sample
 
-    def count(self, model: bytes) -> int:
-        """Samples of a model."""
-        return sum(key == model for key, _ in self._rows)
-
     def put(self, model: bytes, samples: Mapping[str, Sample]) -> None:
         """Write samples in one transaction: all or none."""
         rows = [Row.of(model, point, sample) for point, sample in samples.items()]

@@ -25,7 +25,6 @@ def from_data(
     *,
     bounds: Limits | None = None,
     law: Law | None = None,
-    resolution: float = 0.0,
 ) -> Claimed:
     """Fuzzy number of measured values: P(claimed quantity in its cut at α) >= 1 − α at every α.
 
@@ -42,14 +41,13 @@ def from_data(
 
     Args:
         values: Numbers, or pairs (lower, upper) of what each value is known to lie between; an
-            infinite end means censored on that side.
+            infinite end means censored on that side. Of rounded values they are half a step away.
         claim: "next value", "mean", "median" or "quantile 0.95". A mean needs a law or both bounds.
         bounds: Physically possible values (lower, upper), None where there is no bound. They fill
             in what the values do not decide: without them the number has no cut at low α, and none
             at 0.
         law: "normal" or, but for the mean, "log-normal", where that is known: narrower cuts, which
             rest on it.
-        resolution: Step to which the values were rounded.
 
     Raises:
         RefusedError: An argument is wrong, or the values decide nothing.
@@ -57,7 +55,7 @@ def from_data(
     quantile = _quantile(claim)
     if law is not None:
         chosen("law", law, get_args(Law))
-    data = Observations.of(values, bounds, resolution)
+    data = Observations.of(values, bounds)
     number, decided = _cuts(data, claim, quantile, law)
     return Claimed(number, Claim(claim, _conditions(data, law, bounds)), decided)
 

@@ -83,7 +83,7 @@ def _widened(number: Claimed, rule: Joint) -> Claimed:
         np.append(np.diff(level) > 0, True) & (level <= 1)
     )  # of equal levels the last cut
     lower, upper = (tuple(np.asarray(ends)[last]) for ends in (steps.lower, steps.upper))
-    moved = Stepwise(tuple(level[last]), lower, upper, steps.outer)
+    moved = Stepwise(tuple(level[last]), lower, upper)
     decided = float(rule.joined(np.asarray(number.decided)))
     return replace(number, number=moved, decided=decided, joint=rule)
 

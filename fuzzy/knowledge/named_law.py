@@ -59,7 +59,7 @@ def _require_scatter(data: Observations, law: str) -> None:
     """Refuse values that do not tell the scatter of a law."""
     finite = np.isfinite(data.lower).all() and np.isfinite(data.upper).all()
     unlike = not data.exact or data.lower[0] < data.lower[-1]
-    cure = "leave the law out, give bounds= or resolution=, or measure more"
+    cure = "leave the law out, give bounds=, or measure more"
     values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
     enough = data.count > 1 and finite and unlike
     require(enough, f"values of a {law} law", values, "two or more, finite, unlike", cure)

@@ -30,31 +30,26 @@ class Observations:
     bounds: tuple[float, float]
 
     @classmethod
-    def of(
-        cls, values: Values, bounds: Limits | None = None, resolution: float = 0.0
-    ) -> Observations:
+    def of(cls, values: Values, bounds: Limits | None = None) -> Observations:
         """Values as they were measured.
 
         Args:
             values: Numbers, shape (n,), or pairs of a lower and an upper end, shape (n, 2),
                 infinite where a value is censored; also mixed.
             bounds: Physically possible values; None where there is no bound.
-            resolution: Step to which the values were rounded: each is known to half of it.
 
         Raises:
             RefusedError: There is no value, one is no number, a pair is not in order, or a value
                 lies outside the bounds.
         """
         low, high = _limits(bounds)
-        half = real("resolution", resolution) / 2
         ends = np.array([_pair(number, value) for number, value in enumerate(values, 1)])
         require(len(ends) > 0, "values", list(values), "one or more")
-        require(half >= 0, "resolution", resolution, "0 or more")
-        lower, upper = ends[:, 0] - half, ends[:, 1] + half
-        outside = np.flatnonzero((upper < low) | (lower > high))
-        for row in outside:
-            allowed = f"values within the bounds [{low:g}, {high:g}]"
-            require(False, f"value {row + 1}", ends[row].tolist(), allowed)
+        lower, upper = ends.T
+        inside = (upper >= low) & (lower <= high)
+        row = int(np.argmin(inside))
+        allowed = f"values within the bounds [{low:g}, {high:g}]"
+        require(inside.all(), f"value {row + 1}", ends[row].tolist(), allowed)
         return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
 
     @property

@@ -21,7 +21,7 @@ from alphacut.fuzzy.campaign.values import SpentError
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation, attained, searched
 from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -48,7 +48,7 @@ class Automatic:
             as the samples happen to bound them.
 
     Raises:
-        RefusedError: A number is not positive, or the tolerance not below 1.
+        RefusedError: A number is not positive, or the tolerance above 1.
     """
 
     tolerance: float = 1e-3
@@ -61,8 +61,7 @@ class Automatic:
     name = "automatic"
 
     def __post_init__(self) -> None:
-        share = real("tolerance", self.tolerance)
-        require(0 < share < 1, "tolerance", share, "shares inside (0, 1)")
+        real("tolerance", self.tolerance, positive=True, most=1)
         for key in ("starts", "look", "passes"):
             real(key, getattr(self, key), positive=True, whole=True)
         real("seed", self.seed, whole=True)

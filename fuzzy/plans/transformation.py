@@ -10,7 +10,7 @@ corner of each bound.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from math import prod
@@ -71,44 +71,30 @@ def _settled(x: float, known: list[float], width: float) -> float:
     return x
 
 
-@dataclass(frozen=True)
-class _Transformation:
-    """Base of the methods: a grid per level, and the retransformation."""
+def grids(domain: Domain, refined: Collection[str]) -> list[list[list[float]]]:
+    """Points of each level and input, rising; those between the ends of refined inputs only."""
+    columns = [
+        hanss_points(number, domain.alpha, inner=name in refined)
+        for name, number in domain.inputs.items()
+    ]
+    return [list(level) for level in zip(*columns, strict=True)]
 
-    @property
-    def name(self) -> str:
-        """The word for it in a case file."""
-        return type(self).__name__.lower()
 
-    def _refined(self, names: Sequence[str]) -> set[str]:
-        """Inputs that get the recursion's inner points."""
-        raise NotImplementedError
+def _combined(campaign: Campaign, domain: Domain, refined: Collection[str], method: str) -> Design:
+    """All combinations of the points of each level, if the budget carries them."""
+    each = grids(domain, refined)
+    afford(sum(prod(map(len, grid)) for grid in each), campaign, method)
+    return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in each])
 
-    def grids(self, domain: Domain) -> list[list[list[float]]]:
-        """For each level and input, the points in rising order."""
-        refined = self._refined(domain.names)
-        columns = []
-        for name, number in domain.inputs.items():
-            columns.append(hanss_points(number, domain.alpha, inner=name in refined))
-        return [list(level) for level in zip(*columns, strict=True)]
 
-    def size(self, domain: Domain) -> int:
-        """Samples over all levels, counted without listing them."""
-        return sum(prod(len(points) for points in grid) for grid in self.grids(domain))
-
-    def points(self, domain: Domain) -> Design:
-        """The samples of every level, each distinct one listed once."""
-        return Design.from_levels(
-            domain, [np.array(list(product(*grid))) for grid in self.grids(domain)]
-        )
-
-    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Evaluate the samples and rearrange them into α-cuts."""
-        domain.require_free(self.name)
-        afford(self.size(domain), campaign, self.name)
-        design = self.points(domain)
-        bounds = design.bounds(campaign(design.points), self.name)
-        return proving(bounds, campaign, corners_suffice(domain, bounds.outputs, campaign.known))
+def _transformed(
+    campaign: Campaign, domain: Domain, refined: Collection[str], method: str
+) -> Bounds:
+    """Bounds from all combinations, proved where corners suffice."""
+    domain.require_free(method)
+    design = _combined(campaign, domain, refined, method)
+    bounds = design.bounds(campaign(design.points), method)
+    return proving(bounds, campaign, corners_suffice(domain, bounds.outputs, campaign.known))
 
 
 def corners_suffice(domain: Domain, outputs: Sequence[str], known: Known) -> Mask:
@@ -127,23 +113,29 @@ def afford(samples: float, campaign: Campaign, method: str) -> None:
 
 
 @dataclass(frozen=True)
-class General(_Transformation):
+class General:
     """General transformation method: all combinations of the recursion's points."""
 
-    def _refined(self, names: Sequence[str]) -> set[str]:
-        return set(names)
+    name = "general"
+
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
+        """Evaluate the samples and rearrange them into α-cuts."""
+        return _transformed(campaign, domain, domain.names, self.name)
 
 
 @dataclass(frozen=True)
-class Reduced(_Transformation):
+class Reduced:
     """Reduced transformation method: corners of each cut; exact where monotone."""
 
-    def _refined(self, names: Sequence[str]) -> set[str]:
-        return set()
+    name = "reduced"
+
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
+        """Evaluate the samples and rearrange them into α-cuts."""
+        return _transformed(campaign, domain, (), self.name)
 
 
 @dataclass(frozen=True)
-class Extended(_Transformation):
+class Extended:
     """Extended transformation method: ends of monotone inputs, all points of the others.
 
     Args:
@@ -155,23 +147,21 @@ class Extended(_Transformation):
     monotone: tuple[str, ...] | None = None
     outputs: tuple[str, ...] = ()
 
-    def _refined(self, names: Sequence[str]) -> set[str]:
-        for name in self.monotone or ():
-            chosen("monotone input", name, names)
-        return set(names) - set(self.monotone or ())
+    name = "extended"
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
         if self.monotone is not None:
-            return super().run(campaign, domain)
+            for name in self.monotone:
+                chosen("monotone input", name, domain.names)
+            refined = set(domain.names) - set(self.monotone)
+            return _transformed(campaign, domain, refined, self.name)
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
         known = campaign.known.monotone_in(domain.names, effects.outputs)
-        classes = (effects.signs[0] != 0) | known
-        pairs = zip(domain.names, classes.all(axis=0), strict=True)
-        plan = replace(self, monotone=tuple(name for name, holds in pairs if holds))
-        design = plan.points(domain)
-        afford(len(design.points), campaign, self.name)
+        monotone = ((effects.signs[0] != 0) | known).all(axis=0)
+        refined = {name for name, ends in zip(domain.names, monotone, strict=True) if not ends}
+        design = _combined(campaign, domain, refined, self.name)
         return _verified(design, campaign, effects, self.name)
 
 
@@ -201,11 +191,8 @@ class Signed:
 
     def _points(self, effects: Effects, domain: Domain) -> list[Array]:
         """Corners that the signs name, times the general method's points of other inputs."""
-        grids = General().grids(domain)
-        return [
-            _level_points(np.unique(signs, axis=0), grid)
-            for signs, grid in zip(effects.signs, grids, strict=True)
-        ]
+        pairs = zip(effects.signs, grids(domain, domain.names), strict=True)
+        return [_level_points(np.unique(signs, axis=0), grid) for signs, grid in pairs]
 
 
 def _verified(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
@@ -227,7 +214,7 @@ def _verified(design: Design, campaign: Campaign, effects: Effects, method: str)
 def _size(effects: Effects, domain: Domain) -> float:
     """Samples of the plan, counted without listing them."""
     total = 0.0
-    for signs, grid in zip(effects.signs, General().grids(domain), strict=True):
+    for signs, grid in zip(effects.signs, grids(domain, domain.names), strict=True):
         counts = np.array([len(points) for points in grid], float)
         patterns = np.unique(signs == 0, axis=0)
         total += 2 * np.where(patterns, counts, 1.0).prod(axis=1).sum()
@@ -236,10 +223,9 @@ def _size(effects: Effects, domain: Domain) -> float:
 
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
     rows: list[tuple[float, ...]] = []
-    for pattern in np.unique(signs, axis=0):
-        for sense in (1, -1):
-            pairs = zip(pattern, grid, strict=True)
-            rows += product(*(_ends(points, sense * sign) for sign, points in pairs))
+    for pattern in np.concatenate([signs, -signs]):
+        pairs = zip(pattern, grid, strict=True)
+        rows += product(*(_ends(points, sign) for sign, points in pairs))
     return np.array(rows)
 
 

@@ -11,7 +11,7 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.sets.claimed import from_level
 from alphacut.fuzzy.sets.interaction import Interaction, require_inputs
-from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, level
+from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, rising
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
@@ -57,9 +57,7 @@ class Domain:
     interactions: Sequence[Interaction] = ()
 
     def __post_init__(self) -> None:
-        alpha = tuple(level(alpha) for alpha in self.alpha)
-        rising = bool(alpha) and (np.diff(alpha) > 0).all()
-        require(rising, "alpha", list(alpha), "levels that rise within [0, 1]")
+        alpha = rising(self.alpha)
         inputs = fuzzy_inputs(self.inputs)
         decided = {name: from_level(number, alpha[0]) for name, number in inputs.items()}
         object.__setattr__(self, "alpha", alpha)

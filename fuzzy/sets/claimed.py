@@ -112,10 +112,6 @@ class Claimed(FuzzyNumber):
             raise RefusedError(f"alpha of the {self.claim.about}", alpha, allowed, cure)
         return self.number.cut(alpha)
 
-    def known(self, alpha: float) -> float:
-        """Greatest level up to `alpha` whose cut is no wider than what is known."""
-        return self.number.known(alpha)
-
     def __str__(self) -> str:
         low, high = self.cut(self.decided)
         ends = f"{low:.6g} … {high:.6g} at α = {self.decided:.4g}"

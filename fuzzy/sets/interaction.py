@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -11,8 +11,6 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
-
-_HALVINGS = 50
 
 
 class Interaction(Protocol):
@@ -69,21 +67,18 @@ class Ellipsoidal:
     their whole cuts.
 
     Args:
-        correlation: Entry of R for pairs of inputs, inside (−1, 1); 0 for pairs not named.
-        among: Further inputs that interact, without a correlation.
+        correlation: Entry of R for pairs of inputs, inside (−1, 1); 0 for other pairs of them.
 
     Raises:
         RefusedError: No two inputs are named, a correlation is out of range, or correlations
             contradict each other.
     """
 
-    correlation: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    among: tuple[str, ...] = ()
+    correlation: Mapping[tuple[str, str], float]
 
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
-            key = f"correlation of {' and '.join(pair)}"
-            require(-1 < real(key, value) < 1, key, value, "values inside (-1, 1)")
+            real(f"correlation of {' and '.join(pair)}", value, least=-1, most=1)
         require(len(self.names) > 1, "inputs of the ellipsoid", self.names, "two names or more")
         definite = np.linalg.eigvalsh(self._matrix).min() > 0
         allowed = "values that agree: their matrix is positive definite"
@@ -92,8 +87,7 @@ class Ellipsoidal:
     @property
     def names(self) -> tuple[str, ...]:
         """The inputs that interact, each once."""
-        pairs = (name for pair in self.correlation for name in pair)
-        return tuple(dict.fromkeys((*pairs, *self.among)))
+        return tuple(dict.fromkeys(name for pair in self.correlation for name in pair))
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
         """(1 − α)² − tᵀ R⁻¹ t, shape (n,)."""
@@ -129,16 +123,10 @@ def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Arra
         anchor: An allowed point, shape (inputs,).
         slack: Room at points (n, inputs), shape (n,).
     """
-    outside, inside = 0.0, 1.0
-    if slack(point[None])[0] >= 0:
-        return point
-    for _ in range(_HALVINGS):
-        middle = (outside + inside) / 2
-        if slack((point + middle * (anchor - point))[None])[0] >= 0:
-            inside = middle
-        else:
-            outside = middle
-    return point + inside * (anchor - point)
+    shares = np.concatenate([[0.0], np.geomspace(1e-15, 1, 400)])[:, None]
+    line: Array = point + shares * (anchor - point)
+    line[-1] = anchor
+    return np.asarray(line[np.argmax(slack(line) >= 0)])
 
 
 def require_inputs(interactions: Sequence[Interaction], inputs: Sequence[str]) -> None:

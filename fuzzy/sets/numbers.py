@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -61,10 +61,6 @@ class FuzzyNumber(ABC):
         alpha = level(alpha)
         return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
 
-    def known(self, alpha: float) -> float:
-        """Greatest level up to `alpha` whose cut is no wider than what is known."""
-        return alpha
-
     def membership(self, x: ArrayLike) -> Array:
         """Grade of membership μ in [0, 1] at `x`, any shape; not a number where `x` is none."""
         levels, lower, upper = map(np.asarray, self.cuts)
@@ -79,8 +75,19 @@ def level(alpha: float) -> float:
     Raises:
         RefusedError: It lies outside [0, 1].
     """
-    require(0 <= real("alpha", alpha) <= 1, "alpha", alpha, "levels in [0, 1]")
-    return float(alpha)
+    return real("alpha", alpha, least=0, most=1)
+
+
+def rising(alpha: Iterable[float]) -> tuple[float, ...]:
+    """α-levels in rising order.
+
+    Raises:
+        RefusedError: There is none, they do not rise, or one lies outside [0, 1].
+    """
+    levels = tuple(map(level, alpha))
+    ordered = bool(levels) and (np.diff(levels) > 0).all()
+    require(ordered, "alpha", list(levels), "levels that rise within [0, 1]")
+    return levels
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
@@ -221,7 +228,7 @@ class PiecewiseLinear(FuzzyNumber):
         return Cuts(self.alpha, self.lower, self.upper)
 
 
-def nested(alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Cuts:
+def nested(alpha: Iterable[float], lower: ArrayLike, upper: ArrayLike) -> Cuts:
     """Cuts as tuples of numbers.
 
     Args:
@@ -233,11 +240,11 @@ def nested(alpha: ArrayLike, lower: ArrayLike, upper: ArrayLike) -> Cuts:
         RefusedError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not
             finite, nested intervals.
     """
-    levels, low, high = (np.atleast_1d(np.asarray(x, float)) for x in (alpha, lower, upper))
-    rising = levels[0] == 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()
-    alike, shown = len(levels) == len(low) == len(high), (levels.tolist(), len(low), len(high))
-    require(alike and rising, "alpha", shown, "levels that rise from 0 within [0, 1], one an end")
+    levels, low, high = rising(alpha), np.asarray(lower, float), np.asarray(upper, float)
+    alike = levels[0] == 0 and len(levels) == len(low) == len(high)
+    shown = (levels, len(low), len(high))
+    require(alike, "alpha", shown, "levels that rise from 0 within [0, 1], one an end")
     ends = np.concatenate([low, high[::-1]])
-    rising = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
-    require(rising, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
-    return Cuts(*(tuple(map(float, row)) for row in (levels, low, high)))
+    ordered = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
+    require(ordered, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
+    return Cuts(levels, tuple(map(float, low)), tuple(map(float, high)))

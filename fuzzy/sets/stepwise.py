@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,6 @@ class Stepwise(FuzzyNumber):
         alpha: Levels from which the cuts hold, rising from 0, at most 1.
         lower: Lower ends, not falling.
         upper: Upper ends, not rising.
-        outer: Whether truer cuts are narrower between the levels.
 
     Raises:
         RefusedError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not
@@ -31,7 +30,6 @@ class Stepwise(FuzzyNumber):
     alpha: tuple[float, ...]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
-    outer: bool = field(default=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         rows = nested(self.alpha, self.lower, self.upper)
@@ -58,10 +56,6 @@ class Stepwise(FuzzyNumber):
         at = bisect_right(self.alpha, level(alpha)) - 1
         return Cut(self.lower[at], self.upper[at])
 
-    def known(self, alpha: float) -> float:
-        """Greatest level up to `alpha` whose cut is no wider than what is known."""
-        return self.alpha[bisect_right(self.alpha, alpha) - 1] if self.outer else alpha
-
 
 def outer_steps(
     alpha: Sequence[float] | Array, lower: Sequence[float] | Array, upper: Sequence[float] | Array
@@ -75,4 +69,4 @@ def outer_steps(
         upper: Upper ends.
     """
     levels = (0.0, *(min(float(level), round(float(level), 12)) for level in alpha[1:]))
-    return Stepwise(levels, tuple(lower), tuple(upper), outer=True)
+    return Stepwise(levels, tuple(lower), tuple(upper))

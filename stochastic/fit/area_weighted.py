@@ -41,11 +41,8 @@ class AreaWeighted:
         """
         values = np.asarray(values, float).ravel()
         weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
-        labels = (
-            np.arange(len(values))
-            if groups is None
-            else np.unique(np.asarray(groups).ravel(), return_inverse=True)[1]
-        )
+        each = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
+        labels = np.unique(each, return_inverse=True)[1]
         plain = np.isfinite(values).all() and (weights >= 0).all() and weights.sum() > 0
         allowed = "one or more, finite, with weights from 0 on"
         require(plain, "reduced radii", f"{len(values)} values", allowed)
@@ -59,21 +56,13 @@ class AreaWeighted:
 
     def cdf(self, radius: ArrayLike) -> Array:
         """Share of area with r_n ≤ radius, any shape."""
-        return np.asarray(
-            np.concatenate([[0.0], self.cumulated])[
-                np.searchsorted(self.values, radius, side="right")
-            ]
-        )
+        place = np.searchsorted(self.values, radius, side="right")
+        return np.asarray(np.append(0.0, self.cumulated)[place])
 
     def quantile(self, share: ArrayLike) -> Array:
         """Least value with at least `share` of the area at or below it, any shape."""
-        return np.asarray(
-            self.values[
-                np.minimum(
-                    np.searchsorted(self.cumulated, np.asarray(share) - 1e-12), len(self.values) - 1
-                )
-            ]
-        )
+        place = np.searchsorted(self.cumulated, np.asarray(share) - 1e-12)
+        return np.asarray(self.values[np.minimum(place, len(self.values) - 1)])
 
     @property
     def mean(self) -> float:
@@ -123,8 +112,6 @@ class AreaWeighted:
         cure = "take more particles, and check the size of the section"
         require(groups >= 5, "groups of the bootstrap", groups, allowed, cure)
         step = np.append(np.diff(self.values) > 0, True)
-        farthest = [
-            np.abs((np.cumsum(w) - self.cumulated)[step]).max()
-            for w in self.resampled(number, generator)
-        ]
+        drawn = self.resampled(number, generator)
+        farthest = [np.abs((np.cumsum(w) - self.cumulated)[step]).max() for w in drawn]
         return float(np.quantile(farthest, level))

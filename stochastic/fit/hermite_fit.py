@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import polynomial
+from numpy.polynomial import Polynomial, polynomial
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
@@ -69,29 +69,15 @@ class HermiteFit:
     def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
         """Root mean square of r(θ) − H(θ) under f_Θ, in units of r_n, by a fine rule."""
         share = (np.arange(20_000) + 0.5) / 20_000
-        return float(
-            np.sqrt(
-                np.mean(
-                    (sample.quantile(share) - self.map(slopes)(self.distribution.quantile(share)))
-                    ** 2
-                )
-            )
-        )
+        fitted = self.map(slopes)(self.distribution.quantile(share))
+        return float(np.sqrt(np.mean((sample.quantile(share) - fitted) ** 2)))
 
     @cached_property
     def _powers(self) -> Array:
         """Functions h2 and h4 in powers of θ, shape (2, 4)."""
         law = self.distribution
-        xi = np.array([-law.lower, 1.0]) / (law.upper - law.lower)
-        powers = [np.array([1.0])]
-        for _ in range(3):
-            powers.append(polynomial.polymul(powers[-1], xi))
-        return np.array(
-            [
-                sum(np.pad(c * p, (0, 4 - len(p))) for c, p in zip(SHAPES[k], powers, strict=True))
-                for k in (1, 3)
-            ]
-        )
+        xi = Polynomial([-law.lower, 1.0]) / (law.upper - law.lower)
+        return np.array([Polynomial(h)(xi).coef for h in SHAPES[[1, 3]]])
 
     def _integrals(self, share: Array) -> Array:
         """∫ h_i f_Θ dθ from the lower end to each quantile, for h2 and h4, shape (2, n); exact."""
@@ -108,9 +94,8 @@ class HermiteFit:
     @cached_property
     def _shapes_at_nodes(self) -> tuple[Array, Array]:
         rule = gauss_rule(self.distribution, points=8)
-        xi = (rule.nodes - self.distribution.lower) / (
-            self.distribution.upper - self.distribution.lower
-        )
+        law = self.distribution
+        xi = (rule.nodes - law.lower) / (law.upper - law.lower)
         return rule.weights, np.array([polynomial.polyval(xi, h) for h in SHAPES])
 
     @cached_property
@@ -186,9 +171,7 @@ class SlopeBand:
         high = np.maximum(np.clip(ends[:, 1], *square), fitted)
         for share in np.linspace(1, 0, 201):
             a, b = fitted + share * (low - fitted), fitted + share * (high - fitted)
-            if all(
-                fit.is_monotone(corner) for corner in itertools.product(*zip(a, b, strict=True))
-            ):
+            if all(map(fit.is_monotone, itertools.product(*zip(a, b, strict=True)))):
                 break
         a2, a4 = ((float(x), float(y), float(z)) for x, y, z in zip(a, fitted, b, strict=True))
         return SlopeBand(a2, a4, self.level)
@@ -217,12 +200,7 @@ def slope_band(
     from scipy.special import stdtrit
 
     fitted = fit.slopes(sample)
-    drawn = np.array(
-        [fit.slopes(sample, weights) for weights in sample.resampled(resamples, generator)]
-    )
-    half = float(stdtrit(sample.groups.max(), 1 - (1 - level) / 4)) * drawn.std(axis=0, ddof=1)
-    ends = [
-        (float(value - h), float(value), float(value + h))
-        for value, h in zip(fitted, half, strict=True)
-    ]
-    return SlopeBand(ends[0], ends[1], level)
+    drawn = [fit.slopes(sample, weights) for weights in sample.resampled(resamples, generator)]
+    half = float(stdtrit(sample.groups.max(), 1 - (1 - level) / 4)) * np.std(drawn, axis=0, ddof=1)
+    a2, a4 = ((x - float(h), x, x + float(h)) for x, h in zip(fitted, half, strict=True))
+    return SlopeBand(a2, a4, level)

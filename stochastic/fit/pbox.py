@@ -10,6 +10,7 @@ programme.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -36,9 +37,8 @@ class PBox:
 
     def bounds(self, theta: Array) -> tuple[Array, Array]:
         """Least and greatest radius at `theta`, any shape."""
-        return self.fit.map((self.a2[0], self.a4[2]))(theta), self.fit.map(
-            (self.a2[2], self.a4[0])
-        )(theta)
+        least, greatest = (self.a2[0], self.a4[2]), (self.a2[2], self.a4[0])
+        return self.fit.map(least)(theta), self.fit.map(greatest)(theta)
 
     @property
     def area(self) -> float:
@@ -90,11 +90,9 @@ def least_pbox(
 
 def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[float, float | None]]:
     """Ranges of the four ends (a2L, a2U, a4L, a4U) around the modal slopes, in the supports."""
-    low, high = list(modal), list(modal)
-    if hold is not None:
-        low = [min(value, ends[0]) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
-        high = [max(value, ends[2]) for value, ends in zip(modal, (hold.a2, hold.a4), strict=True)]
-    return [(0, low[0]), (high[0], None), (0, low[1]), (high[1], None)]
+    held = ((), ()) if hold is None else (hold.a2, hold.a4)
+    a2, a4 = ((x, *more) for x, more in zip(modal, held, strict=True))
+    return [(0, min(a2)), (max(a2), None), (0, min(a4)), (max(a4), None)]
 
 
 def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
@@ -132,12 +130,9 @@ def _solve(
     """Ends (a2L, a2U, a4L, a4U) of least p-box area under the rows, corners monotone."""
     from scipy.optimize import linprog
 
-    monotone = []
-    for i in (0, 1):
-        for j in (2, 3):
-            row = np.zeros((SLOPES.shape[1], 4))
-            row[:, i], row[:, j] = -SLOPES[1], -SLOPES[3]
-            monotone.append(row)
+    monotone = np.zeros((4, SLOPES.shape[1], 4))
+    for corner, (i, j) in enumerate(product((0, 1), (2, 3))):
+        monotone[corner, :, i], monotone[corner, :, j] = -SLOPES[1], -SLOPES[3]
     h2, h4 = fit.mean_shapes
     result = linprog(
         [-h2, h2, -h4, h4],

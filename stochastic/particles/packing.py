@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import FailedError, require
+from alphacut.fuzzy.refused import FailedError, real, require
 from alphacut.stochastic.particles.neighbour_search import balls, size_classes
 from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
@@ -39,10 +39,9 @@ class Packing:
     shape: Shape = DISCS
 
     def __post_init__(self) -> None:
-        number, fraction, densest = self.number, self.fraction, self.shape.densest
-        require(number >= 1, f"packing.{self.shape.particles}", number, "numbers from 1 on")
-        key, allowed = f"packing.{self.shape.cells}_fraction", f"values in (0, {densest:g}]"
-        require(0 < fraction <= densest, key, fraction, allowed)
+        real(f"packing.{self.shape.particles}", self.number, whole=True, least=1)
+        key = f"packing.{self.shape.cells}_fraction"
+        real(key, self.fraction, positive=True, most=self.shape.densest)
 
     def make(self, generator: np.random.Generator) -> Particles:
         """One packing, in a box as large as the particles and the fraction make it.

@@ -12,8 +12,6 @@ same everywhere, with every disc listed whose centre lies in the window.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
@@ -25,38 +23,27 @@ EDGES = np.array([np.pi, 0.0, -np.pi / 2, np.pi / 2])
 ANGLES = 33
 
 
-@dataclass(frozen=True, eq=False)
-class WholeCells:
-    """Cells to be counted, and their weights.
-
-    Args:
-        disc: Indices of the discs whose cells are whole, shape (k,).
-        weight: Cells that each stands for, shape (k,); 1 in a periodic box.
-    """
-
-    disc: Rows
-    weight: Array
-
-
-def whole_cells(diagram: Apollonius) -> WholeCells:
+def whole_cells(diagram: Apollonius) -> tuple[Rows, Array]:
     """Cells clear of the window's edge, with weights that make up for the others.
+
+    Returns:
+        Indices of the discs whose cells are whole, shape (k,), and the number of cells that each
+        stands for, shape (k,); all and 1 in a periodic box.
 
     Raises:
         RefusedError: No cell is whole.
     """
     discs = diagram.discs
-    if not discs.periodic:
-        reach = _reach(diagram)
-        inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
-        room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
-        disc = np.flatnonzero((reach <= room).all(axis=1) & ~diagram.cut)
-        allowed = "windows in which the edge leaves a cell whole"
-        require(len(disc) > 0, "size", discs.size.tolist(), allowed, "take a larger section")
-        fits = (
-            inner - np.stack([reach[disc, :2].sum(axis=1), reach[disc, 2:].sum(axis=1)], axis=1)
-        ).prod(axis=1)
-        return WholeCells(disc, discs.measure / fits)
-    return WholeCells(np.arange(len(discs), dtype=np.intp), np.ones(len(discs)))
+    if discs.periodic:
+        return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))
+    reach = _reach(diagram)
+    inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
+    room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
+    disc = np.flatnonzero((reach <= room).all(axis=1) & ~diagram.cut)
+    allowed = "windows in which the edge leaves a cell whole"
+    require(len(disc) > 0, "size", discs.size.tolist(), allowed, "take a larger section")
+    taken = reach[disc].reshape(-1, 2, 2).sum(axis=2)  # across and along
+    return disc, discs.measure / (inner - taken).prod(axis=1)
 
 
 def _reach(diagram: Apollonius) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import real
 from alphacut.stochastic.theta.law import ThetaLaw, panel_edges
 
 
@@ -70,7 +70,7 @@ def gauss_rule(
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
     """
-    require(points >= 1, "points", points, "numbers from 1 on")
+    real("points", points, whole=True, least=1)
     fine = _fine_rule(distribution, 16 + 2 * points, between)
     held = fine.weights > _NEGLIGIBLE
     at, weights = fine.nodes[held], fine.weights[held]
@@ -97,6 +97,7 @@ def _fine_rule(law: ThetaLaw, points: int, between: tuple[float, float] | None) 
 
 FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
 LARGEST = 30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
+MOST = 40  # nodes of a polynomial
 
 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
@@ -106,38 +107,11 @@ def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
     is small: its error falls with the number of nodes as that of the rule itself does. Pieces that
     keep the order of the values elsewhere.
     """
-    from scipy.interpolate import PchipInterpolator
+    from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 
-    if len(nodes) >= FEWEST and lebesgue(nodes, at) <= LARGEST:
-        return barycentric(nodes, values, at)
+    if FEWEST <= len(nodes) <= MOST:
+        # the same digits each time: SciPy takes the nodes in a random order
+        basis = BarycentricInterpolator(nodes, np.eye(len(nodes)), rng=0)(at)
+        if np.abs(basis).sum(axis=-1).max() <= LARGEST:
+            return np.asarray(basis @ values)
     return np.asarray(PchipInterpolator(nodes, values)(at))
-
-
-def barycentric(nodes: Array, values: Array, at: Array) -> Array:
-    """Polynomial through values at nodes, shape (n,), at `at` (any shape).
-
-    The second form of the barycentric formula (Berrut and Trefethen, SIAM Review 46, 2004). SciPy's
-    takes the nodes in a random order, and its last digits change from run to run.
-    """
-    scaled = 4 / (nodes[-1] - nodes[0]) * (nodes[:, None] - nodes)
-    np.fill_diagonal(scaled, 1.0)
-    gaps = np.asarray(at, float)[..., None] - nodes
-    hit = gaps == 0
-    shares = 1 / np.prod(scaled, axis=1) / np.where(hit, 1.0, gaps)
-    shares = np.where(hit.any(axis=-1, keepdims=True), hit, shares)
-    total: Array = (shares * values).sum(axis=-1) / shares.sum(axis=-1)
-    return total
-
-
-def lebesgue(nodes: Array, at: Array) -> float:
-    """Lebesgue constant of polynomial interpolation at `at`; infinite for over 40 nodes."""
-    if len(nodes) > 40:
-        return float("inf")
-    distance = nodes[:, None] - nodes
-    np.fill_diagonal(distance, 1.0)
-    gaps = np.asarray(at, float).ravel()[:, None] - nodes
-    sums = np.zeros(len(gaps))
-    for own in range(len(nodes)):
-        others = np.arange(len(nodes)) != own
-        sums += np.abs(np.prod(gaps[:, others] / distance[own, others], axis=1))
-    return float(sums.max())

@@ -54,11 +54,11 @@ def test_cuts_that_are_not_nested_are_a_failure():
 def test_attained_bounds_lie_inside_proved_ones_but_for_the_error_of_the_scheme(time):
     found = bounds(time=time)
     outer = Ends(found.lower + 0.1, found.upper - 0.1)
-    with pytest.raises(FailedError, match="attained bounds of y lie outside"):
+    with pytest.raises(FailedError, match="attained bounds lie outside the proved ones: of y"):
         replace(found, outer=outer)
     replace(found, outer=outer, error=np.full(found.lower.shape, 0.2))
     proved = replace(found, nature=Nature.GUARANTEED)
-    with pytest.raises(FailedError, match="attained bounds of y lie outside"):
+    with pytest.raises(FailedError, match="attained bounds lie outside the proved ones: of y"):
         replace(proved, inner=Ends(found.lower - 0.1, found.upper))
     both = replace(proved, inner=Ends(found.lower + 0.1, found.upper - 0.1))
     assert (both.proved.lower == found.lower).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.stochastic import TruncatedNormal, gauss_rule, layered_rule
-from alphacut.stochastic.theta.quadrature import between_nodes, lebesgue
+from alphacut.stochastic.theta.quadrature import between_nodes
 
 AT = np.linspace(-3, 3, 61)
 
@@ -32,14 +32,6 @@ def test_the_error_falls_with_the_nodes_of_a_gauss_rule(points, error):
 def test_other_nodes_are_joined_without_overshoot(nodes):
     curve = between_nodes(nodes, np.sign(nodes), AT)
     assert np.abs(curve[(nodes[0] <= AT) & (nodes[-1] >= AT)]).max() <= 1 + 1e-12
-
-
-def test_the_lebesgue_constant_is_that_of_the_polynomials():
-    nodes = np.array([-1.0, 0.0, 1.0])
-    at = np.linspace(-1, 1, 2001)
-    basis = [np.polyval(np.polyfit(nodes, row, 2), at) for row in np.eye(3)]
-    assert lebesgue(nodes, at) == pytest.approx(np.abs(basis).sum(0).max())
-    assert lebesgue(np.arange(41.0), at) == np.inf
 
 
 def test_a_curve_between_nodes_is_the_same_to_the_last_bit_each_time():

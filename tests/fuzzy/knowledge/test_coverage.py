@@ -122,5 +122,5 @@ def test_censored_values_are_intervals_without_an_end():
     more = [1.0, 2.0, 2.2, 2.4, 2.5, 2.6, (3.0, np.inf)]
     assert from_data(more, "next value", bounds=(0, None)).cut(0.5).upper == 2.6
     assert from_data([1.0, 2.0, (3.0, np.inf)], "next value", bounds=(0, 9)).cut(0.5) == (1, 9)
-    rounded = from_data([2.0, 3.0], "next value", bounds=(0, 9), resolution=1.0)
+    rounded = from_data([(1.5, 2.5), (2.5, 3.5)], "next value", bounds=(0, 9))
     assert rounded.cut(2 / 3) == (1.5, 3.5)

@@ -256,7 +256,6 @@ def test_shares_of_width():
     expected = np.array([[1 / 3] * 4, [2 / 3] * 4, [0] * 4])
     np.testing.assert_allclose(shares.share[:, :-1, 0], expected, atol=1e-12)
     assert (shares.share[:, -1] == 0).all()
-    assert "y, a: 0 … 33.3 %" in str(shares)
     grouped = width_shares(run, inputs, groups={"both": ("a", "b")})
     np.testing.assert_allclose(grouped.lost[0], grouped.width)
 

@@ -18,7 +18,6 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.plans.transformation import hanss_points
-from alphacut.fuzzy.sets.boxes import Domain
 
 PAPER = {
     "a2": Triangular(0.001, 0.1, 0.3145),
@@ -96,13 +95,11 @@ def test_fuzzy_intervals_start_from_two_points_and_crisp_inputs_from_one():
     [(General(), 225), (Reduced(), 33), (Extended(tuple(PAPER)), 33), (Extended(("E",)), 109)],
 )
 def test_counts_of_the_papers_case(method, evaluations):
-    domain = Domain(PAPER, levels(4))
-    assert method.size(domain) == evaluations
     assert propagate(monotone, PAPER, method).evaluations == evaluations
 
 
 def test_general_method_shares_maps_and_moduli():
-    points = General().points(Domain(PAPER, levels(4))).points
+    points = propagate(monotone, PAPER, General()).samples.points
     assert len(np.unique(points[:, :2], axis=0)) == 55
     assert len(np.unique(points[:, 2])) == 9
 

@@ -57,4 +57,3 @@ def test_a_level_beside_a_decimal_by_rounding_is_that_decimal():
     for k in range(11):
         assert steps.cut(k / 10) == steps.cut(float(grid[k])) == (grid[k], 3 - grid[k])
     assert steps.cut(0.35) == steps.cut(0.3)  # the wider one
-    assert steps.known(0.35) == pytest.approx(0.3)
