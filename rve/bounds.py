@@ -12,20 +12,22 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import AnyPhase
 
 
-def voigt(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
-    """Stiffness at uniform strain, shape (…, 3, 3), in Pa, for area fractions of shape (…)."""
+def voigt(fraction: Array, matrix: Array, inclusion: Array) -> Array:
+    """Stiffness at uniform strain, shape (…, k, k), for fractions of the inclusion of shape (…).
+
+    Args:
+        fraction: Of area or volume.
+        matrix: Stiffness of the matrix, shape (k, k).
+        inclusion: That of the inclusion, in the same unit.
+    """
     share = np.asarray(fraction)[..., None, None]
-    return np.asarray((1 - share) * matrix.stiffness + share * inclusion.stiffness)
+    return np.asarray((1 - share) * matrix + share * inclusion)
 
 
-def reuss(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
-    """Stiffness at uniform in-plane stress, shape (…, 3, 3), in Pa."""
-    share = np.asarray(fraction)[..., None, None]
+def reuss(fraction: Array, matrix: Array, inclusion: Array) -> Array:
+    """Stiffness at uniform stress, as `voigt`."""
     return np.asarray(
-        np.linalg.inv(
-            (1 - share) * np.linalg.inv(matrix.stiffness)
-            + share * np.linalg.inv(inclusion.stiffness)
-        )
+        np.linalg.inv(voigt(fraction, np.linalg.inv(matrix), np.linalg.inv(inclusion)))
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.stochastic import RadiusMap
 
 STRAIN = 0.01  # eq. 15
@@ -101,20 +101,24 @@ class Cell:
         matrix: Material outside the particle.
         inclusion: Material of the particle.
         radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
-        outline: Distance of the particle's edge from its centre over r(θ), a function of the angle;
-            None for a circle.
+        outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
     """
 
     matrix: AnyPhase
     inclusion: AnyPhase
     radius: RadiusMap
-    outline: Callable[[Array], Array] | None = None
+    outline: Outline = circle
+
+    @property
+    def stiffness(self) -> tuple[Array, Array]:
+        """Of matrix and particle, (3, 3) each, in Pa."""
+        return self.matrix.stiffness, self.inclusion.stiffness
 
     @property
     def square(self) -> bool:
         """True where the stiffness has the symmetry of the square: round, isotropic."""
-        plain = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
-        return plain and self.outline is None
+        isotropic = isinstance(self.matrix, Phase) and isinstance(self.inclusion, Phase)
+        return isotropic and is_round(self.outline)
 
 
 def square_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:

@@ -7,6 +7,8 @@ takes it from here. Signals stay the program's.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import cffi
@@ -28,29 +30,30 @@ with uninterrupted():
     from dolfinx.fem import petsc
     from petsc4py import PETSc
 
-__all__ = [
-    "MPI", "PETSc", "at_points", "basix", "compiled", "factors", "fem", "mesh_of", "option_is_used",
-    "petsc", "ufl",
-]  # fmt: skip
+__all__ = ["MPI", "PETSc", "basix", "fem", "petsc", "ufl"]  # imported from here by others
 
 # twice as fast as the default -O2, equal to round-off; other processes may compile the same
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}
 
 
-def compiled(form: ufl.Form) -> fem.Form:
-    """The form, compiled or from DOLFINx's cache."""
-    with (
-        warnings.catch_warnings()
-    ):  # UFL signs a form by its quadrature points, which print in full
-        warnings.filterwarnings("ignore", message="Applying str")
-        return fem.form(form, jit_options=JIT)
-
-
-def at_points(value: Any, points: Array) -> fem.Expression:
-    """A UFL expression, compiled, at `points` of the reference cell."""
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the warning that UFL signs a form by its quadrature points, which print in full."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Applying str")
-        return fem.Expression(value, points, jit_options=JIT)
+        yield
+
+
+@_quiet()
+def compiled(form: ufl.Form) -> fem.Form:
+    """The form, compiled or from DOLFINx's cache."""
+    return fem.form(form, jit_options=JIT)
+
+
+@_quiet()
+def at_points(value: Any, points: Array) -> fem.Expression:
+    """A UFL expression, compiled, at `points` of the reference cell."""
+    return fem.Expression(value, points, jit_options=JIT)
 
 
 def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
@@ -85,6 +88,15 @@ def option_is_used(name: str) -> bool:
     return any(byte != b"\0" for byte in used)
 
 
-def factors() -> str:
-    """The library that factorises plane problems, the fastest of those at hand."""
-    return "cholmod" if PETSc.Sys.hasExternalPackage("cholmod") else "mumps"
+def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:
+    """A direct solver by the fastest library at hand; options under the prefix come before it."""
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    ksp = PETSc.KSP().create(matrix.comm)
+    ksp.setOptionsPrefix(prefix)
+    ksp.setOperators(matrix)
+    ksp.setType("preonly")
+    ksp.pc.setType("cholesky")
+    library = "cholmod" if PETSc.Sys.hasExternalPackage("cholmod") else "mumps"
+    ksp.pc.setFactorSolverType(library)
+    ksp.setFromOptions()
+    return ksp

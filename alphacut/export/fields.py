@@ -11,7 +11,6 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import whole_file
 from alphacut.rve.cell import LOADS, Cell
-from alphacut.rve.mesh.outline import circle
 
 if TYPE_CHECKING:
     import meshio
@@ -86,7 +85,7 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     from alphacut.rve.mesh.prism_grid import PrismGrid
     from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 
-    outline = cell.outline or circle
+    outline = cell.outline
     radius = reference_radius(cell.radius, outline)
     plane = triangulate(size=size, radius=radius, outline=outline)
     grid = PrismGrid(plane, layers)
@@ -105,7 +104,7 @@ def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     from alphacut.rve.prism import fields as prism
     from alphacut.rve.prism.model import PrismModel
 
-    model = PrismModel(size, layers, outline=cell.outline or circle)
+    model = PrismModel(size, layers, outline=cell.outline)
     fields = prism.cell_fields(model, cell.radius, cell.matrix, cell.inclusion)
     return wedges(fields.points, fields.cells, fields.phase, point_data(fields))
 

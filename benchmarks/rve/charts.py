@@ -21,7 +21,7 @@ from alphacut.rve.result import Homogenised
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from benchmarks.rows import write
-from benchmarks.rve.solvers import MATRIX, PAPER, PARTICLE
+from benchmarks.rve.solvers import MATRIX, PAPER, PARTICLE, SOLVERS
 
 RESULTS = Path(__file__).parents[1] / "results"
 PLANES = ((0.6, 4), (0.45, 5), (0.3, 6), (0.2, 8), (0.14, 9))  # mesh size, nodes in θ
@@ -68,7 +68,8 @@ def families() -> dict[str, list[tuple[str, Way]]]:
         ("prism, interface ignored", "theta", "sign"),
     ):
         lines[name] = [
-            (f"h {h:g}, {n} layers", way(PrismModel(h, n, interface, solver))) for h, n in PRISMS
+            (f"h {h:g}, {n} layers", way(PrismModel(h, n, interface, SOLVERS[solver])))
+            for h, n in PRISMS
         ]
     return lines
 

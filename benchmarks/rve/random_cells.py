@@ -85,20 +85,20 @@ def any_cell(rng: np.random.Generator) -> Cell:
         [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
     )
     particle = VoigtPhase((turn.T @ own @ turn).tolist())
-    outline = Ellipse(float(rng.choice([0.5, 2.0]))) if rng.random() < 0.75 else None
+    outline = Ellipse(float(rng.choice([0.5, 2.0]))) if rng.random() < 0.75 else circle
     return Cell(Phase(20e9, 0.3), particle, random_map(rng, 0.66), outline)
 
 
 def draw_prism(rng: np.random.Generator, cell: Cell) -> PrismModel:
     """Prisms at a random resolution."""
     size, layers = float(rng.uniform(0.2, 0.5)), int(rng.choice([1, 2, 4, 6]))
-    return PrismModel(size, layers, stiffness=True, outline=cell.outline or circle)
+    return PrismModel(size, layers, stiffness=True, outline=cell.outline)
 
 
 def draw_slices(rng: np.random.Generator, cell: Cell) -> SlicesModel:
     """Slices at a random resolution."""
     size, points = float(rng.uniform(0.2, 1.0)), int(rng.integers(3, 10))
-    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline or circle)
+    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline)
 
 
 def judged(own: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
@@ -154,9 +154,7 @@ def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
         truth = SeriesModel(accuracy=1e-12).solve(*parts)[0]
         numbers = [one for result in results for one in judged_curve(result)]
     else:
-        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline or circle).solve(
-            *parts
-        )[0]
+        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline).solve(*parts)[0]
         numbers = []
     return numbers + [one for result in results for one in judged(result, truth)]
 

@@ -14,7 +14,6 @@ from alphacut.rve.mesh import square
 from alphacut.rve.mesh.outline import Outline, circle, extents, reach, require_fit
 from alphacut.rve.settings import require_mesh_size
 
-EDGES = ((1, 2), (0, 2), (0, 1))  # of a triangle, in the order of Basix
 _CLOSEST = 0.9995
 _COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
 
@@ -108,14 +107,9 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
     )
     lattice: Array = np.asarray(element.points, float)
     barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
-    ends, edges = _number_edges(mesh.triangles)
+    ends, edges, on_interface = square.edges(mesh.triangles, mesh.inside)
     places = np.einsum("nl,eld->end", barycentric, mesh.points[mesh.triangles])
-    sides = [
-        np.bincount(edges[mesh.inside == flag].ravel(), minlength=len(ends))
-        for flag in (False, True)
-    ]
-    on_interface = (sides[0] > 0) & (sides[1] > 0)
-    for k, (a, b) in enumerate(EDGES):
+    for k, (a, b) in enumerate(square.EDGES):
         bent = np.flatnonzero(on_interface[edges[:, k]])
         places[bent] += _bend(mesh, mesh.triangles[bent][:, [a, b]], barycentric[:, [a, b]])
     cells = _number_nodes(
@@ -124,13 +118,6 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
     points = np.empty((cells.max() + 1, 2))
     points[cells] = places
     return points, cells
-
-
-def _number_edges(triangles: Rows) -> tuple[Rows, Rows]:
-    """The two vertices of each edge (k, 2) and the edges of each triangle (m, 3)."""
-    pairs = np.stack([triangles[:, list(pair)] for pair in EDGES], axis=1)
-    ends, edges = np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)
-    return ends, edges.reshape(-1, 3)
 
 
 def _number_nodes(

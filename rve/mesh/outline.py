@@ -61,18 +61,15 @@ def area(outline: Outline) -> float:
 
 def reach(outline: Outline) -> float:
     """Greatest coordinate on the outline for ρ = 1, below 1/ρ where the particle fits."""
-    extents = outline(_ANGLES) * np.maximum(abs(np.cos(_ANGLES)), abs(np.sin(_ANGLES)))
-    return float(extents.max())
+    wide, high, _ = extents(outline)
+    return max(wide, high)
 
 
 def extents(outline: Outline) -> tuple[float, float, float]:
     """Greatest |x1| and |x2|, and least distance from the centre, for ρ = 1."""
     s = outline(_ANGLES)
-    return (
-        float((s * abs(np.cos(_ANGLES))).max()),
-        float((s * abs(np.sin(_ANGLES))).max()),
-        float(s.min()),
-    )
+    wide, high = (float((s * abs(way(_ANGLES))).max()) for way in (np.cos, np.sin))
+    return wide, high, float(s.min())
 
 
 def require_fit(outline: Outline, radius: float) -> None:
@@ -85,6 +82,5 @@ def require_fit(outline: Outline, radius: float) -> None:
     if not (s > 0).all() or abs(s[0] - s[-1]) > 1e-9 * s[0]:
         raise RefusedError("outline", s.min(), "positive distances of period 2π")
     if not radius > 0 or radius * reach(outline) >= 1:
-        limit = 1 / reach(outline)
-        raise RefusedError("radius", f"{radius:g}", f"values in (0, {limit:.4g}), in halves of the"
-                           " cell's side")  # fmt: skip
+        allowed = f"values in (0, {1 / reach(outline):.4g}), in halves of the cell's side"
+        raise RefusedError("radius", f"{radius:g}", allowed)

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Rows
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.mesh.triangulation import Triangulation
 
 
@@ -37,21 +37,28 @@ class Periodicity:
 
 @lru_cache(maxsize=4)
 def identify(plane: Triangulation) -> Periodicity:
-    """Pair the nodes on opposite sides of the cell.
+    """Pair the nodes on opposite sides of the cell."""
+    unknown = unknowns(plane.points)
+    return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, int(unknown.max()) + 1)
+
+
+def unknowns(points: Array) -> Rows:
+    """Unknown of each node of the cell, in the order of the nodes, −1 at the corners, shape (n,).
+
+    Args:
+        points: Positions, shape (n, 2).
 
     Raises:
-        RuntimeError: A node has none.
+        RuntimeError: A node of a side has no partner.
     """
-    keys = np.round(plane.points * 1e7).astype(np.int64)
-    folded = np.where(keys == 10**7, -(10**7), keys)
+    side = 10**8
+    keys = np.round(points * side).astype(np.int64)
+    folded = np.where(keys == side, -side, keys)
     _, first, label = np.unique(folded, axis=0, return_index=True, return_inverse=True)
     label = label.ravel()
-    sides = (abs(keys) == 10**7).sum(axis=1)
+    sides = (abs(keys) == side).sum(axis=1)
     if (np.bincount(label)[label] != 2**sides).any():
         raise RuntimeError("a node of a side has no partner on the opposite side: mesh both alike")
-    # the corner first, then as numbered
-    order = np.argsort(np.where((abs(keys[first]) == 10**7).all(axis=1), -1, first))
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order)) - 1
-    unknown = rank[label]
-    return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, len(order) - 1)
+    corner = (abs(keys[first]) == side).all(axis=1)
+    order = np.argsort(np.where(corner, -1, first))
+    return np.asarray(np.argsort(order)[label] - 1)

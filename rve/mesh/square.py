@@ -13,6 +13,8 @@ from alphacut.rve.mesh.outline import Outline, is_round
 
 Triangles = tuple[Array, Rows, Mask]
 Sizes = Callable[[float, float], float]
+EDGES = ((1, 2), (0, 2), (0, 1))
+"""Of a triangle by their vertices, in Basix's order."""
 _ARC = np.linspace(0, np.pi / 2, 17)[1:-1]  # of a quarter of an outline
 
 
@@ -46,10 +48,23 @@ def triangles(
     return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), inside
 
 
+def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
+    """Edges of a mesh: their ends, those of each triangle, and which lie on the interface.
+
+    Returns:
+        Shapes (k, 2), (m, 3) in the order of `EDGES`, and (k,).
+    """
+    pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
+    ends, number = np.unique(pairs, axis=0, return_inverse=True)
+    number = number.reshape(-1, 3)
+    sides = [np.isin(np.arange(len(ends)), number[inside == flag]) for flag in (False, True)]
+    return ends, number, sides[0] & sides[1]
+
+
 @contextmanager
 def _model() -> Iterator[Any]:
     """Gmsh with an empty model, quiet, on one thread."""
-    import gmsh  # here: loading it takes a tenth of a second, and kept meshes need none
+    import gmsh
 
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
     try:

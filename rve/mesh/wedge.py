@@ -50,10 +50,21 @@ def wedge(components: int) -> Any:
     evaluations = [
         [np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in entity] for entity in points
     ]
+    identity, smooth = basix.MapType.identity, basix.SobolevSpace.H1
+    degrees = 1, 2  # Lagrange's subdegree and superdegree
     scalar = basix.ufl.custom_element(
-        PRISM, [], _coefficients(), points, evaluations, 0, basix.MapType.identity,
-        basix.SobolevSpace.H1, False, 1, 2, basix.PolysetType.standard,
-    )  # fmt: skip
+        PRISM,
+        [],
+        _coefficients(),
+        points,
+        evaluations,
+        0,
+        identity,
+        smooth,
+        False,
+        *degrees,
+        basix.PolysetType.standard,
+    )
     return basix.ufl.blocked_element(scalar, shape=(components,))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
-from alphacut.rve.mesh.outline import area, circle
+from alphacut.rve.mesh.outline import area
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
@@ -57,7 +57,7 @@ def _by_series(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
 
 def _by_slices(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
     """The same by slices; between their nodes by the polynomial through them."""
-    model = SlicesModel(points=_POINTS, outline=cell.outline or circle)
+    model = SlicesModel(points=_POINTS, outline=cell.outline)
     exact = model.solve(cell.radius, cell.matrix, [cell.inclusion])[0]
     nodes = exact.curve
     assert nodes.error is not None
@@ -107,10 +107,10 @@ def _of_nodes(curve: StressCurve, exact: Array, left: Array) -> Array:
 
 def _by_bounds(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
     """Errors that no exact value exceeds."""
-    share = area(cell.outline or circle) / AREA * cell.radius(curve.theta) ** 2
+    share = area(cell.outline) / AREA * cell.radius(curve.theta) ** 2
     ends = [
         replace(curve, stiffness=c, s11=stresses(c)[0], s12=stresses(c)[1])
-        for c in (bound(share, cell.matrix, cell.inclusion) for bound in (reuss, voigt))
+        for c in (bound(share, *cell.stiffness) for bound in (reuss, voigt))
     ]
     own = _readings(curve)[-1]
     mean = np.max([_apart(own, _readings(end)[-1]) for end in ends], axis=0)

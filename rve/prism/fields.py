@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import AnyPhase
+from alphacut.rve.cell import AnyPhase, Cell
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.form import strain
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
+from alphacut.rve.solver.krylov import solve
 from alphacut.stochastic import RadiusMap
 
 NODES = 15
@@ -49,11 +50,11 @@ def cell_fields(
         ConvergenceError: The linear solver stopped early.
         FoldedMeshError: The map bends more than the layers can follow.
     """
-    problem, phases = model.problem(radius_map), (matrix.stiffness, inclusion.stiffness)
+    cell, problem = Cell(matrix, inclusion, radius_map, model.outline), model.problem(radius_map)
     form, grid = problem.form, problem.form.grid
-    problem.assemble(phases)
-    loads = model.loads(matrix, inclusion)
-    vectors = problem.solver(model.options).solve(problem.loads(loads)).vectors
+    problem.assemble(cell.stiffness)
+    loads = model.loads(cell)
+    vectors = solve(problem.solver(model.options), problem.loads(loads)).vectors
     fluctuations = [problem.field(vector) for vector in vectors]
     positions = grid.positions(radius_map)
     total = np.empty((grid.nodes, 2, len(vectors)))
@@ -64,7 +65,7 @@ def cell_fields(
         total[form.node, :, k] = u + positions[form.node, :2] @ tensor
         wedges[form.wedge, ..., k] = _strain_at_nodes(problem, u) + uniform
     inside: Rows = grid.inside.astype(np.intp)
-    stress = np.stack(phases)[inside][:, None] @ wedges
+    stress = np.stack(cell.stiffness)[inside][:, None] @ wedges
     numbered = grid.cells + inside[:, None] * grid.nodes
     kept, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)

@@ -57,13 +57,10 @@ class PrismForm:
             "quadrature_points": points,
             "quadrature_weights": weights,
         }
-        # a mesh that knows nothing of the particle has it at points of the first part
-        inside = self.grid.inside[self.wedge] & self.grid.conforming
-        parts = [
-            ufl.Measure("dx", self.mesh, 1, rule, [(1, np.flatnonzero(one).astype(np.int32))])
-            for one in (~inside, inside)
-        ]
-        self.elastic = CellForm(self.space, fem.functionspace(self.mesh, at_each), parts)
+        inside = self.grid.inside[self.wedge]
+        phases = [(k, np.flatnonzero(inside == k).astype(np.int32)) for k in (0, 1)]
+        dx = ufl.Measure("dx", self.mesh, metadata=rule, subdomain_data=phases)
+        self.elastic = CellForm(self.space, fem.functionspace(self.mesh, at_each), [dx(0), dx(1)])
         self._u = fem.Function(self.space)
         self._strain = at_points(strain(self._u), points)
         self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
@@ -82,16 +79,14 @@ class PrismForm:
         theta, _ = self.slices()
         density = radius.distribution.pdf(theta)
         if not (density > 0).all():
-            raise RefusedError(
-                f"density of θ at {theta[~(density > 0)][0]:.4g}", f"{density.min():g}",
-                "positive densities", "shorten the support, or take the series",
-            )  # fmt: skip
+            place = f"density of θ at {theta[~(density > 0)][0]:.4g}"
+            cure = "shorten the support, or take the series"
+            raise RefusedError(place, f"{density.min():g}", "positive densities", cure)
         self.areas = self._areas()
-        if not self.mesh.comm.allreduce(int((self.areas <= 0).any())) == 0:
-            raise FoldedMeshError(
-                f"the mesh folds over where it follows the radius through {self.grid.layers} layers"
-                " in θ", "take more layers or a smaller mesh size",
-            )  # fmt: skip
+        if self.mesh.comm.allreduce(int((self.areas <= 0).any())):
+            where = f"where it follows the radius through {self.grid.layers} layers in θ"
+            cure = "take more layers or a smaller mesh size"
+            raise FoldedMeshError(f"the mesh folds over {where}", cure)
         self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
         self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
 

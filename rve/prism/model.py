@@ -19,9 +19,9 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import LOADS, THREE_LOADS, AnyPhase, Cell, Phase
-from alphacut.rve.certificate import ROUND_OFF, WHAT, Limits, certify, require
+from alphacut.rve.certificate import ROUND_OFF, hill_mandel, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
-from alphacut.rve.mesh.outline import Outline, circle, is_round
+from alphacut.rve.mesh.outline import Outline, circle
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.rve.prism.error_estimate import judged
@@ -29,12 +29,12 @@ from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_ba
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import require_compressible, require_mesh_size, require_parts
-from alphacut.rve.solver.krylov import Solutions
+from alphacut.rve.solver.krylov import Solutions, solve
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap
 
 INTERFACES = ("conforming", "sign")
-STAGES = ("mesh", "assemble", "setup", "solve")
+Seconds = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,7 @@ class PrismModel:
         layers: Layers in θ, at least 1 (paper: 12).
         interface: "conforming", or "sign" for a mesh that ignores the interface (first order in h,
             too stiff: for comparison).
-        solver: Name in `rve.solver.options.SOLVERS`.
-        petsc: PETSc options without their prefix `rve_`; they override the solver's own.
+        petsc: PETSc options without their prefix `rve_`; they override the default solver's.
         parallel: Whether all MPI ranks work on one cell together; if not each works on its own.
         stiffness: Whether to solve a third load, for the whole planar stiffness.
         estimate: Whether to declare the errors, measured against the series, or the slices where
@@ -63,7 +62,6 @@ class PrismModel:
     mesh_size: float = 0.15
     layers: int = 12
     interface: str = "conforming"
-    solver: str = "theta"
     petsc: Mapping[str, str] = field(default_factory=dict)
     parallel: bool = False
     stiffness: bool = False
@@ -78,7 +76,6 @@ class PrismModel:
             raise RefusedError("the number of layers", self.layers, "1 or more")
         if self.interface not in INTERFACES:
             raise RefusedError("the interface", repr(self.interface), ", ".join(INTERFACES))
-        SolverOptions(self.solver)
 
     def solve(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
@@ -93,20 +90,28 @@ class PrismModel:
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        watch = Stopwatch()
-        with watch("mesh"):
+        seconds: Seconds = {}
+        with timed(seconds, "mesh"):
             problem = self.problem(radius_map)
-        bases: dict[float, ModulusBasis | None] = {}
+        with timed(seconds, "solve"):
+            basis = self._basis(problem, matrix, inclusions)
         results = []
         for inclusion in inclusions:
-            result = None
-            if isinstance(matrix, Phase) and isinstance(inclusion, Phase) and self._projects:
-                ratio = inclusion.poisson
-                if ratio not in bases:
-                    bases[ratio] = self._basis(problem, matrix, ratio, watch)
-                result = self._projected(problem, bases[ratio], (matrix, inclusion), watch)
-            result = result or self._solved(problem, (matrix, inclusion), watch)
-            results.append(replace(result, seconds=watch.report()))
+            cell = Cell(matrix, inclusion, radius_map, self.outline)
+            if basis is not None and isinstance(inclusion, Phase):
+                strains, residual = basis.project(inclusion.modulus), basis.error
+                iterations = basis.iterations
+            else:
+                strains, solved = self._solved(problem, cell, seconds)
+                iterations, residual = solved.iterations, solved.residual
+            result = replace(
+                self._result(strains, cell, residual),
+                unknowns=problem.numbering.size,
+                iterations=iterations,
+                seconds={**seconds, "total": sum(seconds.values())},
+            )
+            results.append(result)
+            seconds = {}
         return results
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
@@ -127,105 +132,72 @@ class PrismModel:
     @property
     def options(self) -> SolverOptions:
         """The linear solver with what overrides it."""
-        return SolverOptions(self.solver, self.petsc)
+        return SolverOptions(self.petsc)
 
-    def loads(self, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
+    def loads(self, cell: Cell) -> Array:
         """Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15).
 
         Two tell all moduli of a cell with the symmetry of the square, of others three.
         """
-        round_ = is_round(self.outline)
-        square = round_ and isinstance(matrix, Phase) and isinstance(inclusion, Phase)
-        return LOADS if square and not self.stiffness else THREE_LOADS
-
-    @property
-    def _projects(self) -> bool:
-        """True where samples are projected: ordinary solver and mesh, and a range of moduli."""
-        ordinary = self.options == SolverOptions() and self.interface == "conforming"
-        return ordinary and self.moduli is not None and self.moduli[1] > self.moduli[0]
+        return LOADS if cell.square and not self.stiffness else THREE_LOADS
 
     def _basis(
-        self, problem: PrismProblem, matrix: Phase, poisson: float, watch: Stopwatch
+        self, problem: PrismProblem, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> ModulusBasis | None:
-        """Solutions to project on, or None where two of them do not carry the others."""
-        assert self.moduli is not None
-        with watch("solve"):
-            loads = self.loads(matrix, Phase(self.moduli[0], poisson))
-            basis = modulus_basis(problem, matrix, poisson, self.moduli, loads)
+        """Solutions to project the samples on; None where each is to be solved."""
+        ends, ratios = self.moduli, {getattr(one, "poisson", None) for one in inclusions}
+        ordinary = not self.petsc and self.interface == "conforming" and len(ratios) == 1
+        ratio = ratios.pop()
+        if ends is None or ratio is None or not (ordinary and isinstance(matrix, Phase)):
+            return None
+        if ends[0] == ends[1]:
+            return None
+        cell = Cell(matrix, inclusions[0], problem.map, self.outline)
+        basis = modulus_basis(problem, matrix, ratio, ends, self.loads(cell))
         return basis if basis.error <= TOLERANCE else None
 
-    def _projected(
-        self,
-        problem: PrismProblem,
-        basis: ModulusBasis | None,
-        phases: tuple[Phase, Phase],
-        watch: Stopwatch,
-    ) -> Homogenised | None:
-        low, high = self.moduli or (0.0, np.inf)
-        modulus = phases[1].modulus
-        if not low * (1 - ROUND_OFF) <= modulus <= high * (1 + ROUND_OFF):
-            value, allowed = f"{modulus:g} Pa", f"values in [{low:g}, {high:g}] Pa"
-            raise RefusedError("modulus of the particle", value, allowed, "widen `moduli`")
-        if basis is None:
-            return None
-        with watch("solve"):
-            strains = basis.project(modulus)
-        result = self._result(problem, strains, phases, basis.error, watch)
-        reason = "projected on solutions at two moduli of the particle"
-        return replace(result, iterations=basis.iterations, reason=reason)
-
     def _solved(
-        self, problem: PrismProblem, phases: tuple[AnyPhase, AnyPhase], watch: Stopwatch
-    ) -> Homogenised:
-        stiffness = (phases[0].stiffness, phases[1].stiffness)
-        with watch("assemble"):
-            problem.assemble(stiffness)
-            strained = self.loads(*phases)
-            loads = problem.loads(strained)
-        if np.array_equal(*stiffness):  # the affine field is the solution
+        self, problem: PrismProblem, cell: Cell, seconds: Seconds
+    ) -> tuple[SliceStrains, Solutions]:
+        """Means over the slices of a sample, and the solutions that they are of."""
+        strains = self.loads(cell)
+        with timed(seconds, "assemble"):
+            problem.assemble(cell.stiffness)
+            loads = problem.loads(strains)
+        if np.array_equal(*cell.stiffness):  # the affine field is the solution
             solved = Solutions([load.duplicate() for load in loads], (0,) * len(loads), 0.0)
         else:
-            with watch("setup"):
-                solver = problem.solver(self.options)
-            with watch("solve"):
-                solved = solver.solve(loads)
-        with watch("solve"):
+            with timed(seconds, "setup"):
+                ksp = problem.solver(self.options)
+            with timed(seconds, "solve"):
+                solved = solve(ksp, loads)
+        with timed(seconds, "solve"):
             fluctuations = [problem.field(vector) for vector in solved.vectors]
-            strains = problem.slice_strains(list(zip(strained, fluctuations, strict=True)))
-        result = self._result(problem, strains, phases, solved.residual, watch)
-        return replace(result, iterations=solved.iterations)
+            means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
+        return means, solved
 
-    def _result(
-        self,
-        problem: PrismProblem,
-        strains: SliceStrains,
-        phases: tuple[AnyPhase, AnyPhase],
-        residual: float,
-        watch: Stopwatch,
-    ) -> Homogenised:
+    def _result(self, strains: SliceStrains, cell: Cell, residual: float) -> Homogenised:
         """The result with its certificate and its declared errors."""
-        pair = (phases[0].stiffness, phases[1].stiffness)
-        stress, loads = strains.stress(pair), self.loads(*phases)
+        stress, loads = strains.stress(cell.stiffness), self.loads(cell)
         whole = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
-        outline = None if is_round(self.outline) else self.outline
-        result = Homogenised(
-            curve=curve,
-            method=self.name,
-            solver=str(self.options),
-            unknowns=problem.numbering.size,
-            cell=Cell(*phases, problem.map, outline),
-        )
+        result = Homogenised(curve, self.name, str(self.options), cell=cell)
         if self.estimate:
-            with watch("estimate"):
-                result = judged(result)
+            result = judged(result)
         allowed = 2 * result.largest_error if result.errors else self._roughly
-        limits = Limits(self.options.residual_limit, ROUND_OFF + allowed)
-        share = strains.fraction, strains.weights
-        checks = certify(stress, strains.energy(pair), loads, share, phases)
-        checks["residual"] = residual
-        ordered = {name: checks[name] for name in WHAT if name in checks}
-        return replace(result, checks=require(ordered, limits))
+        phases = cell.matrix, cell.inclusion
+        energy = strains.energy(cell.stiffness)
+        checks = {
+            "residual": residual,
+            "hill_mandel": hill_mandel(mean(strains.weights, stress), energy, loads),
+            **stress_checks(stress, loads, strains.fraction, strains.weights, phases),
+        }
+        require(
+            checks,
+            algebraic=self.options.residual_limit,
+            discretisation=ROUND_OFF + allowed,
+        )
+        return replace(result, checks=checks)
 
     @property
     def _roughly(self) -> float:
@@ -233,25 +205,14 @@ class PrismModel:
         return 0.1 * self.mesh_size ** (3 if self.interface == "conforming" else 1)
 
 
-class Stopwatch:
-    """Adds up wall time by stage."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(STAGES, 0.0)
-
-    @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        """Add the time of the block to `stage`."""
-        started = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - started
-
-    def report(self) -> dict[str, float]:
-        """Seconds by stage since the last report, their total without the estimate's."""
-        seconds, self.seconds = self.seconds, dict.fromkeys(STAGES, 0.0)
-        return {**seconds, "total": sum(seconds[stage] for stage in STAGES)}
+@contextmanager
+def timed(seconds: Seconds, stage: str) -> Iterator[None]:
+    """Add the wall time of the block to that of a stage."""
+    started = perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = seconds.get(stage, 0.0) + perf_counter() - started
 
 
 @lru_cache(maxsize=2)

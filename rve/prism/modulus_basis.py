@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Phase
 from alphacut.rve.fenicsx import PETSc
 from alphacut.rve.prism.problem import CELL_AREA, PrismProblem, SliceStrains
-from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.krylov import solve
 from alphacut.rve.solver.options import SolverOptions
 
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
@@ -35,7 +36,7 @@ class ModulusBasis:
         loads: f_0 and f_1, projected, shape (2, fields, loads).
         strains: Of the macroscopic strains alone, then of the solutions.
         iterations: Of the solutions.
-        unit: Modulus that K_1 is of, in Pa.
+        ends: Least and greatest modulus, in Pa; K_1 is of the latter.
         error: Energy of the residual, the larger at the ends, over that of the affine field.
     """
 
@@ -43,18 +44,26 @@ class ModulusBasis:
     loads: Array
     strains: SliceStrains
     iterations: tuple[int, ...]
-    unit: float
+    ends: tuple[float, float]
     error: float = np.nan
 
     def project(self, modulus: float) -> SliceStrains:
-        """Mean strains of the slices with this modulus of the particle, in Pa."""
+        """Mean strains of the slices with this modulus of the particle, in Pa.
+
+        Raises:
+            RefusedError: It lies outside the range.
+        """
+        low, high = self.ends
+        if not low * (1 - ROUND_OFF) <= modulus <= high * (1 + ROUND_OFF):
+            value, allowed = f"{modulus:g} Pa", f"values in [{low:g}, {high:g}] Pa"
+            raise RefusedError("modulus of the particle", value, allowed, "widen `moduli`")
         coefficients = self.coefficients(modulus)
         return self.strains.combined(np.concatenate([np.eye(coefficients.shape[1]), coefficients]))
 
     def coefficients(self, modulus: float) -> Array:
         """Of the solutions for each load, shape (fields, loads)."""
         system, loads = (
-            one[0] + modulus / self.unit * one[1] for one in (self.stiffness, self.loads)
+            one[0] + modulus / self.ends[1] * one[1] for one in (self.stiffness, self.loads)
         )
         return np.asarray(np.linalg.solve(system, loads))
 
@@ -77,19 +86,18 @@ def modulus_basis(
     phases = matrix.stiffness, Phase(ends[1], poisson).stiffness
     systems = [problem.assemble(phases, phase).copy() for phase in _PHASES]
     forces = [problem.loads(strains, phase) for phase in _PHASES]
-    solver, solved = None, []
+    ksp, solved = None, []
     for share in _CHEBYSHEV:
         part = (ends[0] + share * (ends[1] - ends[0])) / ends[1]
         systems[0].copy(problem.matrix, _SAME)
         problem.matrix.axpy(part, systems[1], _SAME)
-        solver = solver or problem.solver(_LOOSE)  # its factors serve both
-        solved.append(
-            solver.solve([_sum(first, second, part) for first, second in zip(*forces, strict=True)])
-        )
-    assert solver is not None
+        ksp = ksp or problem.solver(_LOOSE)  # its factors serve both
+        loads = [_sum(first, second, part) for first, second in zip(*forces, strict=True)]
+        solved.append(solve(ksp, loads))
+    assert ksp is not None
     vectors = _orthonormal([v for solutions in solved for v in solutions.vectors])
     images = [[system * v for v in vectors] for system in systems]
-    stiffness, loads = (
+    stiffness, projected = (
         np.array([[[v.dot(w) for w in side] for v in vectors] for side in sides])
         for sides in (images, forces)
     )
@@ -98,10 +106,10 @@ def modulus_basis(
         [(strain, None) for strain in strains] + [(none, problem.field(v)) for v in vectors]
     )
     iterations = sum((solutions.iterations for solutions in solved), ())
-    basis = ModulusBasis(stiffness, loads, means, iterations, ends[1])
+    basis = ModulusBasis(stiffness, projected, means, iterations, ends)
     scale = CELL_AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
     # half-way it is as large as at the ends or less: the nodes are those of Chebyshev
-    left = [_left_out(basis, modulus, images, forces, solver) for modulus in ends]
+    left = [_left_out(basis, modulus, images, forces, ksp.pc) for modulus in ends]
     return replace(basis, error=float((np.array(left) / scale).max()))
 
 
@@ -110,16 +118,16 @@ def _left_out(
     modulus: float,
     images: list[list[PETSc.Vec]],
     forces: list[list[PETSc.Vec]],
-    solver: LinearSolver,
+    preconditioner: PETSc.PC,
 ) -> Array:
     """Energy of the residual at a modulus, by the preconditioner, shape (loads,)."""
-    part, energies = modulus / basis.unit, []
+    part, energies = modulus / basis.ends[1], []
     for k, column in enumerate(basis.coefficients(modulus).T):
         residual = _sum(forces[0][k], forces[1][k], part)
         shares = np.concatenate([-column, -part * column])
         residual.maxpy(shares.tolist(), images[0] + images[1])
         answer = residual.duplicate()
-        solver.ksp.pc.apply(residual, answer)
+        preconditioner.apply(residual, answer)
         energies.append(residual.dot(answer))
     return np.array(energies)
 

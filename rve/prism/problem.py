@@ -14,7 +14,7 @@ from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES
 from alphacut.rve.prism.form import PrismForm
-from alphacut.rve.solver.krylov import LinearSolver
+from alphacut.rve.solver.krylov import krylov_solver
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap
@@ -77,7 +77,6 @@ class PrismProblem:
         self.numbering = LevelNumbering(grid, identify(grid.plane), comm)
         self._local = self.numbering.local_map(self.form.node)
         self.matrix = self.numbering.matrix(self._local)
-        self._solver: LinearSolver | None = None
 
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
@@ -106,14 +105,9 @@ class PrismProblem:
         forces = [self.form.elastic.load(one, parts) for one in strains]
         return [self.numbering.vector(self._local, one) for one in forces]
 
-    def solver(self, options: SolverOptions) -> LinearSolver:
-        """The solver of the stiffness as assembled; the last, if by levels, is renewed."""
-        law, last = self.map.distribution, self._solver
-        if last is not None and last.options == options and options.by_levels:
-            last.renew(law)
-            return last
-        self._solver = LinearSolver(self.matrix, self.numbering, law, options)
-        return self._solver
+    def solver(self, options: SolverOptions) -> PETSc.KSP:
+        """The solver of the stiffness as assembled."""
+        return krylov_solver(self.matrix, self.numbering, self.map.distribution, options)
 
     def field(self, vector: PETSc.Vec) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
@@ -139,9 +133,14 @@ class PrismProblem:
         weight = form.of_slices(weights)[None, :, :, None] * parts
         flat = strain.reshape(-1, 3 * len(fields))
         products = np.array([flat.T @ (one.reshape(-1, 1) * flat) for one in weight])
-        total = [self.comm.allreduce(one) for one in (means, fraction, products)]
-        shape = (2, 3, len(fields), 3, len(fields))
+        means, fraction, products = (
+            self.comm.allreduce(one) for one in (means, fraction, products)
+        )
+        count = len(fields)
         return SliceStrains(
-            theta, weights, total[0].reshape(2, -1, 3, len(fields)), total[1].ravel(),
-            total[2].reshape(shape),
-        )  # fmt: skip
+            theta=theta,
+            weights=weights,
+            strain=means.reshape(2, -1, 3, count),
+            fraction=fraction.ravel(),
+            products=products.reshape(2, 3, count, 3, count),
+        )

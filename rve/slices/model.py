@@ -15,7 +15,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import AnyPhase, Cell, axial_moduli, square_moduli
-from alphacut.rve.mesh.outline import Outline, circle, is_round
+from alphacut.rve.mesh.outline import Outline, circle
 from alphacut.rve.result import Homogenised
 from alphacut.rve.settings import (
     require_compressible,
@@ -72,7 +72,7 @@ class SlicesModel:
         """One result for each of `inclusions`, in their order.
 
         Raises:
-            PlaneError: A linear system was not solved.
+            ConvergenceError: A linear system was not solved.
             TouchingError: Particles nearly touch.
             RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
         """
@@ -85,13 +85,12 @@ class SlicesModel:
         nodes = np.searchsorted(radii, at_nodes)
         slices = self._slices(radii, matrix, inclusions)
         seconds = {"total": perf_counter() - start}
-        outline = None if is_round(self.outline) else self.outline
         results = []
         for m, inclusion in enumerate(inclusions):
             stiffness = np.array([one.stiffness(self.order)[m] for one in slices])
             moduli, phases = square_moduli(stiffness), (matrix, inclusion)
             in_theta = theta_error(radius_map, rule, radii=radii, moduli=moduli, phases=phases)
-            cell = Cell(matrix, inclusion, radius_map, outline)
+            cell = Cell(matrix, inclusion, radius_map, self.outline)
             error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
             curve = curve_of(rule, stiffness[nodes])
             result = Homogenised(

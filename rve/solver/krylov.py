@@ -36,7 +36,9 @@ class Solutions:
     residual: float
 
 
-class LinearSolver:
+def krylov_solver(
+    matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
+) -> PETSc.KSP:
     """A PETSc solver of one reduced stiffness, its preconditioner set up.
 
     Args:
@@ -45,68 +47,24 @@ class LinearSolver:
         law: Law of θ.
         options: PETSc options.
 
-    Attributes:
-        ksp: PETSc's.
-
     Raises:
         OptionError: PETSc refuses an option or its value, or does not use it.
         ConvergenceError: A factorisation failed.
     """
-
-    def __init__(
-        self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
-    ) -> None:
-        self.matrix, self.options = matrix, options
-        self.ksp = PETSc.KSP().create(matrix.comm)
-        self.ksp.setOptionsPrefix(PREFIX)
-        self.ksp.setOperators(matrix)
-        if options.all["pc_type"] == "gamg":
-            matrix.setNearNullSpace(translations(matrix, numbering))
-        with in_database(options), uninterrupted():
-            self.ksp.setFromOptions()
-            if options.by_levels:
-                self.by_levels = ThetaPreconditioner(matrix, numbering, law)
-                self.ksp.pc.setPythonContext(self.by_levels)
-            self.ksp.setUp()
-
-    def renew(self, law: ThetaLaw) -> None:
-        """Take the matrix as it is now; for the preconditioner by levels."""
-        with uninterrupted():
-            self.by_levels.renew(law)
-
-    @uninterrupted()
-    def solve(self, loads: Sequence[PETSc.Vec]) -> Solutions:
-        """Solutions for all loads, one after another, with the matrix as it is now.
-
-        Raises:
-            ConvergenceError: The tolerance was not reached, or a solution is not finite.
-        """
-        solved = [self._solve(load) for load in loads]
-        pairs = zip(loads, (x for x, _ in solved), strict=True)
-        residual = max(self._residual(load, x) for load, x in pairs)
-        return Solutions([x for x, _ in solved], tuple(count for _, count in solved), residual)
-
-    def _solve(self, load: PETSc.Vec) -> tuple[PETSc.Vec, int]:
-        x = load.duplicate()
-        self.ksp.solve(load, x)  # eq. 7: K U = F
-        reason, iterations = self.ksp.getConvergedReason(), self.ksp.getIterationNumber()
-        if reason <= 0 or not np.isfinite(x.norm()):
-            raise ConvergenceError(
-                f"{self.ksp.getType()} with {self.ksp.pc.getType()} stopped after {iterations}"
-                f" iterations without reaching its tolerance (PETSc reason {reason})",
-                f"raise -{PREFIX}ksp_max_it or take another solver",
-            )
-        return x, iterations
-
-    def _residual(self, load: PETSc.Vec, x: PETSc.Vec) -> float:
-        rest = load.duplicate()
-        self.matrix.mult(x, rest)
-        rest.axpy(-1, load)
-        return float(rest.norm() / (load.norm() or 1.0))
+    ksp = PETSc.KSP().create(matrix.comm)
+    ksp.setOptionsPrefix(PREFIX)
+    ksp.setOperators(matrix)
+    matrix.setNearNullSpace(translations(matrix))
+    with in_database(options), uninterrupted():
+        ksp.setFromOptions()
+        if options.by_levels:
+            ksp.pc.setPythonContext(ThetaPreconditioner(matrix, numbering, law))
+        ksp.setUp()
+    return ksp
 
 
-def translations(matrix: PETSc.Mat, numbering: LevelNumbering) -> PETSc.NullSpace:
-    """The near-null space: a translation in either direction, of all levels."""
+def translations(matrix: PETSc.Mat) -> PETSc.NullSpace:
+    """The near-null space, which multigrid asks for: either translation of all levels."""
     vectors = []
     for component in range(2):
         vector = matrix.createVecRight()
@@ -114,6 +72,37 @@ def translations(matrix: PETSc.Mat, numbering: LevelNumbering) -> PETSc.NullSpac
         vector.normalize()
         vectors.append(vector)
     return PETSc.NullSpace().create(vectors=vectors, comm=matrix.comm)
+
+
+@uninterrupted()
+def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
+    """Solutions for all loads, one after another, with the solver's matrix as it is now.
+
+    Raises:
+        ConvergenceError: The tolerance was not reached, or a solution is not finite.
+    """
+    matrix, _ = ksp.getOperators()
+    vectors, iterations, residuals = [], [], []
+    for load in loads:
+        x, rest = load.duplicate(), load.duplicate()
+        ksp.solve(load, x)  # eq. 7: K U = F
+        _require_converged(ksp, x)
+        matrix.mult(x, rest)
+        rest.axpy(-1, load)
+        vectors.append(x)
+        iterations.append(ksp.getIterationNumber())
+        residuals.append(rest.norm() / (load.norm() or 1.0))
+    return Solutions(vectors, tuple(iterations), max(residuals))
+
+
+def _require_converged(ksp: PETSc.KSP, x: PETSc.Vec) -> None:
+    reason, iterations = ksp.getConvergedReason(), ksp.getIterationNumber()
+    if reason <= 0 or not np.isfinite(x.norm()):
+        raise ConvergenceError(
+            f"{ksp.getType()} with {ksp.pc.getType()} stopped after {iterations}"
+            f" iterations without reaching its tolerance (PETSc reason {reason})",
+            f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
+        )
 
 
 @contextmanager

@@ -19,6 +19,46 @@ from alphacut.rve.mesh.periodicity import Periodicity
 from alphacut.rve.mesh.prism_grid import PrismGrid
 
 
+def map_of(pairs: Rows, comm: MPI.Intracomm) -> PETSc.LGMap:
+    """Local-to-global map of nodes to their pairs of unknowns, −1 where dropped."""
+    return PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
+
+
+def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
+    """Matrix of zeros with room for all unknowns that share a cell.
+
+    Args:
+        pairs: Pairs of unknowns of each cell's nodes, −1 where dropped, shape (cells, nodes).
+        local_map: Of the nodes of this rank.
+        rows: Unknowns of this rank.
+        size: Unknowns in all.
+    """
+    kept = pairs >= 0
+    cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[kept]
+    shape = len(pairs), size // 2
+    touch = sp.csr_matrix((np.ones(len(cell), np.int8), (cell, pairs[kept])), shape)
+    own = touch.T.tocsr()[rows.start // 2 : rows.stop // 2]
+    pattern = sp.kron((own @ touch).astype(bool), np.ones((2, 2), bool), "csr")
+    pattern.sort_indices()
+    csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
+    sizes = (len(rows), size)
+    matrix = PETSc.Mat().createAIJ((sizes, sizes), bsize=2, comm=local_map.comm)
+    matrix.setPreallocationCSR((*csr, np.zeros(pattern.nnz)))
+    matrix.setLGMap(local_map, local_map)
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    return matrix
+
+
+def reduced(values: Array, local_map: PETSc.LGMap, own: int, size: int) -> PETSc.Vec:
+    """Vector of `own` unknowns here and `size` in all: the sum of the values (nodes · 2,)."""
+    vector = PETSc.Vec().createMPI((own, size), bsize=2, comm=local_map.comm)
+    vector.setLGMap(local_map)
+    nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
+    vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
+    vector.assemble()
+    return vector
+
+
 class LevelNumbering:
     """Reduced unknowns, two at each node that is left.
 
@@ -60,36 +100,15 @@ class LevelNumbering:
 
     def local_map(self, nodes: Rows) -> PETSc.LGMap:
         """Reduced unknowns of DOLFINx's nodes; −1 where dropped."""
-        return PETSc.LGMap().create(
-            self.pairs[nodes].astype(PETSc.IntType), bsize=2, comm=self.comm
-        )
+        return map_of(self.pairs[nodes], self.comm)
 
     def matrix(self, local_map: PETSc.LGMap) -> PETSc.Mat:
         """Matrix of zeros with room for all pairs of unknowns that share a wedge."""
-        pairs = self.pairs[self.grid.cells]
-        kept = pairs >= 0
-        wedge = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[kept]
-        shape = len(pairs), self.size // 2
-        touch = sp.csr_matrix((np.ones(len(wedge), np.int8), (wedge, pairs[kept])), shape)
-        own = touch.T.tocsr()[self.rows.start // 2 : self.rows.stop // 2]
-        pattern = sp.kron((own @ touch).astype(bool), np.ones((2, 2), bool), "csr")
-        pattern.sort_indices()
-        csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
-        sizes = (len(self.rows), self.size)
-        matrix = PETSc.Mat().createAIJ((sizes, sizes), bsize=2, comm=self.comm)
-        matrix.setPreallocationCSR((*csr, np.zeros(pattern.nnz)))
-        matrix.setLGMap(local_map, local_map)
-        matrix.setOption(PETSc.Mat.Option.SPD, True)
-        return matrix
+        return zero_matrix(self.pairs[self.grid.cells], local_map, self.rows, self.size)
 
     def vector(self, local_map: PETSc.LGMap, values: Array) -> PETSc.Vec:
         """Sum Pᵀ f of what every rank's nodes have, shape (nodes · 2,)."""
-        vector = PETSc.Vec().createMPI((len(self.rows), self.size), bsize=2, comm=self.comm)
-        vector.setLGMap(local_map)
-        nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
-        vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
-        vector.assemble()
-        return vector
+        return reduced(values, local_map, len(self.rows), self.size)
 
     def to_nodes(self, values: Array, nodes: Rows) -> Array:
         """Displacements of nodes, zero on the fixed line, shape (nodes, 2), from all unknowns."""

@@ -1,8 +1,8 @@
-"""The linear solvers of the product-space cell by name: PETSc options, readable in one place.
+"""PETSc options of the product-space cell, and how they are chosen.
 
-`theta` is the default: conjugate gradients with this project's preconditioner, for which
-``pc_type python`` stands. The others are there to compare with. Options under the prefix ``-rve_``
-override a named set; those under ``-rve_level_`` are of the preconditioner's plane problems.
+The default is conjugate gradients with this project's preconditioner, for which ``pc_type python``
+stands. Options under the prefix ``-rve_`` override it, such as ``-rve_pc_type gamg``; those under
+``-rve_level_`` are of the preconditioner's plane problems.
 """
 
 from __future__ import annotations
@@ -14,20 +14,14 @@ from alphacut.fuzzy.refused import RefusedError
 
 PREFIX = "rve_"
 LEVEL = "level_"
-_CG = {
+DEFAULTS = {
     "ksp_type": "cg",
     "ksp_rtol": "1e-8",
     "ksp_norm_type": "unpreconditioned",
-    "ksp_max_it": "500",
+    "pc_type": "python",
 }
-
-SOLVERS: Mapping[str, Mapping[str, str]] = {
-    "theta": {**_CG, "pc_type": "python"},
-    # algebraic multigrid, told the translations of every level
-    "gamg": {**_CG, "ksp_max_it": "5000", "pc_type": "gamg", "pc_gamg_threshold": "0.01"},
-    # sparse direct
-    "mumps": {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
-}
+MOST_ITERATIONS = 500
+"""By the preconditioner, which takes tens at most; others may take ten times as many."""
 
 
 class OptionError(RefusedError):
@@ -36,27 +30,20 @@ class OptionError(RefusedError):
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """A named set with what overrides it.
+    """The default with what overrides it.
 
     Args:
-        solver: Name in `SOLVERS`.
-        overrides: PETSc options without prefix that override the set.
-
-    Raises:
-        RefusedError: No solver of that name.
+        overrides: PETSc options without prefix.
     """
 
-    solver: str = "theta"
     overrides: Mapping[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.solver not in SOLVERS:
-            raise RefusedError("solver", self.solver, ", ".join(SOLVERS))
 
     @property
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
-        return {**SOLVERS[self.solver], **self.overrides}
+        chosen = {**DEFAULTS, **self.overrides}
+        most = MOST_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
+        return {"ksp_max_it": str(most), **chosen}
 
     @property
     def by_levels(self) -> bool:
@@ -73,5 +60,5 @@ class SolverOptions:
         return min(1e-5, max(1e-7, tolerance))
 
     def __str__(self) -> str:
-        overrides = (f"-{PREFIX}{name} {value}".strip() for name, value in self.overrides.items())
-        return " ".join([self.solver, *overrides])
+        words = [f"-{PREFIX}{name} {value}".strip() for name, value in self.overrides.items()]
+        return " ".join(["theta", *words] if self.by_levels else words)

@@ -33,7 +33,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.fenicsx import PETSc, factors
+from alphacut.rve.fenicsx import PETSc, cholesky
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.options import LEVEL, PREFIX
 from alphacut.stochastic import ThetaLaw
@@ -76,10 +76,8 @@ def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
         mass[layers + 1 :, layers + 1 :],
     )
     shift: Array = np.asarray(np.linalg.solve(hats, between), float)
-    return ThetaMass(
-        hats.diagonal(), bubbles.diagonal(), _inverse_root(hats),
-        _inverse_root(bubbles - between.T @ shift), shift,
-    )  # fmt: skip
+    root, excess = _inverse_root(hats), _inverse_root(bubbles - between.T @ shift)
+    return ThetaMass(hats.diagonal(), bubbles.diagonal(), root, excess, shift)
 
 
 def _inverse_root(matrix: Array) -> Array:
@@ -92,26 +90,15 @@ class PlaneSolver:
     """A solver of one level, by default a Cholesky factor.
 
     Args:
-        matrix: The level's block; its values may change, its pattern stays.
+        block: The level's block.
+        mass: Its mass along θ, by which it is divided.
     """
 
-    def __init__(self, matrix: PETSc.Mat) -> None:
-        matrix.setOption(PETSc.Mat.Option.SPD, True)
-        self.matrix = matrix
-        self._ksp = PETSc.KSP().create(matrix.comm)
-        self._ksp.setOperators(matrix)
-        self._ksp.setType("preonly")
-        self._ksp.pc.setType("cholesky")
-        self._ksp.pc.setFactorSolverType(factors())
-        self._ksp.setOptionsPrefix(PREFIX + LEVEL)
-        self._ksp.setFromOptions()
-        self._solution, self._load = matrix.createVecs()
-
-    def set_up(self, mass: float) -> None:
-        """Factorise the block over its mass along θ."""
-        self.matrix.scale(1 / mass)
+    def __init__(self, block: PETSc.Mat, mass: float) -> None:
+        block.scale(1 / mass)
+        self._ksp = cholesky(block, PREFIX + LEVEL)
         self._ksp.setUp()
-        self._ksp.pc.setUp()  # where values changed, KSP leaves it to the next solve
+        self._solution, self._load = block.createVecs()
 
     def __call__(self, load: Array) -> Array:
         """Solution for a load, shape (n,)."""
@@ -124,41 +111,27 @@ class ThetaPreconditioner:
     """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``.
 
     Args:
-        matrix: The reduced stiffness; its values may change.
+        matrix: The reduced stiffness.
         numbering: Its unknowns.
         law: Law of θ.
     """
 
     def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
-        self.matrix, self.numbering = matrix, numbering
+        self.numbering = numbering
+        self.mass = theta_mass(law, numbering.grid.levels(law))
         self.injection = _injection(numbering)
         self.own = matrix.createVecLeft()
         self.scatter, self.whole = PETSc.Scatter.toAll(self.own)
-        self._sets = self._spans()
-        parts = matrix.createSubMatrices(self._sets)
         n, v, layers = numbering.planar, numbering.between, numbering.grid.layers
-        self._hats = [_hat(n, v, below=k > 0, above=k < layers) for k in numbering.levels]
-        blocks = [part.PtAP(hat) for part, hat in zip(parts, self._hats, strict=False)]
-        self.levels = [PlaneSolver(block) for block in blocks]
-        self.middles = [PlaneSolver(part) for part in parts[len(blocks) :]]
-        self._set_up(law)
-
-    def renew(self, law: ThetaLaw) -> None:
-        """Take the matrix as it is now; the analysis of its pattern is kept."""
-        # new parts: PETSc 3.22 cannot fill large ones again on several ranks
-        parts = self.matrix.createSubMatrices(self._sets)
-        for part, hat, level in zip(parts, self._hats, self.levels, strict=False):
-            part.PtAP(hat, level.matrix)
-        for part, middle in zip(parts[len(self.levels) :], self.middles, strict=True):
-            part.copy(middle.matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self._set_up(law)
-
-    def _set_up(self, law: ThetaLaw) -> None:
-        self.mass = theta_mass(law, self.numbering.grid.levels(law))
-        for k, level in zip(self.numbering.levels, self.levels, strict=True):
-            level.set_up(self.mass.hats[k])
-        for k, middle in zip(self.numbering.middles, self.middles, strict=True):
-            middle.set_up(self.mass.bubbles[k])
+        parts = matrix.createSubMatrices(self._spans())
+        self.levels = [
+            PlaneSolver(part.PtAP(_hat(n, v, below=k > 0, above=k < layers)), self.mass.hats[k])
+            for k, part in zip(numbering.levels, parts, strict=False)
+        ]
+        self.middles = [
+            PlaneSolver(part, self.mass.bubbles[k])
+            for k, part in zip(numbering.middles, parts[len(self.levels) :], strict=True)
+        ]
 
     def _spans(self) -> list[PETSc.IS]:
         """Unknowns of this rank's levels with those half-way beside them, and of those alone."""

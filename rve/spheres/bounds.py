@@ -29,20 +29,6 @@ def space_stiffness(phase: Phase) -> Array:
     return cubic_voigt(bulk, shear, shear)
 
 
-def voigt(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """Stiffness at uniform strain, shape (…, 6, 6), in Pa, for volume fractions of shape (…)."""
-    share = np.asarray(fraction)[..., None, None]
-    return np.asarray((1 - share) * space_stiffness(matrix) + share * space_stiffness(inclusion))
-
-
-def reuss(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """Stiffness at uniform stress, shape (…, 6, 6), in Pa."""
-    share = np.asarray(fraction)[..., None, None]
-    compliances = (np.linalg.inv(space_stiffness(phase)) for phase in (matrix, inclusion))
-    first, second = compliances
-    return np.asarray(np.linalg.inv((1 - share) * first + share * second))
-
-
 def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
     share = np.asarray(fraction, float)

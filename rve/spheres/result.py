@@ -11,10 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Cell, Phase
-from alphacut.rve.certificate import ROUND_OFF, Limits, require
+from alphacut.rve.certificate import ROUND_OFF, mean, order_checks, require
 from alphacut.rve.result import Homogenised
-from alphacut.rve.spheres.bounds import hashin_shtrikman, reuss, shear_against_trace_bounds, voigt
+from alphacut.rve.spheres.bounds import (
+    hashin_shtrikman,
+    shear_against_trace_bounds,
+    space_stiffness,
+)
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, hill_shear
 from alphacut.stochastic import RadiusMap
 
@@ -62,12 +67,10 @@ def certified_spheres(
         CertificateError: One is violated by more than the declared error.
     """
     fraction, phases = volume_fraction(radius_map(result.curve.theta)), (matrix, inclusion)
-    weights, mean = result.curve.weights, np.asarray(result.stiffness)
-    low, high = (
-        np.tensordot(weights, bound(fraction, *phases), axes=1) for bound in (reuss, voigt)
-    )
+    pair = space_stiffness(matrix), space_stiffness(inclusion)
+    weights, bulk = result.curve.weights, result.moduli[0]
+    low, high = (mean(weights, bound(fraction, *pair)) for bound in (reuss, voigt))
     limits = hashin_shtrikman(fraction, *phases)
-    scale, bulk = float(abs(mean).max()), result.moduli[0]
     least, greatest = limits[0] @ weights
     nodes = cubic_moduli(np.asarray(result.curve.stiffness))
     sheared = [
@@ -75,12 +78,9 @@ def certified_spheres(
         for k, ends in enumerate(limits[1].T)
     ]
     checks = {
-        "symmetry": float(abs(mean - mean.T).max()) / scale,
-        "reuss": max(0.0, -float(np.linalg.eigvalsh(mean - low)[0])) / scale,
-        "voigt": max(0.0, -float(np.linalg.eigvalsh(high - mean)[0])) / scale,
+        **order_checks(np.asarray(result.stiffness), low, high),
         "hashin_shtrikman": max(0.0, least - bulk, bulk - greatest) / bulk,
         "hashin_shtrikman_shear": max(sheared),
     }
-    allowed = Limits(discretisation=ROUND_OFF + result.largest_error)
-    cell = Cell(matrix, inclusion, radius_map)
-    return replace(result, checks=require(checks, allowed), cell=cell)
+    checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
+    return replace(result, checks=checks, cell=Cell(matrix, inclusion, radius_map))

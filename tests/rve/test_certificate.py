@@ -5,16 +5,11 @@ import pytest
 
 from alphacut.rve.bounds import bulk_modulus, hashin_shtrikman, reuss, voigt
 from alphacut.rve.cell import LOADS, Phase
-from alphacut.rve.certificate import (
-    CertificateError,
-    Limits,
-    load_checks,
-    require,
-    stiffness_checks,
-)
+from alphacut.rve.certificate import CertificateError, require, stress_checks
 from alphacut.stochastic import HermiteMap
 
 SOFT, HARD = Phase(20e9), Phase(80e9, 0.2)
+PAIR = SOFT.stiffness, HARD.stiffness
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
 
 
@@ -33,7 +28,7 @@ def layered(fraction):
 
 @pytest.mark.parametrize("fraction", [0.0, 0.2, 0.7, 1.0])
 def test_bounds_enclose_a_laminate_and_close_at_the_ends(fraction):
-    low, high, between = reuss(fraction, SOFT, HARD), voigt(fraction, SOFT, HARD), layered(fraction)
+    low, high, between = reuss(fraction, *PAIR), voigt(fraction, *PAIR), layered(fraction)
     assert np.linalg.eigvalsh(between - low)[0] >= -1e-4 * SOFT.modulus * 1e-9
     assert np.linalg.eigvalsh(high - between)[0] >= -1e-4 * SOFT.modulus * 1e-9
     if fraction in (0.0, 1.0):
@@ -44,27 +39,28 @@ def test_hashin_shtrikman_lies_inside_reuss_and_voigt_and_in_order():
     fraction = np.linspace(0, 1, 11)
     least, greatest = hashin_shtrikman(fraction, SOFT, HARD)[0]
     assert (least <= greatest * (1 + 1e-12)).all()
-    assert (bulk_modulus(voigt(fraction, SOFT, HARD)) >= greatest * (1 - 1e-12)).all()
-    assert (bulk_modulus(reuss(fraction, SOFT, HARD)) <= least * (1 + 1e-12)).all()
+    assert (bulk_modulus(voigt(fraction, *PAIR)) >= greatest * (1 - 1e-12)).all()
+    assert (bulk_modulus(reuss(fraction, *PAIR)) <= least * (1 + 1e-12)).all()
 
 
-def checks_of(stiffness):
-    return stiffness_checks(stiffness[None], np.array([0.4]), np.array([1.0]), (SOFT, HARD))
+def checks_of(stress, loads):
+    one = np.array([0.4]), np.array([1.0])
+    return stress_checks(stress[None], loads, *one, (SOFT, HARD))
 
 
 def test_a_right_stiffness_passes():
     lower, _ = hashin_shtrikman(0.4, SOFT, HARD)[0]
-    right = reuss(0.4, SOFT, HARD) * float(lower / bulk_modulus(reuss(0.4, SOFT, HARD))) * 1.01
-    assert require(checks_of(right), Limits())["reuss"] == 0
+    right = reuss(0.4, *PAIR) * float(lower / bulk_modulus(reuss(0.4, *PAIR))) * 1.01
+    assert require(checks_of(right, np.eye(3)))["reuss"] == 0
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         (lambda c: c + np.triu(np.ones((3, 3)), 1) * 1e6, "not symmetric"),
-        (lambda c: reuss(0.4, SOFT, HARD) * 0.99, "below the Reuss bound"),
-        (lambda c: voigt(0.4, SOFT, HARD) * 1.01, "above the Voigt bound"),
-        (lambda c: voigt(0.4, SOFT, HARD) * 0.9999, "outside the Hashin–Shtrikman bounds"),
+        (lambda c: reuss(0.4, *PAIR) * 0.99, "below the Reuss bound"),
+        (lambda c: voigt(0.4, *PAIR) * 1.01, "above the Voigt bound"),
+        (lambda c: voigt(0.4, *PAIR) * 0.9999, "outside the Hashin–Shtrikman bounds"),
         (lambda c: c * np.nan, "is allowed; do not use this result"),
     ],
 )
@@ -73,15 +69,21 @@ def test_a_wrong_stiffness_is_refused_by_name(wrong, message):
     with pytest.raises(
         (CertificateError, np.linalg.LinAlgError), match=f"{message}|did not converge"
     ):
-        require(checks_of(wrong(c)), Limits())
+        require(checks_of(wrong(c), np.eye(3)))
 
 
 def test_a_flipped_shear_stress_is_below_the_reuss_bound():
     stress = layered(0.4) @ LOADS.T
     stress[2] *= -1
-    checks = load_checks(stress[None], LOADS, np.array([0.4]), np.array([1.0]), (SOFT, HARD))
     with pytest.raises(CertificateError, match="Reuss"):
-        require(checks, Limits())
+        require(checks_of(stress, LOADS))
+
+
+def test_two_loads_see_the_bulk_modulus_of_the_whole_stiffness():
+    c = layered(0.4)
+    whole, seen = checks_of(c, np.eye(3)), checks_of(c @ LOADS.T, LOADS)
+    assert whole["hashin_shtrikman"] == pytest.approx(seen["hashin_shtrikman"], rel=1e-9)
+    assert whole["hashin_shtrikman"] > 0
 
 
 class TestProductSpace:

@@ -1,7 +1,5 @@
 """The plane meshes: periodic, on their outline, sound wherever they slide."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ pytest.importorskip("dolfinx")
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
 from alphacut.rve.mesh.outline import Ellipse, area, circle, is_round
-from alphacut.rve.mesh.periodicity import identify
+from alphacut.rve.mesh.periodicity import identify, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, moved
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.stochastic import HermiteMap
@@ -65,7 +63,7 @@ def test_a_node_without_a_partner_is_refused():
     side = np.flatnonzero((points[:, 0] == 1) & (abs(points[:, 1]) < 0.9))
     points[side[0], 1] += 1e-3
     with pytest.raises(RuntimeError, match="has no partner"):
-        identify.__wrapped__(SimpleNamespace(points=points, vertices=plane.vertices))
+        unknowns(points)
 
 
 @pytest.mark.parametrize("outline", OUTLINES)

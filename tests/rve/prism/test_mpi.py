@@ -21,12 +21,14 @@ from alphacut.rve.prism.model import PrismModel
 from alphacut.stochastic import HermiteMap
 
 radii, small = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), HermiteMap(0.2, 0.1, 0.5, 0.1)
+MUMPS = {"ksp_type": "preonly", "ksp_norm_type": "none", "pc_type": "cholesky"}
+MUMPS["pc_factor_mat_solver_type"] = "mumps"
 results = []
 for layers, radius_map, options in (
     (5, radii, {"stiffness": True}),
     (1, radii, {}),
     (4, radii, {"interface": "sign"}),
-    (3, small, {"outline": Ellipse(2.0), "solver": "mumps", "estimate": False}),
+    (3, small, {"outline": Ellipse(2.0), "petsc": MUMPS, "estimate": False}),
     (3, radii, {"moduli": (75e9, 85e9)}),
     (3, radii, {"petsc": {"level_pc_type": "gamg"}}),
     (172, radii, {"estimate": False}),  # PETSc takes the parts of one rank in 2 goes, of the other in 3

@@ -94,7 +94,7 @@ def test_projected_samples_are_those_solved_whatever_their_company():
     solved = PrismModel(0.3, 4).solve(PAPER, MATRIX, [Phase(e) for e in moduli])
     for one, other in zip(projected, solved, strict=True):
         assert one.modulus == pytest.approx(other.modulus, rel=2e-10)
-        assert "projected" in one.reason
+        assert len(one.iterations) == 2 * len(other.iterations)
     assert model.solve(PAPER, MATRIX, [Phase(77e9)])[0].modulus == projected[1].modulus
     with pytest.raises(RefusedError, match="modulus of the particle is 9e\\+10 Pa; allowed"):
         model.solve(PAPER, MATRIX, [Phase(90e9)])
@@ -103,12 +103,20 @@ def test_projected_samples_are_those_solved_whatever_their_company():
 def test_a_range_too_wide_for_two_solutions_is_solved_sample_by_sample():
     wide = PrismModel(0.4, 3, moduli=(1e9, 400e9)).solve(PAPER, MATRIX, [PARTICLE])[0]
     assert wide.modulus == solve(mesh_size=0.4, layers=3).modulus
-    assert wide.reason == ""
+    assert len(wide.iterations) == 2
 
 
-@pytest.mark.parametrize("solver", ["mumps", "gamg"])
-def test_every_solver_gives_the_same_modulus(solver):
-    one = solve(mesh_size=0.3, layers=4, solver=solver).modulus
+MUMPS = {
+    "ksp_type": "preonly",
+    "ksp_norm_type": "none",
+    "pc_type": "cholesky",
+    "pc_factor_mat_solver_type": "mumps",
+}
+
+
+@pytest.mark.parametrize("petsc", [MUMPS, {"pc_type": "gamg"}])
+def test_every_solver_gives_the_same_modulus(petsc):
+    one = solve(mesh_size=0.3, layers=4, petsc=petsc).modulus
     assert one == pytest.approx(solve(mesh_size=0.3, layers=4).modulus, rel=1e-9)
 
 
@@ -179,7 +187,9 @@ def test_a_stiffness_lies_within_the_bounds_of_its_phases():
     result = solve(SMALL, ORTHOTROPIC, mesh_size=0.4, layers=3, stiffness=True)
     fraction = np.pi / 4 * SMALL(result.curve.theta) ** 2
     for bound, sign in ((reuss, 1), (voigt, -1)):
-        mean = np.tensordot(result.curve.weights, bound(fraction, MATRIX, ORTHOTROPIC), axes=1)
+        mean = np.tensordot(
+            result.curve.weights, bound(fraction, MATRIX.stiffness, ORTHOTROPIC.stiffness), axes=1
+        )
         assert np.linalg.eigvalsh(sign * (result.stiffness - mean))[0] > -1e-3 * mean.max()
     assert result.checks["reuss"] == result.checks["voigt"] == 0
 
@@ -251,7 +261,6 @@ def test_levels_are_solved_by_what_options_say():
         ({"mesh_size": 0.0}, r"the mesh size is 0; allowed: values in \(0, 1\]"),
         ({"layers": 0}, "the number of layers is 0; allowed: 1 or more"),
         ({"interface": "soft"}, "the interface is 'soft'; allowed: conforming, sign"),
-        ({"solver": "magic"}, "solver is magic; allowed: theta, gamg, mumps"),
     ],
 )
 def test_an_option_out_of_range_is_refused(options, message):

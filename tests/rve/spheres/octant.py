@@ -17,7 +17,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Phase
-from alphacut.rve.fenicsx import MPI, PETSc, compiled, factors, fem, petsc, ufl
+from alphacut.rve.fenicsx import MPI, PETSc, cholesky, compiled, fem, petsc, ufl
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.settings import HALVES, require_mesh_size
 from alphacut.rve.spheres.bounds import bulk_and_shear
@@ -103,12 +103,7 @@ def _energy(
     known.assemble()
     right, reduced = stiffness.createVecLeft(), stiffness.copy()
     reduced.zeroRowsColumns(dofs, 1.0, known, right)
-    solver = PETSc.KSP().create(stiffness.comm)
-    solver.setOperators(reduced)
-    solver.setType("preonly")
-    solver.pc.setType("cholesky")
-    solver.pc.setFactorSolverType(factors())
-    solver.solve(right, known)
+    cholesky(reduced, "octant_").solve(right, known)
     stiffness.mult(known, right)
     return float(known.dot(right))
 
