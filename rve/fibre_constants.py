@@ -26,8 +26,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.series.longitudinal import longitudinal_shear
-from alphacut.rve.slices.theta_rule import theta_rule
-from alphacut.stochastic import ThetaRule
+from alphacut.stochastic import ThetaRule, gauss_rule
 
 if TYPE_CHECKING:
     from alphacut.rve.result import Homogenised
@@ -108,7 +107,7 @@ class _Slack:
     @classmethod
     def of(cls, cell: Cell) -> _Slack:
         """Of a cell, averaged over θ."""
-        rule = theta_rule(cell.radius, points=_FINE)
+        rule = gauss_rule(cell.radius.distribution, points=_FINE)
         inner = np.pi / 4 * cell.radius(rule.nodes) ** 2
         c = np.array([phase.stiffness for phase in (cell.matrix, cell.inclusion)])
         bulk, mean = (c[:, 0, 0] + c[:, 0, 1]) / 2, float(rule.weights @ inner)
@@ -149,6 +148,6 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
         total = float(rule.weights @ values)
         return total, float(rule.weights @ (values * errors)) / total
 
-    value, error = mean(theta_rule(cell.radius, points=_FINE))
-    other, _ = mean(theta_rule(cell.radius, points=_COARSER))
+    value, error = mean(gauss_rule(cell.radius.distribution, points=_FINE))
+    other, _ = mean(gauss_rule(cell.radius.distribution, points=_COARSER))
     return value, error + abs(other / value - 1)

@@ -71,7 +71,6 @@ class Homogenised:
         errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
             C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty where none
             were estimated.
-        reason: Why this model and resolution were taken.
         checks: Certificate: name of each property to its measured violation, within its bound.
         cell: What was homogenised.
         average: What E and ν are of, a name in `anisotropy.AVERAGES`.
@@ -84,7 +83,6 @@ class Homogenised:
     iterations: tuple[int, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     errors: Mapping[str, Array] = field(default_factory=dict)
-    reason: str = ""
     checks: Mapping[str, float] = field(default_factory=dict)
     cell: Cell | None = None
     average: str = AXES

@@ -18,12 +18,12 @@ from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
 from alphacut.rve.mesh.outline import area
 from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.series.means import RuleError
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import SeriesError
 from alphacut.rve.slices.curve import AREA, stresses
 from alphacut.rve.slices.model import SlicesModel
-from alphacut.rve.slices.theta_rule import RuleError
 
 _ACCURACY = 1e-9  # of the series
 _POINTS = 14  # of slices in θ

@@ -9,15 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-import numpy as np
-
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.result import Homogenised
+from alphacut.rve.series.means import settled_means
 from alphacut.rve.series.stiffness import square_stiffness
+from alphacut.rve.series.truncation import CellModuli
 from alphacut.rve.settings import require_accuracy, require_parts, require_points
-from alphacut.rve.slices.curve import certified, mean_errors, with_errors
-from alphacut.rve.slices.theta_rule import settle_rule
+from alphacut.rve.slices.curve import certified, with_errors
 from alphacut.stochastic import RadiusMap
 
 
@@ -54,31 +53,22 @@ class SeriesModel:
         """
         require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
-        used: dict[float, tuple[Array, Array]] = {}
 
-        def stiffness_at(radii: Array) -> Array:
-            cells = square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-            used.update(zip(radii, zip(cells.errors, cells.harmonics, strict=True), strict=True))
-            return cells.matrix
+        def cells(radii: Array) -> CellModuli:
+            return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
 
-        curves, gaps, finest = settle_rule(
-            radius_map, stiffness_at, points=self.points, accuracy=self.accuracy
-        )
-        seconds = {"solve": perf_counter() - start, "total": perf_counter() - start}
-        results = []
-        for k, (curve, gap, judge) in enumerate(zip(curves, gaps, finest, strict=True)):
-            own, other = ([used[float(r)] for r in radius_map(c.theta)] for c in (curve, judge))
-            error, harmonics = np.array([e[k] for e, _ in own]), max(int(n[k]) for _, n in own)
-            left = mean_errors(judge, np.array([e[k] for e, _ in other]))
-            results.append(
+        means = settled_means(radius_map, cells, points=self.points, accuracy=self.accuracy)
+        seconds = {"total": perf_counter() - start}
+        return [
+            certified(
                 Homogenised(
-                    curve=with_errors(curve, error),
+                    curve=with_errors(mean.curve, mean.nodes),
                     method=self.name,
-                    unknowns=harmonics,
+                    unknowns=mean.terms,
                     seconds=seconds,
-                    errors={"space": np.maximum(mean_errors(curve, error), left), "theta": gap},
-                    reason=f"{curve.theta.size} nodes in θ, {harmonics} harmonics",
+                    errors=mean.errors,
+                    cell=Cell(matrix, inclusion, radius_map),
                 )
             )
-        pairs = zip(results, inclusions, strict=True)
-        return [certified(result, Cell(matrix, phase, radius_map)) for result, phase in pairs]
+            for mean, inclusion in zip(means, inclusions, strict=True)
+        ]

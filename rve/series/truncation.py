@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,80 +10,128 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 
-Solve = Callable[[Array, int], tuple[Array, Array]]
+_BATCH = 2_000_000  # entries of one batch of matrices
+Solve = Callable[[Array, int], Array]
+"""Three moduli of k cells times m inclusions, shape (k, m, 3), from radii and number of terms."""
 
 
 class SeriesError(FailedError):
     """The multipole series does not reach its tolerance."""
 
 
-@dataclass(frozen=True)
-class Truncation:
-    """How a series is continued, and what is said where it ends.
+@dataclass(frozen=True, eq=False)
+class CellModuli:
+    """Moduli of n cells times m inclusions.
 
     Args:
-        following: The next numbers of terms to try, from those tried.
-        most: Largest number of terms.
-        terms: Their name in the message, such as "harmonics".
-        particles: Name of the particles that nearly touch.
+        moduli: In Pa, shape (n, m, 3): of the plane C11 + C12, C11 − C12 and C33, of space K,
+            (C11 − C12)/2 and C44.
+        errors: Their declared relative truncation errors, same shape.
+        terms: Number of terms that reached it, shape (n, m).
+        voigt: Stiffness from the three moduli.
     """
 
-    following: Callable[[Array], Array]
-    most: int
+    moduli: Array
+    errors: Array
+    terms: Array
+    voigt: Callable[[Array, Array, Array], Array]
+
+    @property
+    def matrix(self) -> Array:
+        """Voigt matrices, shape (n, m, 3, 3) of the plane and (n, m, 6, 6) of space, in Pa."""
+        return self.voigt(*np.moveaxis(self.moduli, -1, 0))
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """How a series is continued, how it is judged, and what is said where it ends.
+
+    Args:
+        steps: Numbers of terms to try, rising.
+        decay: What a term takes from the logarithm of the error, over arccosh(1/r).
+        unknowns: Of one linear system with so many terms.
+        safety: Margin of the estimated error.
+        round_off: Relative, of a modulus.
+        terms: Their name in the message, such as "harmonics".
+        particles: Name of the particles that nearly touch.
+        voigt: Stiffness from the three moduli.
+    """
+
+    steps: tuple[int, ...]
+    decay: float
+    unknowns: Callable[[int], int]
+    safety: float
+    round_off: float
     terms: str
     particles: str
+    voigt: Callable[[Array, Array, Array], Array]
 
     def settle(
-        self, radius: Array, inclusions: int, first: Array, solve: Solve, *, tolerance: float
-    ) -> tuple[Array, Array, Array]:
+        self, radius: Array, inclusions: int, solve: Solve, *, tolerance: float
+    ) -> CellModuli:
         """Moduli of n cells times m inclusions, each with as many terms as it needs.
 
         Args:
-            radius: Radii over half the cell's side, shape (n,).
+            radius: Radii over half the cell's side, shape (n,), each in [0, 1).
             inclusions: m.
-            first: Numbers of terms to begin with, shape (n,).
-            solve: Three moduli of k cells and their declared relative errors, shape (k, m, 3)
-                each, from the cells' rows and the number of terms.
+            solve: The series.
             tolerance: Relative error allowed, of the moduli.
 
-        Returns:
-            Moduli and declared relative errors, shape (n, m, 3) each, and terms used, (n, m).
-
         Raises:
-            SeriesError: `most` terms do not suffice.
+            RefusedError: A radius lies outside [0, 1).
+            SeriesError: The last step does not suffice.
         """
-        shape = (radius.size, inclusions)
-        moduli, error = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
+        radius, tolerance = require_radii(radius), max(tolerance, 2 * self.round_off)
+        steps, shape = np.array(self.steps), (radius.size, inclusions)
+        moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
         used, todo = np.zeros(shape, int), np.arange(radius.size)
-        terms = np.minimum(first, self.most)
+        rate = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))
+        place = np.searchsorted(steps, np.log(1 / tolerance) / rate)
+        place = np.minimum(place, steps.size - 1)
         while todo.size:
-            for count in np.unique(terms[todo]):
-                rows = todo[terms[todo] == count]
+            for step in np.unique(place[todo]):
+                rows = todo[place[todo] == step]
                 # what is settled stays, whatever its companions need
-                open_ = error[rows].max(axis=2) > tolerance
-                values, left = solve(rows, int(count))
+                open_ = errors[rows].max(axis=2) > tolerance
+                values, left = self._judged(radius[rows], inclusions, solve, int(steps[step]))
                 moduli[rows] = np.where(open_[..., None], values, moduli[rows])
-                error[rows] = np.where(open_[..., None], left, error[rows])
-                used[rows] = np.where(open_, count, used[rows])
-            todo = todo[error[todo].max(axis=(1, 2)) > tolerance]
-            self._refuse(radius[todo], terms[todo], error[todo], tolerance)
-            terms[todo] = np.minimum(self.following(terms[todo]), self.most)
-        return moduli, error, used
+                errors[rows] = np.where(open_[..., None], left, errors[rows])
+                used[rows] = np.where(open_, steps[step], used[rows])
+            todo = todo[errors[todo].max(axis=(1, 2)) > tolerance]
+            ended = todo[place[todo] == steps.size - 1]
+            if ended.size:
+                self._refuse(radius[ended].max(), errors[ended].max(), tolerance)
+            place[todo] += 1
+        return CellModuli(moduli, errors, used, self.voigt)
 
-    def _refuse(self, radius: Array, terms: Array, errors: Array, tolerance: float) -> None:
+    def _judged(
+        self, radius: Array, inclusions: int, solve: Solve, terms: int
+    ) -> tuple[Array, Array]:
+        """Moduli and their errors, with a margin: a quarter and a half more terms tell them."""
+        counts = terms, terms + max(2, terms // 4), terms + max(4, terms // 2)
+        own, finer, finest = (
+            np.concatenate([solve(part, n) for part in self._batches(radius, inclusions, n)])
+            for n in counts
+        )
+        return own, self.safety * error_by_more_terms(own, finer, finest) + self.round_off
+
+    def _batches(self, radius: Array, inclusions: int, terms: int) -> Iterator[Array]:
+        """Radii in so many parts that matrices stay small."""
+        parts = -(-radius.size * inclusions * self.unknowns(terms) ** 2 // _BATCH)
+        yield from np.array_split(radius, min(radius.size, parts))
+
+    def _refuse(self, radius: float, error: float, tolerance: float) -> None:
         """Raise where no more terms are to be had."""
-        stuck = terms >= self.most
-        if stuck.any():
-            raise SeriesError(
-                f"the series at r = {radius[stuck].max():.6g} reaches a relative error of"
-                f" {errors[stuck].max():.1e} with {self.most} {self.terms}, {tolerance:.1e} is"
-                f" allowed: {self.particles} nearly touch",
-                "lower the radius or raise the tolerance",
-            )
+        raise SeriesError(
+            f"the series at r = {radius:.6g} reaches a relative error of {error:.1e} with"
+            f" {self.steps[-1]} {self.terms}, {tolerance:.1e} is allowed: {self.particles} nearly"
+            " touch",
+            "lower the radius or raise the tolerance",
+        )
 
 
 def error_by_more_terms(own: Array, finer: Array, finest: Array) -> Array:
-    """Relative distance from the farther of two longer series.
+    """Relative distance from the farther of two better values.
 
     One alone may meet the value by chance, for changes have either sign.
     """

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import STRAIN, Cell, square_moduli
+from alphacut.rve.cell import STRAIN, square_moduli
 from alphacut.rve.certificate import ROUND_OFF, require, stress_checks
 from alphacut.rve.mesh.outline import area
 from alphacut.rve.result import Homogenised, StressCurve
@@ -57,16 +57,17 @@ def mean_errors(curve: StressCurve, error: Array, *, square: bool = True) -> Arr
     return errors
 
 
-def certified(result: Homogenised, cell: Cell) -> Homogenised:
-    """Result with its cell and the certificate of its stiffness, within the estimated error.
+def certified(result: Homogenised) -> Homogenised:
+    """Result with the certificate of its stiffness, within the estimated error.
 
     Raises:
         CertificateError: Symmetry or a bound is violated.
     """
-    curve = result.curve
+    curve, cell = result.curve, result.cell
+    assert cell is not None
     assert curve.stiffness is not None
     fraction = area(cell.outline) / AREA * cell.radius(curve.theta) ** 2
     phases = cell.matrix, cell.inclusion
     checks = stress_checks(curve.stiffness, np.eye(3), fraction, curve.weights, phases)
     checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
-    return replace(result, checks=checks, cell=cell)
+    return replace(result, checks=checks)

@@ -6,7 +6,7 @@ with radius r(θ).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -24,11 +24,12 @@ from alphacut.rve.settings import (
     require_points,
 )
 from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
-from alphacut.rve.slices.theta_rule import DIGITS, extreme_radii, theta_error, theta_rule
-from alphacut.stochastic import RadiusMap
+from alphacut.rve.slices.theta_error import DIGITS, theta_error
+from alphacut.stochastic import RadiusMap, gauss_rule, require_map
 
 _FADE = 0.03  # least share of the last change that is taken to be left by order 4
 _ORDERS = 2, 3, 4
+_SAMPLES = 2049  # of a map, in which its extremes are sought
 _ROUND_OFF = 1e-13
 _CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
@@ -45,9 +46,8 @@ class SlicesModel:
     Args:
         order: Polynomial degree of the elements, 2 to 4.
         mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
-        points: Nodes in θ, of each smooth piece where the map jumps or bends; at least 2.
+        points: Nodes in θ, at least 2.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
-        progress: Called with the fraction done.
 
     Raises:
         RefusedError: A value lies outside its range.
@@ -57,7 +57,6 @@ class SlicesModel:
     mesh_size: float = 0.2
     points: int = 10
     outline: Outline = circle
-    progress: Callable[[float], None] | None = None
     name = "slices"
 
     def __post_init__(self) -> None:
@@ -78,49 +77,41 @@ class SlicesModel:
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        start = perf_counter()
-        rule = theta_rule(radius_map, points=self.points)
-        at_nodes = np.round(radius_map(rule.nodes), DIGITS)
-        radii = np.unique(np.concatenate([at_nodes, np.round(extreme_radii(radius_map), DIGITS)]))
-        nodes = np.searchsorted(radii, at_nodes)
-        slices = self._slices(radii, matrix, inclusions)
+        require_map(radius_map)
+        start, law = perf_counter(), radius_map.distribution
+        rule = gauss_rule(law, points=self.points)
+        every = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
+        solved = np.concatenate([radius_map(rule.nodes), [every.min(), every.max()]])
+        radii, places = np.unique(np.round(solved, DIGITS), return_inverse=True)
+        nodes = places[: rule.nodes.size]
+        slices = [
+            solve_slice(r, matrix, inclusions, mesh_size=self.mesh_size, outline=self.outline)
+            for r in radii
+        ]
         seconds = {"total": perf_counter() - start}
         results = []
         for m, inclusion in enumerate(inclusions):
+            cell = Cell(matrix, inclusion, radius_map, self.outline)
             stiffness = np.array([one.stiffness(self.order)[m] for one in slices])
             moduli, phases = square_moduli(stiffness), (matrix, inclusion)
-            in_theta = theta_error(radius_map, rule, radii=radii, moduli=moduli, phases=phases)
-            cell = Cell(matrix, inclusion, radius_map, self.outline)
             error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
             curve = curve_of(rule, stiffness[nodes])
             result = Homogenised(
-                with_errors(curve, _POINTWISE * error[nodes], square=cell.square),
-                self.name,
-                "cholesky",
-                max(one.unknowns[_ORDERS.index(self.order)] for one in slices),
-                (),
-                seconds,
-                {"space": mean_errors(curve, error[nodes], square=cell.square), "theta": in_theta},
-                f"{rule.nodes.size} nodes in θ, elements of order {self.order}, mesh size"
-                f" {self.mesh_size:g}",
+                curve=with_errors(curve, _POINTWISE * error[nodes], square=cell.square),
+                method=self.name,
+                solver="cholesky",
+                unknowns=max(one.unknowns[_ORDERS.index(self.order)] for one in slices),
+                seconds=seconds,
+                errors={
+                    "space": mean_errors(curve, error[nodes], square=cell.square),
+                    "theta": theta_error(
+                        radius_map, rule, radii=radii, moduli=moduli, phases=phases
+                    ),
+                },
+                cell=cell,
             )
-            results.append(certified(result, cell))
+            results.append(certified(result))
         return results
-
-    def _slices(
-        self, radii: Array, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
-    ) -> list[Slice]:
-        """The cells solved, one for each radius, by all orders: the others judge the result's."""
-        slices = []
-        for radius in radii:
-            slices.append(
-                solve_slice(
-                    radius, matrix, inclusions, mesh_size=self.mesh_size, outline=self.outline
-                )
-            )
-            if self.progress:
-                self.progress(len(slices) / radii.size)
-        return slices
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.bounds import reuss, voigt
-from alphacut.rve.cell import Cell, Phase
+from alphacut.rve.cell import Phase
 from alphacut.rve.certificate import ROUND_OFF, mean, order_checks, require
 from alphacut.rve.result import Homogenised
 from alphacut.rve.spheres.bounds import (
@@ -21,7 +21,6 @@ from alphacut.rve.spheres.bounds import (
     space_stiffness,
 )
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, hill_shear
-from alphacut.stochastic import RadiusMap
 
 VOLUME_OF_UNIT_SPHERE = np.pi / 6  # over the cell's volume at r = 1: fraction = π r³/6
 
@@ -58,15 +57,18 @@ def volume_fraction(radius: Array) -> Array:
     return np.asarray(VOLUME_OF_UNIT_SPHERE * np.asarray(radius) ** 3)
 
 
-def certified_spheres(
-    result: HomogenisedSpheres, radius_map: RadiusMap, matrix: Phase, inclusion: Phase
-) -> HomogenisedSpheres:
+def certified_spheres(result: HomogenisedSpheres) -> HomogenisedSpheres:
     """Result with its certificate: symmetry, Voigt, Reuss, Hashin–Shtrikman.
 
     Raises:
         CertificateError: One is violated by more than the declared error.
     """
-    fraction, phases = volume_fraction(radius_map(result.curve.theta)), (matrix, inclusion)
+    cell = result.cell
+    assert cell is not None
+    matrix, inclusion = phases = cell.matrix, cell.inclusion
+    assert isinstance(matrix, Phase)
+    assert isinstance(inclusion, Phase)
+    fraction = volume_fraction(cell.radius(result.curve.theta))
     pair = space_stiffness(matrix), space_stiffness(inclusion)
     weights, bulk = result.curve.weights, result.moduli[0]
     low, high = (mean(weights, bound(fraction, *pair)) for bound in (reuss, voigt))
@@ -83,4 +85,4 @@ def certified_spheres(
         "hashin_shtrikman_shear": max(sheared),
     }
     checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
-    return replace(result, checks=checks, cell=Cell(matrix, inclusion, radius_map))
+    return replace(result, checks=checks)

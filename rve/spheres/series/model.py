@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-import numpy as np
-
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import Phase
-from alphacut.rve.result import StressCurve
+from alphacut.rve.cell import Cell, Phase
+from alphacut.rve.series.means import settled_means
+from alphacut.rve.series.truncation import CellModuli
 from alphacut.rve.settings import require_accuracy, require_parts, require_points
-from alphacut.rve.slices.theta_rule import settle_rule
-from alphacut.rve.spheres.cubic import cubic_moduli
 from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
-from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+from alphacut.rve.spheres.series.stiffness import cubic_stiffness, unknowns
 from alphacut.stochastic import RadiusMap
 
 
@@ -46,37 +43,22 @@ class SphereSeriesModel:
         """
         require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
-        used: dict[float, tuple[Array, Array]] = {}
 
-        def stiffness_at(radii: Array) -> Array:
-            cells = cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
-            used.update(zip(radii, zip(cells.errors, cells.degrees, strict=True), strict=True))
-            return cells.matrix
+        def cells(radii: Array) -> CellModuli:
+            return cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
 
-        def space_error(curve: StressCurve, k: int) -> Array:
-            """Declared errors of the mean moduli from those at the nodes, shape (3,)."""
-            errors = [used[r][0][k] for r in radius_map(curve.theta)]
-            moduli = curve.weights[:, None] * cubic_moduli(np.asarray(curve.stiffness))
-            return np.asarray((moduli * errors).sum(axis=0) / moduli.sum(axis=0))
-
-        curves, gaps, finest = settle_rule(
-            radius_map,
-            stiffness_at,
-            points=self.points,
-            accuracy=self.accuracy,
-            moduli=cubic_moduli,
-        )
-        seconds, results = perf_counter() - start, []
-        for k, (curve, gap, judge) in enumerate(zip(curves, gaps, finest, strict=True)):
-            degree = max(int(used[r][1][k]) for r in radius_map(curve.theta))
-            space = np.maximum(space_error(curve, k), space_error(judge, k))
-            result = HomogenisedSpheres(
-                curve=curve,
-                method=self.name,
-                unknowns=3 * (degree + 2) ** 2 // 16,
-                seconds={"solve": seconds, "total": seconds},
-                errors={"space": space, "theta": gap},
-                reason=f"{curve.theta.size} nodes in θ, multipoles up to degree {degree}",
+        means = settled_means(radius_map, cells, points=self.points, accuracy=self.accuracy)
+        seconds = {"total": perf_counter() - start}
+        return [
+            certified_spheres(
+                HomogenisedSpheres(
+                    curve=mean.curve,
+                    method=self.name,
+                    unknowns=unknowns(mean.terms),
+                    seconds=seconds,
+                    errors=mean.errors,
+                    cell=Cell(matrix, inclusion, radius_map),
+                )
             )
-            results.append(certified_spheres(result, radius_map, matrix, inclusions[k]))
-        return results
+            for mean, inclusion in zip(means, inclusions, strict=True)
+        ]

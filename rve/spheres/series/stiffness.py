@@ -10,49 +10,34 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-from alphacut.rve.series.truncation import Truncation, error_by_more_terms, require_radii
+from alphacut.rve.series.truncation import CellModuli, Truncation
 from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.cubic import cubic_voigt
 from alphacut.rve.spheres.series.scattering import scattering
 from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
 
-MOST_DEGREES = 64  # reaches 1e-8 at r = 0.985
-_DEGREES = np.array([4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, MOST_DEGREES])
-_BATCH = 2_000_000  # entries of one batch of matrices
-_ROUND_OFF = 2e-13
-_SAFETY = 2.0
-_TRUNCATION = Truncation(
-    lambda degrees: _DEGREES[np.searchsorted(_DEGREES, degrees, "right")],
-    MOST_DEGREES,
-    "degrees of multipoles",
-    "spheres",
+
+def unknowns(degree: int) -> int:
+    """Amplitudes of one load up to a degree."""
+    return 3 * (degree + 2) ** 2 // 16
+
+
+TRUNCATION = Truncation(
+    steps=(4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64),  # reaches 1e-8 at r = 0.985
+    decay=2.0,
+    unknowns=unknowns,
+    safety=2.0,
+    round_off=2e-13,
+    terms="degrees of multipoles",
+    particles="spheres",
+    voigt=cubic_voigt,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class CubicStiffness:
-    """Stiffness of n cells times m inclusions by its moduli.
-
-    Args:
-        moduli: K, (C11 − C12)/2 and C44 in Pa, shape (n, m, 3).
-        errors: Declared relative truncation errors of the three, same shape.
-        degrees: Largest degree of the multipoles that reached it, shape (n, m).
-    """
-
-    moduli: Array
-    errors: Array
-    degrees: Array
-
-    @property
-    def matrix(self) -> Array:
-        """Voigt matrices (11, 22, 33, 23, 13, 12 with 2 ε), shape (n, m, 6, 6)."""
-        return cubic_voigt(*np.moveaxis(self.moduli, -1, 0))
 
 
 def cubic_stiffness(
     radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-10
-) -> CubicStiffness:
-    """Stiffness of n cells times m inclusions.
+) -> CellModuli:
+    """K, (C11 − C12)/2 and C44 of n cells times m inclusions.
 
     Args:
         radius: Radii over half the cell's side, shape (n,), each in [0, 1).
@@ -65,46 +50,19 @@ def cubic_stiffness(
         RefusedError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (spheres nearly in touch).
     """
-    radius = require_radii(radius)
-    rate = 2 * np.arccosh(1 / np.maximum(radius, 1e-3))  # decay of images between two spheres
-    first = np.searchsorted(_DEGREES, np.log(1 / tolerance) / rate)
 
-    def solve(rows: Array, degree: int) -> tuple[Array, Array]:
-        """Moduli and errors; a quarter and a half more degrees tell the error, with a margin."""
-        own, finer, finest = (
-            _moduli(radius[rows], matrix, inclusions, n)
-            for n in (degree, degree + max(2, degree // 4), degree + max(4, degree // 2))
+    def solve(radii: Array, degree: int) -> Array:
+        """By mean stress less that of the far field, from force dipoles."""
+        (bulk, mu), nu = bulk_and_shear(matrix), matrix.poisson
+        axial, sheared = (
+            _dipoles(radii, matrix, inclusions, degree, shear=shear) for shear in (False, True)
         )
-        return own, _SAFETY * error_by_more_terms(own, finer, finest) + _ROUND_OFF
+        scale = 8 * np.pi * mu * (1 - nu) * radii[:, None] ** 3 / VOLUME
+        axial[..., 0] /= -3 * (1 - 2 * nu)
+        dipoles = np.concatenate([axial, sheared], axis=-1)
+        return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
 
-    return CubicStiffness(
-        *_TRUNCATION.settle(
-            radius,
-            len(inclusions),
-            _DEGREES[np.minimum(first, _DEGREES.size - 1)],
-            solve,
-            tolerance=max(tolerance, 2 * _ROUND_OFF),
-        )
-    )
-
-
-def _moduli(radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int) -> Array:
-    """K, (C11 − C12)/2 and C44 with multipoles up to `degree`, in Pa, shape (rows, m, 3)."""
-    size = len(inclusions) * (3 * (degree + 2) ** 2 // 16) ** 2
-    parts = np.array_split(radius, min(radius.size, -(-radius.size * size // _BATCH)))
-    return np.concatenate([_solve_batch(part, matrix, inclusions, degree) for part in parts])
-
-
-def _solve_batch(radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int) -> Array:
-    """The same for few enough radii: mean stress less that of the far field, by force dipoles."""
-    (bulk, mu), nu = bulk_and_shear(matrix), matrix.poisson
-    axial, sheared = (
-        _dipoles(radius, matrix, inclusions, degree, shear=shear) for shear in (False, True)
-    )
-    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
-    axial[..., 0] /= -3 * (1 - 2 * nu)
-    dipoles = np.concatenate([axial, sheared], axis=-1)
-    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
+    return TRUNCATION.settle(radius, len(inclusions), solve, tolerance=tolerance)
 
 
 def _dipoles(

@@ -10,15 +10,13 @@ from scipy.interpolate import make_interp_spline
 from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.slices.theta_rule import theta_rule
-from alphacut.stochastic import HermiteMap
-from tests.stochastic.test_laws import Own
+from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, TruncatedNormal
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 
 
-class Broken:
-    """A map of a user that jumps, under a law with a corner."""
+class Own:
+    """A map of a user, under a law with a corner."""
 
     class distribution:  # noqa: N801 - an instance is not needed
         lower, upper = 0.0, 1.0
@@ -27,14 +25,14 @@ class Broken:
         quantile = staticmethod(stats.triang(0.3).ppf)
 
     def __call__(self, theta):
-        theta = np.asarray(theta, float)
-        return np.where(theta < 0.5, 0.3 + 0.2 * theta, 0.6 + 0.2 * theta)
+        return 0.3 + 0.5 * np.asarray(theta, float)
 
 
 MAPS = {
-    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Own("uniform", ())),
-    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Own("beta", (2, 5))),
-    "user": Broken(),
+    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta()),
+    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta(2, 5, -1.0, 1.0)),
+    "exponential": ExponentialMap(0.2, 0.8, TruncatedNormal(-2.0, 3.0)),
+    "user": Own(),
 }
 
 
@@ -58,9 +56,3 @@ def test_mean_is_that_over_quantiles_and_of_random_draws(name):
     other = SeriesModel().solve(HermiteMap(0.1337, 0.1, 0.8663, 0.1692), MATRIX, [PARTICLE])[0]
     normal = other.curve.weights @ square_moduli(np.asarray(other.curve.stiffness))[:, [0, 2]]
     assert (abs(normal - drawn.mean(axis=0)) > 5 * error).any()  # the law is seen
-
-
-def test_rule_of_a_map_in_pieces_keeps_the_probability_of_each():
-    rule = theta_rule(Broken(), points=6)
-    below = rule.weights[rule.nodes < 0.5].sum()
-    assert below == pytest.approx(stats.triang(0.3).cdf(0.5), abs=1e-8)
