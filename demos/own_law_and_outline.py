@@ -19,12 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from alphacut.export.fields import ORDER
-from alphacut.rve import Phase
-from alphacut.rve.cell import VoigtPhase
-from alphacut.rve.mesh.outline import Ellipse
+from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase
 from alphacut.rve.prism.fields import cell_fields
-from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap
 
 radius, resin = HermiteMap(0.25, 0.1, 0.6, 0.1), Phase(4e9, 0.35)

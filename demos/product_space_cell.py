@@ -24,12 +24,11 @@ import ufl
 from dolfinx import fem
 
 from alphacut.export.fields import ORDER
-from alphacut.rve import LOADS, Phase, effective_modulus
+from alphacut.rve import LOADS, Phase, PrismModel, effective_modulus
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.rve.mesh.wedge import slab_rule
 from alphacut.rve.prism.fields import cell_fields
-from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.krylov import solve
 from alphacut.rve.solver.options import SolverOptions

@@ -19,7 +19,7 @@
 import numpy as np
 
 from alphacut.fuzzy import Triangular, propagate
-from alphacut.rve import Phase, named
+from alphacut.rve import Phase, SeriesModel
 from alphacut.stochastic import HermiteMap, gauss_rule
 
 radius = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -32,11 +32,11 @@ print(f"area fraction {rule.mean(np.pi / 4 * radius(rule.nodes) ** 2):.4f}")
 #
 # ## 2. The cell
 #
-# One crisp cell: matrix of 20 GPa, particle of 80 GPa. The series is exact; `named("prism",
-# layers=12)` is the paper's finite element on the product of cell and θ.
+# One crisp cell: matrix of 20 GPa, particle of 80 GPa. The series is exact; `PrismModel()`
+# is the paper's finite element on the product of cell and θ.
 
 # %%
-series = named("series")
+series = SeriesModel()
 matrix = Phase(20e9, 0.3)
 cell = series.solve(radius, matrix, [Phase(80e9, 0.3)])[0]
 print(f"E = {cell.modulus / 1e9:.4f} GPa (paper: 24.7561 GPa)")

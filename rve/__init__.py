@@ -1,10 +1,39 @@
-"""The periodic cell: its models of the homogenised stiffness behind one result type."""
+"""The periodic cell: its models of the homogenised stiffness behind one result type.
 
-from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase
-from alphacut.rve.model import Model, cross_check, named
+Each model is a frozen dataclass of its resolution with ``solve(radius_map, matrix, inclusions)``.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
+from alphacut.rve.mesh.outline import Ellipse
 from alphacut.rve.result import Homogenised, StressCurve, effective_modulus
+from alphacut.rve.series.model import SeriesModel
+from alphacut.rve.slices.model import SlicesModel
+
+if TYPE_CHECKING:
+    from alphacut.rve.prism.model import PrismModel
 
 __all__ = [
-    "LOADS", "STRAIN", "Cell", "Homogenised", "Model", "Phase", "StressCurve", "cross_check",
-    "effective_modulus", "named",
-]  # fmt: skip
+    "LOADS",
+    "STRAIN",
+    "Cell",
+    "Ellipse",
+    "Homogenised",
+    "Phase",
+    "PrismModel",
+    "SeriesModel",
+    "SlicesModel",
+    "StressCurve",
+    "VoigtPhase",
+    "effective_modulus",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """The model that needs DOLFINx, imported when it is named."""
+    if name != "PrismModel":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from alphacut.rve.prism.model import PrismModel
+
+    return PrismModel

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, require_average, shear_modulus
 from alphacut.rve.cell import STRAIN, Cell, square_moduli
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
@@ -111,18 +107,6 @@ class Homogenised:
             f"Homogenised(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g} ({self.convention}),"
             f" relative error of E {self.estimated_error:.2g}, by {self.method}, {cost:.2g} s)"
         )
-
-    def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw the homogenised stress over θ (Fig. 16), on new axes if none are passed."""
-        if axes is None:
-            from matplotlib import pyplot
-
-            axes = pyplot.subplots(figsize=(5.0, 3.0), layout="constrained")[1]
-        axes.plot(self.curve.theta, self.curve.s11, label="σ11 under ε11 = ε22")
-        axes.plot(self.curve.theta, self.curve.s12, label="σ12 under ε12")
-        axes.set(xlabel="θ", ylabel="homogenised stress in Pa")
-        axes.legend(frameon=False)
-        return axes
 
     @property
     def stiffness(self) -> Array | None:

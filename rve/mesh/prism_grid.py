@@ -7,7 +7,7 @@ half-way between levels, the planar vertices (a serendipity wedge has no midpoin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -16,58 +16,30 @@ from alphacut.rve.mesh.triangulation import Triangulation
 from alphacut.stochastic import RadiusMap, ThetaLaw
 
 
-def moved(mesh: Triangulation, radius: float) -> Array:
-    """Positions of all nodes, shape (n, 2), curved edges on the outline of `radius`.
+def moved(mesh: Triangulation, radii: Array) -> Array:
+    """Positions of all nodes at k radii, shape (k, n, 2), curved edges on the outline.
 
     Nodes slide along rays from the centre: inside the particle in proportion, outside between the
     outline and the side of the square. Edge midpoints slide too, so that the layers between a large
     particle and the side bend with it; only an edge across a diagonal of the square, where sliding
     has a kink, stays straight.
     """
-    rays, outline = _rays(mesh), mesh.outline
-    old, new = mesh.radius * rays.shape, radius * rays.shape
-    with np.errstate(divide="ignore", invalid="ignore"):
-        outer = (
-            new + (rays.distance - old) * (rays.side - new) / (rays.side - old)
-        ) / rays.distance
-    points = mesh.points * np.where(rays.inner, radius / mesh.radius, outer)[:, None]
-    points[rays.straight] = points[mesh.ends[rays.straight - mesh.vertices]].mean(axis=1)
-    # z = 0 of eq. 14
-    x, y = points[mesh.arc].T
-    points[mesh.arc] *= (radius * outline(np.arctan2(y, x)) / np.hypot(x, y))[:, None]
-    return np.asarray(points)
-
-
-@dataclass(frozen=True)
-class _Rays:
-    """Nodes by their rays from the centre, each of shape (n,).
-
-    Args:
-        distance: From the centre.
-        side: Distance of the square's side.
-        shape: Distance of the outline over its radius.
-        inner: Whether a node is the particle's.
-        straight: Midpoints kept straight, any number.
-    """
-
-    distance: Array
-    side: Array
-    shape: Array
-    inner: Mask
-    straight: Rows
-
-
-@lru_cache(maxsize=4)
-def _rays(mesh: Triangulation) -> _Rays:
-    distance, (x, y) = np.linalg.norm(mesh.points, axis=1), mesh.points.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        side = distance / abs(mesh.points).max(axis=1)
+    radius, (x, y) = radii[:, None], mesh.points.T
+    distance, shape = np.hypot(x, y), np.asarray(mesh.outline(np.arctan2(y, x)))
     inner = np.zeros(len(distance), bool)
     inner[mesh.triangles[mesh.inside]] = True
-    shape = np.asarray(mesh.outline(np.arctan2(y, x)))
+    old, new = mesh.radius * shape, radius * shape
+    with np.errstate(divide="ignore", invalid="ignore"):  # at the centre
+        side = distance / abs(mesh.points).max(axis=1)
+        outer = (new + (distance - old) * (side - new) / (side - old)) / distance
+        scale = np.where(inner, radius / mesh.radius, outer)
+        scale = np.where(mesh.arc, new / distance, scale)  # z = 0 of eq. 14
+    points = mesh.points * scale[..., None]
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
     across = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
-    return _Rays(distance, side, shape, inner, np.flatnonzero(across) + mesh.vertices)
+    straight = np.flatnonzero(across & ~mesh.arc[mesh.vertices :])
+    points[:, mesh.vertices + straight] = points[:, mesh.ends[straight]].mean(axis=2)
+    return np.asarray(points)
 
 
 @dataclass(frozen=True)
@@ -126,7 +98,7 @@ class PrismGrid:
     def _at(self, radius: RadiusMap, theta: Array) -> Array:
         if not self.conforming:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
-        return np.array([moved(self.plane, float(r)) for r in radius(theta)])
+        return moved(self.plane, radius(theta))
 
     def sign(self, points: Array, radius: RadiusMap) -> Array:
         """1 where z < 0 in eq. 14, at points (…, 3), else 0; shape (…)."""

@@ -32,7 +32,7 @@ def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline)
     mesh = triangulate(size=0.2, radius=0.5, outline=outline)
     signs = np.sign(areas(mesh.points, mesh.triangles))
     for radius in (0.05, 0.3, 0.65):
-        points = moved(mesh, radius)
+        points = moved(mesh, np.array([radius]))[0]
         assert (areas(points, mesh.triangles) * signs > 0).all()
         x, y = points[mesh.arc].T
         assert np.hypot(x, y) == pytest.approx(radius * outline(np.arctan2(y, x)), rel=1e-12)

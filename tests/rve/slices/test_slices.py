@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.cell import VoigtPhase, axial_moduli, square_moduli
 from alphacut.rve.mesh.outline import Ellipse, circle
-from alphacut.rve.model import cross_check, named
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import SlicesModel, solve_slice
@@ -163,11 +162,6 @@ def test_model_declares_its_error():
     for result, truth in zip(results, exact, strict=True):
         true = abs(result.modulus / truth.modulus - 1)
         assert true < result.estimated_error < 30 * true
-    assert cross_check(results, exact, tolerance=1e-3) < 1e-3
-    with pytest.raises(FailedError, match=r"slices gives E = .* and series"):
-        cross_check(results, exact, tolerance=1e-9)
-    with pytest.raises(RefusedError, match="models of a cross-check is series"):
-        cross_check(exact, exact, tolerance=1e-9)
 
 
 def test_an_ellipse_of_an_orthotropic_material_has_its_own_error_declared():
@@ -231,11 +225,3 @@ def test_estimate_of_the_rule_falls_with_its_error():
     estimate, true = estimated_and_true(lambda _: 16, seed=8, decades=4)
     assert (estimate > true - 1e-11).all()
     assert np.quantile(estimate, 0.9) < 1e-6
-
-
-def test_models_by_name():
-    assert named("slices", order=2) == SlicesModel(order=2)
-    with pytest.raises(ValueError, match="model is 'slice'; allowed: prism, slices, series"):
-        named("slice")
-    with pytest.raises(ValueError, match="option of slices is h; allowed: order"):
-        named("slices", h=1)
