@@ -34,7 +34,6 @@ SOLVERS = {  # PETSc options without prefix
     "gamg": {"pc_type": "gamg", "pc_gamg_threshold": "0.01"},
     "mumps": {
         "ksp_type": "preonly",
-        "ksp_norm_type": "none",
         "pc_type": "cholesky",
         "pc_factor_mat_solver_type": "mumps",
     },

@@ -80,7 +80,7 @@ def test_a_flipped_shear_stress_is_below_the_reuss_bound():
 
 
 def test_two_loads_see_the_bulk_modulus_of_the_whole_stiffness():
-    c = layered(0.4)
+    c = voigt(0.4, *PAIR) * 0.9999
     whole, seen = checks_of(c, np.eye(3)), checks_of(c @ LOADS.T, LOADS)
     assert whole["hashin_shtrikman"] == pytest.approx(seen["hashin_shtrikman"], rel=1e-9)
     assert whole["hashin_shtrikman"] > 0

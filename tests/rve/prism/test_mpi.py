@@ -21,7 +21,7 @@ from alphacut.rve.prism.model import PrismModel
 from alphacut.stochastic import HermiteMap
 
 radii, small = HermiteMap(0.1337, 0.1, 0.8663, 0.1692), HermiteMap(0.2, 0.1, 0.5, 0.1)
-MUMPS = {"ksp_type": "preonly", "ksp_norm_type": "none", "pc_type": "cholesky"}
+MUMPS = {"ksp_type": "preonly", "pc_type": "cholesky"}
 MUMPS["pc_factor_mat_solver_type"] = "mumps"
 results = []
 for layers, radius_map, options in (

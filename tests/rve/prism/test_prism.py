@@ -108,7 +108,6 @@ def test_a_range_too_wide_for_two_solutions_is_solved_sample_by_sample():
 
 MUMPS = {
     "ksp_type": "preonly",
-    "ksp_norm_type": "none",
     "pc_type": "cholesky",
     "pc_factor_mat_solver_type": "mumps",
 }
