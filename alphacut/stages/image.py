@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document, as_json
 from alphacut.io.provenance import file_digest
 from alphacut.rve.image.bounds import Ends
-from alphacut.rve.image.model import ImageCut, ImageModel
+from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
 from alphacut.stages.cell import GPA
 from alphacut.stages.image_study import ImageStudy, Level, study_of
 from alphacut.stages.store import Stage, Work
@@ -65,7 +65,8 @@ def solved(study: ImageStudy, work: Work) -> FuzzyImage:
     start, tick = perf_counter(), work.tick or (lambda share: None)
     try:
         modal = study.images(None, None)
-        model, crisp = study.model.refined(modal)
+        model = replace(study.model, division=usual_division(modal))
+        crisp = model.solve(modal)
         tick(0.2)
         levels = [study.images(level, level) for level in study.alpha]
         cuts = tuple(model.cuts(levels, (modal, crisp)))
@@ -115,7 +116,7 @@ def document(image: FuzzyImage) -> Document:
         },
         "widths_GPa": {name: value / GPA for name, value in image.widths.items()},
         "fractions": dict(zip(image.study.names, map(float, image.study.fractions), strict=True)),
-        "division": image.model.parts,
+        "division": image.model.division,
     }
 
 

@@ -97,7 +97,7 @@ def study_of(cell: ImageCell, alpha: tuple[float, ...], average: str) -> ImageSt
         RefusedError: Its image cannot be used.
     """
     try:
-        grey = read_grey(cell.image, division=1, square=len(cell.pixel) == 1)
+        grey = read_grey(cell.image, square=len(cell.pixel) == 1)
         ranges, fuzzy = _labelled(grey, cell.labels) if cell.labels else _thresholds(grey, cell)
         aspect, solver = cell.pixel[-1] / cell.pixel[0], ConjugateGradient(ACCURACY)
         model = ImageModel(aspect, solver=solver, average=average)

@@ -68,7 +68,7 @@ def round_particle(size: int, radius: float, phases: list[PlaneModuli]) -> Image
     edge = np.abs(np.linspace(-1, 1, size + 1))
     near, far = np.minimum(edge[1:], edge[:-1]), np.maximum(edge[1:], edge[:-1])
     inner, outer = (np.hypot(x, x[:, None]) <= radius for x in (far, near))
-    intervals = [ModuliInterval.crisp(phase) for phase in phases]
+    intervals = [ModuliInterval(phase, phase) for phase in phases]
     return solve_between(moduli_images(inner.astype(int), outer.astype(int), intervals))
 
 

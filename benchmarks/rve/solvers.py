@@ -21,7 +21,7 @@ from alphacut.rve.cell import LOADS, Phase
 from alphacut.rve.prism import model as prism
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.solver.krylov import solve
-from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, RadiusMap
+from alphacut.stochastic import HermiteMap, RadiusMap
 from benchmarks.rows import write
 
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1

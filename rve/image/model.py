@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from math import log2
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.anisotropy import ISOTROPIC, require_average
 from alphacut.rve.image.bounds import Ends, StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.phase_images import ModuliImages
-from alphacut.rve.image.read import memory
 from alphacut.rve.image.solve import ImageSolution, solve_between
 
 MILD = 10.0
@@ -46,10 +44,8 @@ class ImageModel:
 
     Args:
         aspect: Height of a pixel over its width.
-        division: Parts along each side of a pixel; None: `usual_division`.
+        division: Parts along each side of a pixel; see `usual_division`.
         solver: Stopping rule of the fields.
-        width: Width of the stiffness's bounds that a crisp image is to have; pixels are divided
-            further until it has. None: as many parts as `division` says.
         average: What E and ν are of, a name in `anisotropy.AVERAGES`.
 
     Raises:
@@ -57,9 +53,8 @@ class ImageModel:
     """
 
     aspect: float = 1.0
-    division: int | None = None
+    division: int = 1
     solver: ConjugateGradient = field(default_factory=ConjugateGradient)
-    width: float | None = None
     average: str = ISOTROPIC
 
     def __post_init__(self) -> None:
@@ -68,38 +63,10 @@ class ImageModel:
             allowed = f"{FLATTEST:g} to {1 / FLATTEST:g}"
             raise RefusedError("height of a pixel over its width", f"{self.aspect:.3g}", allowed)
 
-    def refined(
-        self, images: ModuliImages, before: float = 0.0
-    ) -> tuple[ImageModel, ImageSolution]:
-        """The model with the parts that its width needs, and the image's solution by it.
-
-        Args:
-            images: Moduli for crisp inputs.
-            before: Width with half as many parts; 0: not known.
-
-        Raises:
-            FailedError: The width is out of the memory's reach.
-        """
-        model = replace(self, division=self.division or usual_division(images))
-        solution = model.solve(images)
-        width = solution.bounds.width
-        if self.width is None or width <= self.width:
-            return model, solution
-        rows, columns = images.bulk[0].shape
-        needed, have = memory(rows, columns, model.parts)
-        power = max(log2(before / width), 1.0) if before else 2.0
-        least = width * (needed / have) ** (power / 2)
-        if needed > have / 4 or least > self.width:
-            raise FailedError(
-                f"a width of {least:.1e} at best fits into memory, {self.width:.2e} is allowed",
-                "take a larger width, or an image of fewer pixels",
-            )
-        return replace(model, division=2 * model.parts).refined(images, width)
-
     def solve(self, images: ModuliImages, start: ImageSolution | None = None) -> ImageSolution:
         """Bounds of every image between two."""
         return solve_between(
-            images, aspect=self.aspect, solver=self.solver, division=self.parts, start=start
+            images, aspect=self.aspect, solver=self.solver, division=self.division, start=start
         )
 
     def cuts(
@@ -123,11 +90,6 @@ class ImageModel:
         )
         rows = zip(solutions, moduli, ratios, strict=True)
         return [ImageCut(s.bounds, e, nu, s.attained, s.iterations) for s, e, nu in rows][::-1]
-
-    @property
-    def parts(self) -> int:
-        """Parts along each side of a pixel."""
-        return self.division or 1
 
 
 def nested(intervals: Sequence[Ends]) -> list[Ends]:

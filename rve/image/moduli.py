@@ -40,12 +40,8 @@ class PlaneModuli:
         """From Young's modulus in Pa and Poisson's ratio, inside (−1, 0.5)."""
         if not -1 < poisson < 0.5:
             raise RefusedError("Poisson's ratio of a phase", poisson, "values in (-1, 0.5)")
-        return cls.of_bulk(modulus / (3 * (1 - 2 * poisson)), modulus / (2 * (1 + poisson)))
-
-    @classmethod
-    def of_bulk(cls, bulk: float, shear: float) -> PlaneModuli:
-        """From the bulk modulus K of three dimensions, positive, and the shear modulus, in Pa."""
-        return cls(bulk + shear / 3 if bulk > 0 else bulk, shear)
+        shear = modulus / (2 * (1 + poisson))
+        return cls(modulus / (3 * (1 - 2 * poisson)) + shear / 3, shear)
 
     @property
     def stiffness(self) -> Array:
@@ -75,11 +71,6 @@ class ModuliInterval:
     def __post_init__(self) -> None:
         if not (self.lower.bulk <= self.upper.bulk and self.lower.shear <= self.upper.shear):
             raise RefusedError("upper moduli of a phase", self.upper, f"{self.lower} or more")
-
-    @classmethod
-    def crisp(cls, moduli: PlaneModuli) -> ModuliInterval:
-        """The interval of one material."""
-        return cls(moduli, moduli)
 
     @classmethod
     def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:

@@ -15,19 +15,18 @@ PLANE_MODES = ("1", "L", "I;16", "I;16B", "I;16L", "I", "F")
 BYTES_PER_PIXEL = 2500  # of both sides together, measured at 1024 × 1024
 
 
-def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
+def read_grey(path: Path, *, square: bool = True) -> Array:
     """Grey values of an image, shape (rows, columns), row 0 at the bottom.
 
     Args:
         path: A file ``.png``, ``.tif`` … or ``.npy``.
-        division: Parts along each side of a pixel that the solver will make.
         square: Refuse a file that says that its pixels are not square.
 
     Raises:
         RefusedError: The file is no plane grey image, holds no numbers, or is too large for memory.
     """
     try:
-        values = _array(path) if path.suffix == ".npy" else _picture(path, division, square)
+        values = _array(path) if path.suffix == ".npy" else _picture(path, square)
     except (RefusedError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise errors of many kinds
@@ -35,7 +34,7 @@ def read_grey(path: Path, *, division: int = 1, square: bool = True) -> Array:
     if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
         what = f"{values.dtype} of shape {values.shape}"
         raise RefusedError(path.name, what, "one plane of 2 × 2 numbers or more")
-    require_memory(values.shape[0], values.shape[1], division)
+    require_memory(*values.shape)
     if not np.isfinite(values).all():
         count = int((~np.isfinite(values)).sum())
         raise RefusedError(path.name, f"with {count} values that are not finite", "numbers")
@@ -47,7 +46,7 @@ def _array(path: Path) -> Array:
     return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
 
 
-def _picture(path: Path, division: int, square: bool) -> Array:
+def _picture(path: Path, square: bool) -> Array:
     """Pixels of one page of grey values, read where they fit into memory."""
     from PIL import Image
 
@@ -61,28 +60,23 @@ def _picture(path: Path, division: int, square: bool) -> Array:
         if square and abs(float(across) / float(up) - 1) > 0.01:
             what = f"of pixels {float(across):g} by {float(up):g} per inch"
             raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
-        require_memory(picture.height, picture.width, division)
+        require_memory(picture.height, picture.width)
         return np.asarray(picture)
 
 
-def require_memory(rows: int, columns: int, division: int) -> None:
+def require_memory(rows: int, columns: int) -> None:
     """Refuses an image whose solution cannot fit into this machine's memory.
 
     Raises:
         RefusedError: It says how much is needed, and how large a piece would fit.
     """
-    needed, have = memory(rows, columns, division)
+    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    needed = BYTES_PER_PIXEL * rows * columns
     if needed > have:
-        side = int((have / BYTES_PER_PIXEL / division**2) ** 0.5)
-        what = f"{rows} × {columns} pixels divided by {division}, about {needed / 1e9:.0f} GB"
+        side = int((have / BYTES_PER_PIXEL) ** 0.5)
+        what = f"{rows} × {columns} pixels, about {needed / 1e9:.0f} GB"
         allowed = f"up to {have / 1e9:.0f} GB of memory"
         raise RefusedError("image", what, allowed, f"crop a piece of {side} × {side} pixels")
-
-
-def memory(rows: int, columns: int, division: int) -> tuple[int, int]:
-    """Bytes that the solution of an image needs, and those that this machine has."""
-    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return BYTES_PER_PIXEL * rows * columns * division**2, have
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:

@@ -2,8 +2,7 @@
 
 The product space has no θ-derivative, so its exact solution at each θ is a plane cell: the
 multipole series for circles of isotropic phases, slices of order 4 for all others. Neither shares
-elements or mesh with the wedges; its own declared error is added. Where neither reaches (particles
-in touch) the distance from the bounds of Voigt and Reuss takes its place.
+elements or mesh with the wedges; its own declared error is added.
 """
 
 from __future__ import annotations
@@ -14,15 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
-from alphacut.rve.mesh.outline import area
 from alphacut.rve.result import Homogenised, StressCurve
-from alphacut.rve.series.means import RuleError
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.series.truncation import SeriesError
-from alphacut.rve.slices.curve import AREA, stresses
+from alphacut.rve.slices.curve import stresses
 from alphacut.rve.slices.model import SlicesModel
 
 _ACCURACY = 1e-9  # of the series
@@ -34,13 +29,14 @@ def judged(result: Homogenised) -> Homogenised:
 
     Args:
         result: Of the product space, with its cell.
+
+    Raises:
+        SeriesError: Particles nearly touch.
+        RuleError: The map of the radius is not smooth.
     """
     cell, curve = result.cell, result.curve
     assert cell is not None
-    try:
-        mean, nodes = _by_series(curve, cell) if cell.square else _by_slices(curve, cell)
-    except (SeriesError, RuleError):
-        mean, nodes = _by_bounds(curve, cell)
+    mean, nodes = _by_series(curve, cell) if cell.square else _by_slices(curve, cell)
     return replace(result, curve=replace(curve, error=nodes), errors={"space": mean})
 
 
@@ -103,19 +99,6 @@ def _of_nodes(curve: StressCurve, exact: Array, left: Array) -> Array:
     """Relative errors of σ11 and σ12 at the nodes, shape (n, 2)."""
     own = np.stack([curve.s11, curve.s12], axis=-1)
     return np.asarray((1 + _apart(own, exact)) * (1 + left) - 1)
-
-
-def _by_bounds(curve: StressCurve, cell: Cell) -> tuple[Array, Array]:
-    """Errors that no exact value exceeds."""
-    share = area(cell.outline) / AREA * cell.radius(curve.theta) ** 2
-    ends = [
-        replace(curve, stiffness=c, s11=stresses(c)[0], s12=stresses(c)[1])
-        for c in (bound(share, *cell.stiffness) for bound in (reuss, voigt))
-    ]
-    own = _readings(curve)[-1]
-    mean = np.max([_apart(own, _readings(end)[-1]) for end in ends], axis=0)
-    nodes = [_of_nodes(curve, np.stack([e.s11, e.s12], axis=-1), np.zeros(2)) for e in ends]
-    return np.asarray(mean), np.max(nodes, axis=0)
 
 
 def _apart(first: Array, second: Array) -> Array:

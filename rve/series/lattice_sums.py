@@ -75,14 +75,10 @@ def _lipschitz(n: int, power: int) -> float:
 
 
 def _near_points(n: int, *, conjugate: bool) -> float:
-    """Direct sum over |m|, |j| ≤ 8; for n ≥ 40 the rest is below round-off, later all but |p| = 1.
-
-    Its places keep zeros, so that the order of summation, and the last bit with it, stays.
-    """
+    """Direct sum over |m|, |j| ≤ 8; the rest is below round-off, later all but |p| = 1."""
+    if n >= _UNIT_POINTS:
+        return 4.0
     m = np.arange(-8.0, 9.0)
     p = (m[:, None] + 1j * m).ravel()
     p = p[p != 0]
-    near = abs(p) < (12.0 if n < _UNIT_POINTS else 1.2)
-    terms = np.zeros_like(p)
-    terms[near] = (p[near].conj() if conjugate else 1) * p[near] ** -float(n)
-    return float(np.sum(terms).real)
+    return float(np.sum((p.conj() if conjugate else 1) * p ** -float(n)).real)

@@ -64,8 +64,6 @@ class ConjugateGradient:
     Args:
         accuracy: Energy that the fields may lack, relative to the system's scale, in (0, 0.1]; a
             bound of the stiffness is then within three times that of the one of solved fields.
-        iterations: Exact number of iterations instead, or None; fields are then not converged and
-            not meant to be.
         watch: Called before every iteration; what it raises ends it.
 
     Raises:
@@ -73,14 +71,11 @@ class ConjugateGradient:
     """
 
     accuracy: float = 3e-6
-    iterations: int | None = None
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
         if not 0 < self.accuracy <= LEAST_ACCURATE:
             raise RefusedError("accuracy of the energy", self.accuracy, "(0, 0.1]")
-        if self.iterations is not None and self.iterations < 0:
-            raise RefusedError("iterations", self.iterations, "0 or more")
 
     def solve(self, system: System) -> tuple[Array, int]:
         """Fields that lack no more than the accuracy says, and the iterations.
@@ -93,10 +88,9 @@ class ConjugateGradient:
         product = inner(residual, direction)
         reach = np.full(product.shape, 1 / system.least)  # energy lacking over product, at most
         allowed = self.accuracy * system.scale
-        limit = LIMIT if self.iterations is None else self.iterations
-        for number in range(limit):
+        for number in range(LIMIT):
             self.watch()
-            if self.iterations is None and np.all(reach * product <= allowed):
+            if np.all(reach * product <= allowed):
                 return fields, number
             image = system.operator.apply(direction)
             length = _ratio(product, inner(direction, image))
@@ -108,14 +102,12 @@ class ConjugateGradient:
             reach = _radau(reach - length, change, system.least)
             direction *= _each(change)
             direction += image
-        if self.iterations is None:
-            lacking = float((reach * product / system.scale).max())
-            raise FailedError(
-                f"the image's fields lack up to {lacking:.1e} of the energy after {LIMIT}"
-                f" iterations, {self.accuracy:.1e} is allowed",
-                "lower the contrast of the phases or allow more",
-            )
-        return fields, limit
+        lacking = float((reach * product / system.scale).max())
+        raise FailedError(
+            f"the image's fields lack up to {lacking:.1e} of the energy after {LIMIT}"
+            f" iterations, {self.accuracy:.1e} is allowed",
+            "lower the contrast of the phases or allow more",
+        )
 
 
 def inner(first: Array, second: Array) -> Array:
