@@ -10,9 +10,10 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.mesh.outline import Outline, circle, is_round
+from alphacut.rve.mesh.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap
 
+AREA = 4.0  # of the cell, in halves of its side
 STRAIN = 0.01  # eq. 15
 IN_GPA = (0.01, 1e4)  # E that is no solid's in Pa (soft gels have 1e4) and is one's in GPa or MPa
 # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
@@ -108,6 +109,15 @@ class Cell:
     inclusion: AnyPhase
     radius: RadiusMap
     outline: Outline = circle
+
+    @property
+    def phases(self) -> tuple[AnyPhase, AnyPhase]:
+        """Matrix and particle."""
+        return self.matrix, self.inclusion
+
+    def fraction(self, theta: Array) -> Array:
+        """Area fraction of the particle at θ of any shape."""
+        return np.asarray(area(self.outline) / AREA * self.radius(theta) ** 2)
 
     @property
     def stiffness(self) -> tuple[Array, Array]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.bounds import hashin_shtrikman, reuss, voigt
 from alphacut.rve.cell import AnyPhase, Phase
+from alphacut.rve.result import Homogenised
 
 ROUND_OFF = 1e-9
 
@@ -51,6 +53,22 @@ def require(
                 "do not use this result",
             )
     return dict(checks)
+
+
+def certified(result: Homogenised) -> Homogenised:
+    """A result, with its cell and stiffness, with the certificate within its declared error.
+
+    Raises:
+        CertificateError: Symmetry or a bound is violated.
+    """
+    curve, cell = result.curve, result.cell
+    assert cell is not None
+    assert curve.stiffness is not None
+    checks = stress_checks(
+        curve.stiffness, np.eye(3), cell.fraction(curve.theta), curve.weights, cell.phases
+    )
+    checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
+    return replace(result, checks=checks)
 
 
 def stress_checks(

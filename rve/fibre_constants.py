@@ -58,28 +58,18 @@ def fibre_constants(result: Homogenised) -> FibreConstants:
     cell = result.cell
     if cell is None or not cell.square:
         raise RefusedError("cell", cell, "a result of round particles and isotropic phases")
-    bulk, along = result.moduli[0] / 2, _mean_longitudinal_shear(cell)
-    slack = _Slack.of(cell)
+    slack, bulk, shear = _Slack.of(cell), result.moduli[0] / 2, result.shear
+    across = float(result.error_of(result.shear_of)) / shear
+    along, error = _mean_longitudinal_shear(cell)
     z, *ends = slack.between(bulk, result.modulus_errors[0])
-    values = _constants(slack, z, bulk, result.shear, along[0])
-    across = result.error_of(lambda moduli: result.shear_of(moduli)) / result.shear
-    changes = [
-        _constants(
-            slack,
-            end,
-            slack.bulk(end),
-            result.shear * (1 + float(across)) ** first,
-            along[0] * (1 + along[1]) ** second,
-        )
-        - values
-        for end, first, second in product(ends, (-1, 1), (-1, 1))
+    values = _constants(slack, z, bulk, shear, along)
+    corners = [
+        _constants(slack, end, slack.bulk(end), shear * (1 + across) ** a, along * (1 + error) ** b)
+        for end, a, b in product(ends, (-1, 1), (-1, 1))
     ]
-    errors = np.abs(changes).max(axis=0) + _ROUND_OFF * np.abs(values)
-    return FibreConstants(_by_name(values), _by_name(errors))
-
-
-def _by_name(values: Array) -> dict[str, float]:
-    return dict(zip(CONSTANTS, map(float, values), strict=True))
+    errors = np.abs(np.array(corners) - values).max(axis=0) + _ROUND_OFF * np.abs(values)
+    named = (dict(zip(CONSTANTS, map(float, row), strict=True)) for row in (values, errors))
+    return FibreConstants(*named)
 
 
 def _constants(slack: _Slack, z: float, bulk: float, shear: float, along: float) -> Array:
@@ -108,8 +98,7 @@ class _Slack:
     def of(cls, cell: Cell) -> _Slack:
         """Of a cell, averaged over θ."""
         rule = gauss_rule(cell.radius.distribution, points=_FINE)
-        inner = np.pi / 4 * cell.radius(rule.nodes) ** 2
-        c = np.array([phase.stiffness for phase in (cell.matrix, cell.inclusion)])
+        inner, c = cell.fraction(rule.nodes), np.array(cell.stiffness)
         bulk, mean = (c[:, 0, 0] + c[:, 0, 1]) / 2, float(rule.weights @ inner)
         between = inner * bulk[0] + (1 - inner) * bulk[1]
         ends = [rule.weights @ ((1 - inner) * inner / (between + shear)) for shear in c[:, 2, 2]]

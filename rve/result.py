@@ -12,6 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, require_average, shear_modulus
 from alphacut.rve.cell import STRAIN, Cell, square_moduli
+from alphacut.stochastic import ThetaRule
 
 
 def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
@@ -37,7 +38,6 @@ class StressCurve:
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
         stiffness: The whole stiffness at the nodes if known, in Voigt order, in Pa: of the plane
             (11, 22, 12 with 2 ε12), shape (n, 3, 3), or of space, (n, 6, 6).
-        error: Declared relative errors of s11 and s12 at the nodes, shape (n, 2), if estimated.
     """
 
     theta: Array
@@ -45,7 +45,12 @@ class StressCurve:
     s11: Array
     s12: Array
     stiffness: Array | None = None
-    error: Array | None = None
+
+    @classmethod
+    def of(cls, rule: ThetaRule, stiffness: Array) -> StressCurve:
+        """Stress under the loads of eq. 15 from the stiffness at the nodes."""
+        s11 = STRAIN * (stiffness[:, 0, 0] + stiffness[:, 0, 1])
+        return cls(rule.nodes, rule.weights, s11, 2 * STRAIN * stiffness[:, -1, -1], stiffness)
 
     @property
     def mean(self) -> tuple[float, float]:

@@ -32,21 +32,6 @@ def require_points(points: int | None) -> None:
         raise RefusedError("number of points of the rule in θ", points, "2 or more")
 
 
-def require_accuracy(value: float, least: float, what: str) -> None:
-    """Refuse a relative error outside [least, 0.1].
-
-    Args:
-        value: The error allowed.
-        least: The least that can be reached.
-        what: Its name, such as "accuracy of the table".
-
-    Raises:
-        RefusedError: It lies outside.
-    """
-    if not least <= value <= 0.1:
-        raise RefusedError(f"the {what}", f"{value:g}", f"values in [{least:g}, 0.1]")
-
-
 def require_compressible(*phases: AnyPhase) -> None:
     """Refuse phases in which quadratic elements lock.
 

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Cell, Phase, VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse, circle
@@ -27,8 +26,6 @@ from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.result import Homogenised
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.rve.slices.curve import stresses
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap
 
@@ -119,20 +116,6 @@ def judged(own: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
     yield Judgement("stiffness", own.largest_error + slack, float(entries))
 
 
-def judged_curve(own: Homogenised) -> Iterator[Judgement]:
-    """The stresses at the nodes of a round cell beside the series there."""
-    cell, curve = own.cell, own.curve
-    assert cell is not None
-    assert curve.error is not None
-    radii = cell.radius(curve.theta)
-    exact = stresses(square_stiffness(radii, cell.matrix, [cell.inclusion]).matrix[:, 0])
-    for name, k in (("s11 at θ", 0), ("s12 at θ", 1)):
-        values: Array = (curve.s11, curve.s12)[k]
-        true = abs(values / exact[k] - 1)
-        for declared, one in zip(curve.error[:, k], true, strict=True):
-            yield Judgement(name, float(declared), float(one))
-
-
 def solved(model: PrismModel, cell: Cell) -> Homogenised:
     """The cell by prisms, on a finer mesh where the one drawn folds over."""
     try:
@@ -152,11 +135,9 @@ def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
         return []
     if cell.square:
         truth = SeriesModel(accuracy=1e-12).solve(*parts)[0]
-        numbers = [one for result in results for one in judged_curve(result)]
     else:
         truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline).solve(*parts)[0]
-        numbers = []
-    return numbers + [one for result in results for one in judged(result, truth)]
+    return [one for result in results for one in judged(result, truth)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -185,12 +185,11 @@ class PrismModel:
         if self.estimate:
             result = judged(result)
         allowed = 2 * result.largest_error if result.errors else self._roughly
-        phases = cell.matrix, cell.inclusion
         energy = strains.energy(cell.stiffness)
         checks = {
             "residual": residual,
             "hill_mandel": hill_mandel(mean(strains.weights, stress), energy, loads),
-            **stress_checks(stress, loads, strains.fraction, strains.weights, phases),
+            **stress_checks(stress, loads, strains.fraction, strains.weights, cell.phases),
         }
         require(
             checks,

@@ -13,9 +13,9 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import Phase
+from alphacut.rve.cell import AREA, Phase
 from alphacut.rve.fenicsx import PETSc
-from alphacut.rve.prism.problem import CELL_AREA, PrismProblem, SliceStrains
+from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.solver.krylov import solve
 from alphacut.rve.solver.options import SolverOptions
 
@@ -107,7 +107,7 @@ def modulus_basis(
     )
     iterations = sum((solutions.iterations for solutions in solved), ())
     basis = ModulusBasis(stiffness, projected, means, iterations, ends)
-    scale = CELL_AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
+    scale = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
     # half-way it is as large as at the ends or less: the nodes are those of Chebyshev
     left = [_left_out(basis, modulus, images, forces, ksp.pc) for modulus in ends]
     return replace(basis, error=float((np.array(left) / scale).max()))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.rve.cell import AREA
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.form import WHOLE
 from alphacut.rve.mesh.periodicity import identify
@@ -18,8 +19,6 @@ from alphacut.rve.solver.krylov import krylov_solver
 from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap
-
-CELL_AREA = 4.0
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,7 @@ class PrismProblem:
         for k, (uniform, u) in enumerate(fields):
             strain[..., k] = uniform if u is None else form.strains(u) + uniform
         area, share = form.areas, form.particle()
-        parts = np.stack([area * (1 - share), area * share]) / CELL_AREA  # (2, cells, 3, points)
+        parts = np.stack([area * (1 - share), area * share]) / AREA  # (2, cells, 3, points)
         sums = np.einsum("pmsq,msqif->pmsif", parts, strain)
         means = np.stack([form.by_layer(one) for one in sums])
         fraction = form.by_layer(parts[1].sum(axis=-1))

@@ -15,8 +15,8 @@ import numpy as np
 from scipy.special import gammaln, zeta
 
 from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.rve.cell import AREA
 
-AREA = 4.0
 # ζ(z + P) − ζ(z) = π conj(P) / area: Legendre's relation on the square lattice
 ZETA_PERIOD = np.pi / AREA
 _UNIT_POINTS = 208  # exponent from which |p| ≥ √2 leaves less than 1e-30

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,12 +12,14 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.result import StressCurve
 from alphacut.rve.series.truncation import CellModuli, error_by_more_terms
-from alphacut.rve.slices.curve import curve_of
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule, require_map
 
 _MOST_POINTS = 1200
 _SAFETY = 1.6
 _NOISE = 1e-13  # of a declared error: what rounding leaves
+
+
+_kept_rule = lru_cache(maxsize=256)(gauss_rule)
 
 
 class RuleError(FailedError):
@@ -30,13 +33,11 @@ class Mean:
     Args:
         curve: With its stiffness.
         errors: Declared relative errors of the three mean moduli by source: space, theta.
-        nodes: Those of the moduli at the nodes by the series, shape (n, 3).
         terms: Most terms of the series.
     """
 
     curve: StressCurve
     errors: dict[str, Array]
-    nodes: Array
     terms: int
 
 
@@ -81,13 +82,14 @@ def settled_means(
     """
     require_map(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
+    make_rule = _kept_rule if isinstance(radius_map.distribution, Hashable) else gauss_rule
     known: dict[int, _Averages] = {}
     settled: dict[int, Mean] = {}
     while True:
         counts = [count, _finer(count), _finer(_finer(count))]
         for n in counts:
             if n not in known:
-                rule = gauss_rule(radius_map.distribution, points=n)
+                rule = make_rule(radius_map.distribution, points=n)
                 known[n] = _Averages(rule, cells(radius_map(rule.nodes)))
         own, finer, finest = (known[n] for n in counts)
         left = _SAFETY * error_by_more_terms(own.moduli, finer.moduli, finest.moduli) + _NOISE
@@ -109,9 +111,8 @@ def settled_means(
 def _mean(own: _Averages, judge: _Averages, in_theta: Array, k: int) -> Mean:
     """Inclusion k by a rule; what the rule that judges it is off by is in no error yet."""
     return Mean(
-        curve=curve_of(own.rule, own.cells.matrix[:, k]),
+        curve=StressCurve.of(own.rule, own.cells.matrix[:, k]),
         errors={"space": np.maximum(own.errors[k], judge.errors[k]), "theta": in_theta},
-        nodes=own.cells.errors[:, k],
         terms=int(own.cells.terms[:, k].max()),
     )
 

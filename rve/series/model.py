@@ -8,15 +8,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import ClassVar
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Cell, Phase
+from alphacut.rve.certificate import certified
 from alphacut.rve.result import Homogenised
-from alphacut.rve.series.means import settled_means
+from alphacut.rve.series.means import Mean, settled_means
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import CellModuli
-from alphacut.rve.settings import require_accuracy, require_parts, require_points
-from alphacut.rve.slices.curve import certified, with_errors
+from alphacut.rve.settings import require_parts, require_points
 from alphacut.stochastic import RadiusMap
 
 
@@ -28,7 +30,7 @@ class SeriesModel:
         points: Nodes of the rule, or None: as many as bring two successive rules within `accuracy`
             of one another.
         accuracy: Relative error allowed, of the series at each θ and, without `points`, of E by the
-            rule in θ; in [1e-12, 0.1].
+            rule in θ; from `LEAST` to 0.1.
 
     Raises:
         RefusedError: A value lies outside its range.
@@ -36,11 +38,14 @@ class SeriesModel:
 
     points: int | None = None
     accuracy: float = 1e-11
-    name = "series"
+    name: ClassVar[str] = "series"
+    LEAST: ClassVar[float] = 1e-12
 
     def __post_init__(self) -> None:
         require_points(self.points)
-        require_accuracy(self.accuracy, 1e-12, "accuracy of the series")
+        if not self.LEAST <= self.accuracy <= 0.1:
+            allowed = f"values in [{self.LEAST:g}, 0.1]"
+            raise RefusedError("the accuracy of the series", f"{self.accuracy:g}", allowed)
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
@@ -54,21 +59,26 @@ class SeriesModel:
         require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
 
-        def cells(radii: Array) -> CellModuli:
-            return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
+        def moduli(radii: Array) -> CellModuli:
+            return self._moduli(radii, matrix, inclusions)
 
-        means = settled_means(radius_map, cells, points=self.points, accuracy=self.accuracy)
-        seconds = {"total": perf_counter() - start}
-        return [
-            certified(
-                Homogenised(
-                    curve=with_errors(mean.curve, mean.nodes),
-                    method=self.name,
-                    unknowns=mean.terms,
-                    seconds=seconds,
-                    errors=mean.errors,
-                    cell=Cell(matrix, inclusion, radius_map),
-                )
+        means = settled_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
+        seconds = perf_counter() - start
+        cells = [Cell(matrix, inclusion, radius_map) for inclusion in inclusions]
+        return [self._result(*one, seconds) for one in zip(means, cells, strict=True)]
+
+    def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
+        return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
+
+    def _result(self, mean: Mean, cell: Cell, seconds: float) -> Homogenised:
+        """The certified result of one inclusion."""
+        return certified(
+            Homogenised(
+                curve=mean.curve,
+                method=self.name,
+                unknowns=mean.terms,
+                seconds={"total": seconds},
+                errors=mean.errors,
+                cell=cell,
             )
-            for mean, inclusion in zip(means, inclusions, strict=True)
-        ]
+        )

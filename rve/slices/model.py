@@ -14,16 +14,16 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import AnyPhase, Cell, axial_moduli, square_moduli
+from alphacut.rve.cell import STRAIN, AnyPhase, Cell, axial_moduli, square_moduli
+from alphacut.rve.certificate import certified
 from alphacut.rve.mesh.outline import Outline, circle
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import (
     require_compressible,
     require_mesh_size,
     require_parts,
     require_points,
 )
-from alphacut.rve.slices.curve import certified, curve_of, mean_errors, with_errors
 from alphacut.rve.slices.theta_error import DIGITS, theta_error
 from alphacut.stochastic import RadiusMap, gauss_rule, require_map
 
@@ -35,7 +35,6 @@ _CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
 _COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
 _ELONGATED = 1.5  # safety of particles that are not round, whose ends bend more
-_POINTWISE = 1.5  # safety of a single θ, where errors do not average
 _SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 
@@ -93,11 +92,11 @@ class SlicesModel:
         for m, inclusion in enumerate(inclusions):
             cell = Cell(matrix, inclusion, radius_map, self.outline)
             stiffness = np.array([one.stiffness(self.order)[m] for one in slices])
-            moduli, phases = square_moduli(stiffness), (matrix, inclusion)
+            moduli = square_moduli(stiffness)
             error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
-            curve = curve_of(rule, stiffness[nodes])
+            curve = StressCurve.of(rule, stiffness[nodes])
             result = Homogenised(
-                curve=with_errors(curve, _POINTWISE * error[nodes], square=cell.square),
+                curve=curve,
                 method=self.name,
                 solver="cholesky",
                 unknowns=max(one.unknowns[_ORDERS.index(self.order)] for one in slices),
@@ -105,13 +104,28 @@ class SlicesModel:
                 errors={
                     "space": mean_errors(curve, error[nodes], square=cell.square),
                     "theta": theta_error(
-                        radius_map, rule, radii=radii, moduli=moduli, phases=phases
+                        radius_map, rule, radii=radii, moduli=moduli, phases=cell.phases
                     ),
                 },
                 cell=cell,
             )
             results.append(certified(result))
         return results
+
+
+def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
+    """Relative errors of the mean C11 + C12, C11 − C12 and C33 from those at the nodes, (n, 3).
+
+    Args:
+        curve: With its stiffness.
+        error: At the nodes, shape (n, 3).
+        square: Whether x1 and x2 differ by the mesh alone.
+    """
+    moduli = square_moduli(np.asarray(curve.stiffness))
+    mean = curve.weights @ moduli
+    errors = np.asarray(curve.weights @ (moduli * error) / mean)
+    errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1) * square
+    return errors
 
 
 @dataclass(frozen=True)

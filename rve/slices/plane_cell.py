@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.rve.cell import AREA
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
@@ -12,7 +13,6 @@ from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.solver.krylov import ConvergenceError, solve
 from alphacut.rve.solver.numbering import map_of, reduced, zero_matrix
 
-AREA = 4.0
 PREFIX = "rve_slice_"
 RESIDUAL = 1e-8  # relative, of a factorisation
 

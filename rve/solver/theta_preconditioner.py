@@ -150,13 +150,13 @@ class ThetaPreconditioner:
         hats, bubbles = numbering.by_level(self._of_all_ranks(residual))
         hats[:-1, :corners] += bubbles / 2
         hats[1:, :corners] += bubbles / 2
-        bubbles -= mass.shift.T @ self._restricted(hats)
+        bubbles -= mass.shift.T @ (hats @ self.injection)  # Jᵀ
         solved = self._solved(self.levels, mass.root[list(numbering.levels)] @ hats)
         excess = self._solved(self.middles, mass.excess[list(numbering.middles)] @ bubbles)
         self.own.array[:] = numbering.joined(solved, excess)
         hats, bubbles = numbering.by_level(self._of_all_ranks(self.own))
         hats, bubbles = mass.root @ hats, mass.excess @ bubbles
-        hats -= self._injected(mass.shift @ bubbles)
+        hats -= (mass.shift @ bubbles) @ self.injection.T  # J
         bubbles += (hats[:-1, :corners] + hats[1:, :corners]) / 2
         rows = numbering.rows
         result.array[:] = numbering.joined(hats, bubbles)[rows.start : rows.stop]
@@ -170,14 +170,6 @@ class ThetaPreconditioner:
         """Solutions of this rank's blocks, one for each row."""
         solutions = [solver(rows[k]) for k, solver in enumerate(solvers)]
         return np.array(solutions).reshape(rows.shape)
-
-    def _injected(self, corners: Array) -> Array:
-        """J times rows on vertices."""
-        return np.asarray((self.injection @ corners.T).T)
-
-    def _restricted(self, nodes: Array) -> Array:
-        """Jᵀ times rows on all nodes."""
-        return np.asarray((self.injection.T @ nodes.T).T)
 
 
 def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:

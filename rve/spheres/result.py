@@ -81,7 +81,7 @@ def certified_spheres(result: HomogenisedSpheres) -> HomogenisedSpheres:
     ]
     checks = {
         **order_checks(np.asarray(result.stiffness), low, high),
-        "hashin_shtrikman": max(0.0, least - bulk, bulk - greatest) / bulk,
+        "hashin_shtrikman": float(max(0.0, least - bulk, bulk - greatest) / bulk),
         "hashin_shtrikman_shear": max(sheared),
     }
     checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
