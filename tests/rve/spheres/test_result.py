@@ -77,7 +77,7 @@ def test_a_wrong_stiffness_has_no_certificate(factors, words):
     moduli = cubic_moduli(result.curve.stiffness) * factors
     wrong = replace(result.curve, stiffness=cubic_voigt(*moduli.T))
     with pytest.raises(CertificateError, match=words):
-        certified_spheres(replace(result, curve=wrong), MAP, MATRIX, STIFF)
+        certified_spheres(replace(result, curve=wrong))
 
 
 @pytest.mark.parametrize("options", [{"points": 1}, {"accuracy": 1e-12}, {"accuracy": np.nan}])
