@@ -8,18 +8,13 @@ from math import hypot
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.outline import Outline, circle, extents, reach, require_fit
+from alphacut.rve.mesh.outline import Outline, circle, extents, require_fit
 from alphacut.rve.settings import require_mesh_size
 
 _CLOSEST = 0.9995
 _COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
-
-
-class TouchingError(FailedError):
-    """Particles so close that the mesh between them has no end."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +46,11 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
         outline: Of the particle.
 
     Raises:
-        RefusedError: A value out of range.
-        TouchingError: Particles nearly touch.
+        RefusedError: A value out of range, or particles nearly touch: the mesh between them would
+            have no end.
     """
     require_mesh_size(size)
-    require_fit(outline, radius)
-    if radius * reach(outline) > _CLOSEST:
-        raise TouchingError(
-            f"the particle reaches to {radius * reach(outline):.6g} of half the cell's side and"
-            f" plane meshes end at {_CLOSEST:g}: the gap between particles would need elements"
-            " without end",
-            "lower the radius",
-        )
+    require_fit(outline, radius, _CLOSEST)
     size, (wide, high, least) = min(size, _COARSEST), (radius * one for one in extents(outline))
     points, triangles, inside = square.triangles(
         size, radius, outline, lambda x, y: size * _grading(x, y, wide, high, least)

@@ -72,8 +72,8 @@ def extents(outline: Outline) -> tuple[float, float, float]:
     return wide, high, float(s.min())
 
 
-def require_fit(outline: Outline, radius: float) -> None:
-    """Refuse a particle that touches a side of the cell.
+def require_fit(outline: Outline, radius: float, most: float = 1.0) -> None:
+    """Refuse a particle that reaches to `most` of half the cell's side.
 
     Raises:
         RefusedError: It does, or its outline is no positive distance.
@@ -81,6 +81,6 @@ def require_fit(outline: Outline, radius: float) -> None:
     s = outline(_ANGLES)
     if not (s > 0).all() or abs(s[0] - s[-1]) > 1e-9 * s[0]:
         raise RefusedError("outline", s.min(), "positive distances of period 2π")
-    if not radius > 0 or radius * reach(outline) >= 1:
-        allowed = f"values in (0, {1 / reach(outline):.4g}), in halves of the cell's side"
+    if not radius > 0 or radius * reach(outline) >= most:
+        allowed = f"values in (0, {most / reach(outline):.4g}), in halves of the cell's side"
         raise RefusedError("radius", f"{radius:g}", allowed)

@@ -71,7 +71,6 @@ class SlicesModel:
 
         Raises:
             ConvergenceError: A linear system was not solved.
-            TouchingError: Particles nearly touch.
             RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)

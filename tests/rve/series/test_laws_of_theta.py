@@ -10,12 +10,13 @@ from scipy.interpolate import make_interp_spline
 from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
-from alphacut.stochastic import Beta, ExponentialMap, HermiteMap, TruncatedNormal
+from alphacut.stochastic import HermiteMap
+from tests.stochastic.test_laws import Own
 
 MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 
 
-class Own:
+class Cornered:
     """A map of a user, under a law with a corner."""
 
     class distribution:  # noqa: N801 - an instance is not needed
@@ -29,10 +30,9 @@ class Own:
 
 
 MAPS = {
-    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta()),
-    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Beta(2, 5, -1.0, 1.0)),
-    "exponential": ExponentialMap(0.2, 0.8, TruncatedNormal(-2.0, 3.0)),
-    "user": Own(),
+    "uniform": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Own("uniform", ())),
+    "beta": HermiteMap(0.1337, 0.1, 0.8663, 0.1692, Own("beta", (2, 5))),
+    "user": Cornered(),
 }
 
 

@@ -15,7 +15,7 @@ from alphacut.stochastic import HermiteMap, gauss_rule
 
 pytest.importorskip("dolfinx")
 
-from alphacut.rve.mesh.curved import TouchingError, plane_mesh
+from alphacut.rve.mesh.curved import plane_mesh
 from alphacut.rve.slices.plane_cell import PlaneCell
 
 MATRIX, INCLUSION = Phase(20e9), Phase(80e9)
@@ -89,7 +89,7 @@ def test_series_and_finest_slices_agree_to_1e_7():
 
 
 def test_refuses_particles_that_nearly_touch():
-    with pytest.raises(TouchingError, match=r"plane meshes end at 0\.9995"):
+    with pytest.raises(RefusedError, match=r"radius is 0.9996; allowed: values in \(0, 0.9995\)"):
         plane_mesh(0.9996, size=0.3)
 
 
