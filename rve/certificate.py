@@ -14,6 +14,8 @@ from alphacut.rve.cell import AnyPhase, Phase
 from alphacut.rve.result import Homogenised
 
 ROUND_OFF = 1e-9
+ALGEBRAIC = 1e-7
+"""Most by which what holds in exact arithmetic may be violated."""
 
 
 class CertificateError(FailedError):
@@ -32,21 +34,19 @@ WHAT = {
 BOUNDS = ("reuss", "voigt", "hashin_shtrikman", "hashin_shtrikman_shear")
 
 
-def require(
-    checks: Mapping[str, float], *, algebraic: float = 1e-7, discretisation: float = ROUND_OFF
-) -> dict[str, float]:
+def require(checks: Mapping[str, float], *, discretisation: float = ROUND_OFF) -> dict[str, float]:
     """The checks as they are, if all are within their limits.
 
     Args:
         checks: Relative violations by the names of `WHAT`.
-        algebraic: Limit of what holds exactly in exact arithmetic: residual, Hill–Mandel, symmetry.
-        discretisation: Declared error of the stiffness, the limit of the bounds.
+        discretisation: Declared error of the stiffness, the limit of the bounds; that of the others
+            is `ALGEBRAIC`.
 
     Raises:
         CertificateError: One is not; the message names it with its value and its limit.
     """
     for name, value in checks.items():
-        limit = discretisation if name in BOUNDS else algebraic
+        limit = discretisation if name in BOUNDS else ALGEBRAIC
         if not value <= limit:
             raise CertificateError(
                 f"{WHAT[name]}: relative violation {value:.2e}, {limit:.2e} is allowed",

@@ -191,12 +191,7 @@ class PrismModel:
             "hill_mandel": hill_mandel(mean(strains.weights, stress), energy, loads),
             **stress_checks(stress, loads, strains.fraction, strains.weights, cell.phases),
         }
-        require(
-            checks,
-            algebraic=self.options.residual_limit,
-            discretisation=ROUND_OFF + allowed,
-        )
-        return replace(result, checks=checks)
+        return replace(result, checks=require(checks, discretisation=ROUND_OFF + allowed))
 
     @property
     def _roughly(self) -> float:

@@ -16,7 +16,7 @@ from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES
 from alphacut.rve.prism.form import PrismForm
 from alphacut.rve.solver.krylov import krylov_solver
-from alphacut.rve.solver.numbering import LevelNumbering
+from alphacut.rve.solver.numbering import LevelNumbering, map_of, reduced, zero_matrix
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap
 
@@ -74,8 +74,9 @@ class PrismProblem:
         self.comm = comm
         self.form = PrismForm(grid, comm)
         self.numbering = LevelNumbering(grid, identify(grid.plane), comm)
-        self._local = self.numbering.local_map(self.form.node)
-        self.matrix = self.numbering.matrix(self._local)
+        pairs, rows = self.numbering.pairs, self.numbering.rows
+        self._local = map_of(pairs[self.form.node], comm)
+        self.matrix = zero_matrix(pairs[grid.cells], self._local, rows, self.numbering.size)
 
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
@@ -101,8 +102,9 @@ class PrismProblem:
 
     def loads(self, strains: Array, parts: slice = WHOLE) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
+        own, size = len(self.numbering.rows), self.numbering.size
         forces = [self.form.elastic.load(one, parts) for one in strains]
-        return [self.numbering.vector(self._local, one) for one in forces]
+        return [reduced(one, self._local, own, size) for one in forces]
 
     def solver(self, options: SolverOptions) -> PETSc.KSP:
         """The solver of the stiffness as assembled."""

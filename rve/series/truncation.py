@@ -81,7 +81,10 @@ class Truncation:
             RefusedError: A radius lies outside [0, 1).
             SeriesError: The last step does not suffice.
         """
-        radius, tolerance = require_radii(radius), max(tolerance, 2 * self.round_off)
+        radius, tolerance = np.atleast_1d(radius), max(tolerance, 2 * self.round_off)
+        if not ((radius >= 0) & (radius < 1)).all():
+            worst = float(radius[np.argmax(np.abs(radius - 0.5))])
+            raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
         steps, shape = np.array(self.steps), (radius.size, inclusions)
         moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
         used, todo = np.zeros(shape, int), np.arange(radius.size)
@@ -100,7 +103,12 @@ class Truncation:
             todo = todo[errors[todo].max(axis=(1, 2)) > tolerance]
             ended = todo[place[todo] == steps.size - 1]
             if ended.size:
-                self._refuse(radius[ended].max(), errors[ended].max(), tolerance)
+                raise SeriesError(
+                    f"the series at r = {radius[ended].max():.6g} reaches a relative error of"
+                    f" {errors[ended].max():.1e} with {self.steps[-1]} {self.terms},"
+                    f" {tolerance:.1e} is allowed: {self.particles} nearly touch",
+                    "lower the radius or raise the tolerance",
+                )
             place[todo] += 1
         return CellModuli(moduli, errors, used, self.voigt)
 
@@ -120,15 +128,6 @@ class Truncation:
         parts = -(-radius.size * inclusions * self.unknowns(terms) ** 2 // _BATCH)
         yield from np.array_split(radius, min(radius.size, parts))
 
-    def _refuse(self, radius: float, error: float, tolerance: float) -> None:
-        """Raise where no more terms are to be had."""
-        raise SeriesError(
-            f"the series at r = {radius:.6g} reaches a relative error of {error:.1e} with"
-            f" {self.steps[-1]} {self.terms}, {tolerance:.1e} is allowed: {self.particles} nearly"
-            " touch",
-            "lower the radius or raise the tolerance",
-        )
-
 
 def error_by_more_terms(own: Array, finer: Array, finest: Array) -> Array:
     """Relative distance from the farther of two better values.
@@ -136,16 +135,3 @@ def error_by_more_terms(own: Array, finer: Array, finest: Array) -> Array:
     One alone may meet the value by chance, for changes have either sign.
     """
     return np.asarray(np.maximum(np.abs(own / finer - 1), np.abs(own / finest - 1)))
-
-
-def require_radii(radius: Array) -> Array:
-    """The radii as an array, refused outside [0, 1).
-
-    Raises:
-        RefusedError: A radius lies outside.
-    """
-    radius = np.atleast_1d(np.asarray(radius, float))
-    if not (np.all(radius >= 0) and np.all(radius < 1)):
-        worst = float(radius[np.argmax(np.abs(radius - 0.5))])
-        raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
-    return radius

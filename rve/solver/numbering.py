@@ -98,18 +98,6 @@ class LevelNumbering:
         half = np.where(vertices >= 0, vertices + self.planar // 2 + first[:-1], -1)
         return np.concatenate([on.ravel(), half.ravel()])
 
-    def local_map(self, nodes: Rows) -> PETSc.LGMap:
-        """Reduced unknowns of DOLFINx's nodes; −1 where dropped."""
-        return map_of(self.pairs[nodes], self.comm)
-
-    def matrix(self, local_map: PETSc.LGMap) -> PETSc.Mat:
-        """Matrix of zeros with room for all pairs of unknowns that share a wedge."""
-        return zero_matrix(self.pairs[self.grid.cells], local_map, self.rows, self.size)
-
-    def vector(self, local_map: PETSc.LGMap, values: Array) -> PETSc.Vec:
-        """Sum Pᵀ f of what every rank's nodes have, shape (nodes · 2,)."""
-        return reduced(values, local_map, len(self.rows), self.size)
-
     def to_nodes(self, values: Array, nodes: Rows) -> Array:
         """Displacements of nodes, zero on the fixed line, shape (nodes, 2), from all unknowns."""
         pairs = np.concatenate([values.reshape(-1, 2), np.zeros((1, 2))])  # −1 is the last

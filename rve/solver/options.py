@@ -50,15 +50,6 @@ class SolverOptions:
         """True for the preconditioner that solves level by level."""
         return self.all["pc_type"] == "python"
 
-    @property
-    def residual_limit(self) -> float:
-        """Relative residual above which a system counts as not solved, 1e-7 … 1e-5."""
-        try:
-            tolerance = 100 * float(self.overrides.get("ksp_rtol", 0))
-        except ValueError:
-            tolerance = 0.0
-        return min(1e-5, max(1e-7, tolerance))
-
     def __str__(self) -> str:
         words = [f"-{PREFIX}{name} {value}".strip() for name, value in self.overrides.items()]
         return " ".join(["theta", *words] if self.by_levels else words)
