@@ -229,12 +229,3 @@ def spread(function: Callable[[Array], Array | float], values: Array, errors: Ar
     ends = product(*((1 / (1 + error), 1 + error) for error in errors))
     changes = [abs(np.asarray(function(values * factor)) - centre) for factor in ends]
     return np.asarray(np.max(changes, axis=0))
-
-
-def error_of_means(result: Homogenised) -> Array:
-    """Absolute errors of E (Pa), ν and the mean stresses s11 and s12 (Pa), shape (4,).
-
-    They are nan where none were made.
-    """
-    s11, _, s12 = np.abs([result.curve.mean[0], 0.0, result.curve.mean[1]]) * result.modulus_errors
-    return np.array([result.estimated_error * result.modulus, result.poisson_error, s11, s12])

@@ -17,7 +17,7 @@ from alphacut.rve import bounds as plane
 from alphacut.rve.cell import STRAIN, AnyPhase, Cell, Phase, VoigtPhase
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.mesh.outline import Ellipse, circle
-from alphacut.rve.result import Homogenised, effective_modulus, error_of_means
+from alphacut.rve.result import Homogenised, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
@@ -276,7 +276,8 @@ def declared_errors(result: Homogenised) -> Document | None:
         modulus, nu = result.error_of(hill_average)
         s11, s12 = result.error_of(lambda k: STRAIN * np.array([2 * k[0] + 2 / 3 * k[1], 2 * k[2]]))
     else:
-        modulus, nu, s11, s12 = error_of_means(result)
+        modulus, nu = result.estimated_error * result.modulus, result.poisson_error
+        s11, s12 = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA}}
 
 

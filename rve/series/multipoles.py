@@ -48,14 +48,10 @@ class Contrast:
     @classmethod
     def of(cls, matrix: Phase, inclusions: Sequence[Phase]) -> Contrast:
         """From the phases, plane strain: κ = 3 − 4ν, μ = E / 2(1 + ν)."""
-        kappa, mu = zip(
-            *(
-                (3 - 4 * p.poisson, p.modulus / (2 * (1 + p.poisson)))
-                for p in (matrix, *inclusions)
-            ),
-            strict=True,
-        )
-        return cls(kappa[0], mu[0], np.array(kappa[1:]), np.array(mu[1:]))
+        phases = (matrix, *inclusions)
+        kappa = np.array([3 - 4 * one.poisson for one in phases])
+        mu = np.array([one.modulus / (2 * (1 + one.poisson)) for one in phases])
+        return cls(float(kappa[0]), float(mu[0]), kappa[1:], mu[1:])
 
     @cached_property
     def ratio(self) -> Array:

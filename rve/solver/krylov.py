@@ -86,23 +86,19 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
     for load in loads:
         x, rest = load.duplicate(), load.duplicate()
         ksp.solve(load, x)  # eq. 7: K U = F
-        _require_converged(ksp, x)
+        reason, count = ksp.getConvergedReason(), ksp.getIterationNumber()
+        if reason <= 0 or not np.isfinite(x.norm()):
+            raise ConvergenceError(
+                f"{ksp.getType()} with {ksp.pc.getType()} stopped after {count}"
+                f" iterations without reaching its tolerance (PETSc reason {reason})",
+                f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
+            )
         matrix.mult(x, rest)
         rest.axpy(-1, load)
         vectors.append(x)
-        iterations.append(ksp.getIterationNumber())
+        iterations.append(count)
         residuals.append(rest.norm() / (load.norm() or 1.0))
     return Solutions(vectors, tuple(iterations), max(residuals))
-
-
-def _require_converged(ksp: PETSc.KSP, x: PETSc.Vec) -> None:
-    reason, iterations = ksp.getConvergedReason(), ksp.getIterationNumber()
-    if reason <= 0 or not np.isfinite(x.norm()):
-        raise ConvergenceError(
-            f"{ksp.getType()} with {ksp.pc.getType()} stopped after {iterations}"
-            f" iterations without reaching its tolerance (PETSc reason {reason})",
-            f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
-        )
 
 
 @contextmanager
