@@ -27,15 +27,11 @@ class ImageCut:
         bounds: Of the stiffness.
         modulus: Interval of E, in Pa, nested in those of lower levels.
         poisson: Interval of ν.
-        attained: Both ends belong to possible images.
-        iterations: Of the slowest system.
     """
 
     bounds: StiffnessBounds
     modulus: Ends
     poisson: Ends
-    attained: bool
-    iterations: int
 
 
 @dataclass(frozen=True)
@@ -89,7 +85,7 @@ class ImageModel:
             for ends in (StiffnessBounds.young, StiffnessBounds.poisson)
         )
         rows = zip(solutions, moduli, ratios, strict=True)
-        return [ImageCut(s.bounds, e, nu, s.attained, s.iterations) for s, e, nu in rows][::-1]
+        return [ImageCut(s.bounds, e, nu) for s, e, nu in rows][::-1]
 
 
 def nested(intervals: Sequence[Ends]) -> list[Ends]:

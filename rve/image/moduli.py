@@ -57,8 +57,6 @@ class ModuliInterval:
     Args:
         lower: Least moduli.
         upper: Greatest moduli.
-        attained: Both ends are materials that can occur; else the interval only encloses them (a
-            fuzzy Poisson's ratio).
 
     Raises:
         RefusedError: The ends are the wrong way round.
@@ -66,7 +64,6 @@ class ModuliInterval:
 
     lower: PlaneModuli
     upper: PlaneModuli
-    attained: bool = True
 
     def __post_init__(self) -> None:
         if not (self.lower.bulk <= self.upper.bulk and self.lower.shear <= self.upper.shear):
@@ -82,4 +79,4 @@ class ModuliInterval:
             PlaneModuli.of_young(soft, least).bulk, PlaneModuli.of_young(soft, high).shear
         )
         upper = PlaneModuli(max(bulks), PlaneModuli.of_young(stiff, low).shear)
-        return cls(lower, upper, attained=low == high)
+        return cls(lower, upper)

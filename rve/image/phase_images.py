@@ -23,12 +23,10 @@ class ModuliImages:
     Args:
         bulk: Least and greatest plane-strain bulk modulus K + G/3.
         shear: Least and greatest shear modulus.
-        attained: Both images are possible ones, so the bounds cannot be drawn closer.
     """
 
     bulk: tuple[Array, Array]
     shear: tuple[Array, Array]
-    attained: bool
 
     def same(self, other: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""
@@ -55,17 +53,11 @@ def moduli_images(first: Rows, last: Rows, phases: Sequence[ModuliInterval]) -> 
     """Least and greatest moduli of pixels of the phases `first` … `last`."""
     pairs = np.unique(first * len(phases) + last)
     tables = np.zeros((4, len(phases), len(phases)))
-    attained = all(phase.attained for phase in phases)
     for a, b in (divmod(int(pair), len(phases)) for pair in pairs):
         bulks = [(p.lower.bulk, p.upper.bulk) for p in phases[a : b + 1]]
         shears = [(p.lower.shear, p.upper.shear) for p in phases[a : b + 1]]
         least = np.min([bulks, shears], axis=1)[:, 0]
         greatest = np.max([bulks, shears], axis=1)[:, 1]
         tables[:, a, b] = least[0], greatest[0], least[1], greatest[1]
-        ends = ((least, 0), (greatest, 1))
-        attained = attained and all(
-            any((k[e], g[e]) == tuple(value) for k, g in zip(bulks, shears, strict=True))
-            for value, e in ends
-        )
     images = [table[first, last] for table in tables]
-    return ModuliImages((images[0], images[1]), (images[2], images[3]), attained)
+    return ModuliImages((images[0], images[1]), (images[2], images[3]))

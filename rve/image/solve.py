@@ -19,21 +19,13 @@ class ImageSolution:
 
     Args:
         bounds: Of the stiffness.
-        attained: Both ends belong to possible images, so that they cannot be drawn closer than the
-            fields leave them.
         upper: Displacement side.
         lower: Stress side.
     """
 
     bounds: StiffnessBounds
-    attained: bool
     upper: SideSolution
     lower: SideSolution
-
-    @property
-    def iterations(self) -> int:
-        """Of the slowest load."""
-        return max(self.upper.iterations, self.lower.iterations)
 
 
 def solve_image(
@@ -49,7 +41,7 @@ def solve_image(
     The plane-strain bulk modulus K + G/3 and the shear modulus of each pixel have the shape (rows,
     columns) and are in Pa; row 0 is at the bottom, y rises with rows.
     """
-    images = ModuliImages((bulk, bulk), (shear, shear), attained=True)
+    images = ModuliImages((bulk, bulk), (shear, shear))
     return solve_between(images, aspect=aspect, solver=solver, division=division)
 
 
@@ -95,4 +87,4 @@ def solve_between(
         finally:  # Ctrl-C and errors are not to wait for the other side
             stopped.set()
     bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
-    return ImageSolution(bounds, images.attained, upper, lower)
+    return ImageSolution(bounds, upper, lower)

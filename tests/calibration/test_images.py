@@ -114,7 +114,7 @@ def test_images_between_two():
         bulk, shear, aspect = draw(rng)
         share = rng.choice([0.0, 1.0, rng.random()], size=(2, *bulk.shape))
         wide = 1 + rng.uniform(0, 0.3)
-        images = ModuliImages((bulk, wide * bulk), (shear, wide * shear), attained=True)
+        images = ModuliImages((bulk, wide * bulk), (shear, wide * shear))
         bounds = solve_between(images, aspect=aspect).bounds
         inside = (m * (1 + (wide - 1) * s) for m, s in zip((bulk, shear), share, strict=True))
         beside(table, rng, bounds, truth(*inside, aspect), k, most=np.inf)

@@ -23,15 +23,13 @@ SMALL = 1 << 17  # pixels up to which the loads are solved together
 
 @dataclass(frozen=True)
 class Side:
-    """Space of trial fields with its coefficients.
+    """Space of trial fields with its coefficients: of displacements, or of stresses.
 
     Args:
-        name: "displacement" bounds the stiffness from above, "stress" the compliance.
         element: Maker of the element for a pixel's aspect ratio.
         stiff: Coefficients are K + G/3 and G; else 1/(4 (K + G/3)) and 1/(4 G).
     """
 
-    name: str
     element: Callable[[float], Element]
     stiff: bool
 
@@ -42,8 +40,8 @@ class Side:
         return np.asarray(0.25 / bulk), np.asarray(0.25 / shear)
 
 
-DISPLACEMENT = Side("displacement", displacement_element, stiff=True)
-STRESS = Side("stress", airy_element, stiff=False)
+DISPLACEMENT = Side(displacement_element, stiff=True)
+STRESS = Side(airy_element, stiff=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +84,9 @@ def solve_side(
     element, whole = side.element(aspect), side.coefficients(bulk, shear)
     parts = np.ones((division, division))
     trace, deviator = (np.asarray(np.kron(one, parts)) for one in whole)
-    begin = None if start is None else _of_solved_loads(start)
+    begin = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
     fields, iterations = _fields(element, trace, deviator, solver, begin)
-    fields = _of_unit_loads(fields)
+    fields = np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1)
     weights = list(zip(element.parts, (trace, deviator), strict=True))
     result = energies(element, fields, element.mean_modes(UNIT_LOADS), weights)
     return SideSolution(fields, result, iterations)
@@ -113,16 +111,6 @@ def _fields(
             solver.solve(System(operator, preconditioner, load, scale[part], least, guess))
         )
     return np.concatenate([fields for fields, _ in solved]), max(steps for _, steps in solved)
-
-
-def _of_solved_loads(fields: Array) -> Array:
-    """Fields under `SOLVED_LOADS` from those under `UNIT_LOADS`."""
-    return np.stack([fields[0] + fields[1], fields[0] - fields[1], fields[2]])
-
-
-def _of_unit_loads(fields: Array) -> Array:
-    """Fields under `UNIT_LOADS` from those under `SOLVED_LOADS`."""
-    return np.stack([(fields[0] + fields[1]) / 2, (fields[0] - fields[1]) / 2, fields[2]])
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:

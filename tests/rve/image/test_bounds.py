@@ -106,7 +106,7 @@ def test_chequerboards_of_one_bulk_modulus_keep_their_product_of_shear_moduli(se
     assert result.bulk[0] <= bulk <= result.bulk[1]
 
 
-@pytest.mark.parametrize("side", [DISPLACEMENT, STRESS], ids=lambda side: side.name)
+@pytest.mark.parametrize("side", [DISPLACEMENT, STRESS], ids=["displacement", "stress"])
 @pytest.mark.parametrize("size", [1e-12, 1e-6, 1e-2, 10.0])
 def test_a_perturbed_field_still_bounds(side, size):
     rng = np.random.default_rng(3)
@@ -159,7 +159,7 @@ def test_a_turned_image_has_the_turned_stiffness():
 def test_a_homogeneous_image_is_exact():
     bulk, shear = np.full((6, 9), 3.0), np.full((6, 9), 2.0)
     result = solve_image(bulk, shear)
-    assert result.iterations == 0
+    assert result.upper.iterations == result.lower.iterations == 0
     assert result.bounds.contains(stiffness(3.0, 2.0))
     assert result.bounds.width < 1e-13
 
@@ -231,7 +231,7 @@ def test_too_few_iterations_raise(monkeypatch):
         solve_image(bulk, shear, solver=TIGHT)
 
 
-@pytest.mark.parametrize("options", [{"accuracy": 0}, {"iterations": -1}])
+@pytest.mark.parametrize("options", [{"accuracy": 0}, {"accuracy": 1}])
 def test_bad_stopping_rules_are_refused(options):
     with pytest.raises(RefusedError) as error:
         ConjugateGradient(**options)
