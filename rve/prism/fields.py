@@ -30,7 +30,6 @@ class CellFields:
         displacement: In halves of the cell's side, shape (n, 2, loads).
         stress: (σ11, σ22, σ12), means over the wedges of one phase that meet in a node, shape
             (n, 3, loads), in Pa.
-        volume: Of the wedges, weighted with f_Θ, shape (m,).
     """
 
     points: Array
@@ -38,7 +37,6 @@ class CellFields:
     phase: Rows
     displacement: Array
     stress: Array
-    volume: Array
 
 
 def cell_fields(
@@ -72,11 +70,8 @@ def cell_fields(
     mean = np.zeros((len(kept), 3, len(vectors)))
     np.add.at(mean, cells, stress)
     mean /= np.bincount(cells.ravel())[:, None, None]
-    volume = np.empty(len(cells))
-    heights = form.of_slices(form.slices()[1])
-    volume[form.wedge] = (form.areas * heights[..., None]).sum(axis=(1, 2))
     nodes = kept % grid.nodes
-    return CellFields(positions[nodes], cells, inside, total[nodes], mean, volume)
+    return CellFields(positions[nodes], cells, inside, total[nodes], mean)
 
 
 def _strain_at_nodes(problem: PrismProblem, displacement: Array) -> Array:

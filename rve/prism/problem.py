@@ -11,7 +11,6 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import AREA
 from alphacut.rve.fenicsx import MPI, PETSc
 from alphacut.rve.form import WHOLE
-from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES
 from alphacut.rve.prism.form import PrismForm
@@ -73,7 +72,7 @@ class PrismProblem:
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
         self.comm = comm
         self.form = PrismForm(grid, comm)
-        self.numbering = LevelNumbering(grid, identify(grid.plane), comm)
+        self.numbering = LevelNumbering(grid, comm)
         pairs, rows = self.numbering.pairs, self.numbering.rows
         self._local = map_of(pairs[self.form.node], comm)
         self.matrix = zero_matrix(pairs[grid.cells], self._local, rows, self.numbering.size)

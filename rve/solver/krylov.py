@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.fenicsx import PETSc, option_is_used
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.solver.numbering import LevelNumbering
-from alphacut.rve.solver.options import PREFIX, OptionError, SolverOptions
+from alphacut.rve.solver.options import PREFIX, SolverOptions
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import ThetaLaw
 
@@ -48,7 +48,7 @@ def krylov_solver(
         options: PETSc options.
 
     Raises:
-        OptionError: PETSc refuses an option or its value, or does not use it.
+        RefusedError: PETSc refuses an option or its value, or does not use it.
         ConvergenceError: A factorisation failed.
     """
     ksp = PETSc.KSP().create(matrix.comm)
@@ -106,7 +106,7 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     """Keep options in PETSc's database during the block; those of the caller's own there stay.
 
     Raises:
-        OptionError: PETSc refuses an option, or has not asked for an override by the end of the
+        RefusedError: PETSc refuses an option, or has not asked for an override by the end of the
             block.
         ConvergenceError: PETSc fails otherwise.
     """
@@ -120,7 +120,7 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     except PETSc.Error as failure:
         why = str(failure).splitlines()[-1].strip()
         if options.overrides:
-            raise OptionError("PETSc", str(options), "what PETSc takes", why) from failure
+            raise RefusedError("PETSc", str(options), "what PETSc takes", why) from failure
         raise ConvergenceError(f"PETSc cannot set up {options}: {why}") from failure
     finally:
         for name in options.all:
@@ -130,4 +130,4 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     if unused:
         value = options.overrides[unused[0]]
         option = f"-{PREFIX}{unused[0]}"
-        raise OptionError(option, value, "options that PETSc uses", "check its spelling")
+        raise RefusedError(option, value, "options that PETSc uses", "check its spelling")

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.fenicsx import MPI, PETSc
-from alphacut.rve.mesh.periodicity import Periodicity
+from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.mesh.prism_grid import PrismGrid
 
 
@@ -64,10 +64,10 @@ class LevelNumbering:
 
     Args:
         grid: Topology.
-        periodicity: Unknowns of one level.
         comm: Communicator.
 
     Attributes:
+        periodicity: Unknowns of one level.
         planar: Unknowns of a level.
         between: Unknowns half-way between two levels: those of vertices.
         size: Unknowns in all.
@@ -76,9 +76,9 @@ class LevelNumbering:
         rows: Unknowns of this rank.
     """
 
-    def __init__(self, grid: PrismGrid, periodicity: Periodicity, comm: MPI.Intracomm) -> None:
-        self.grid, self.periodicity, self.comm = grid, periodicity, comm
-        self.planar, self.between = 2 * periodicity.count, 2 * periodicity.vertices
+    def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
+        self.grid, self.periodicity = grid, identify(grid.plane)
+        self.planar, self.between = 2 * self.periodicity.count, 2 * self.periodicity.vertices
         self.stride = self.planar + self.between
         self.size = grid.layers * self.stride + self.planar
         own = np.array_split(np.arange(grid.layers + 1), comm.size)

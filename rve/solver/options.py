@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from alphacut.fuzzy.refused import RefusedError
-
 PREFIX = "rve_"
 LEVEL = "level_"
 DEFAULTS = {
@@ -22,10 +20,6 @@ DEFAULTS = {
 }
 MOST_ITERATIONS = 500
 """By the preconditioner, which takes tens at most; others may take ten times as many."""
-
-
-class OptionError(RefusedError):
-    """A PETSc option that PETSc does not take."""
 
 
 @dataclass(frozen=True)
