@@ -181,7 +181,7 @@ def parts(
 def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    map_of, matrix, inclusion = parts(values, radius.family, cell.stiffness)
+    map_of, matrix, inclusion = parts(values, radius.law, cell.stiffness)
     return Cell(matrix, inclusion, map_of, cell.outline or circle)
 
 
