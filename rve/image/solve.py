@@ -9,7 +9,8 @@ from threading import Event
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.side import DISPLACEMENT, STRESS, SideSolution, solve_side
+from alphacut.rve.image.fields.element import airy_element, displacement_element
+from alphacut.rve.image.fields.side import SideSolution, solve_side
 from alphacut.rve.image.phase_images import ModuliImages
 
 
@@ -72,11 +73,10 @@ def solve_between(
     def solved(end: int) -> SideSolution:
         guess = None if start is None else (start.lower, start.upper)[end].fields
         return solve_side(
-            (STRESS, DISPLACEMENT)[end],
+            (airy_element, displacement_element)[end](aspect),
             images.bulk[end],
             images.shear[end],
             solver=replace(rule, watch=watch),
-            aspect=aspect,
             division=division,
             start=guess,
         )

@@ -2,9 +2,7 @@
 
 Voigt and Reuss hold as matrices; Hashin and Shtrikman's (J. Mech. Phys. Solids 11, 127, 1963; with
 the extreme moduli of either phase, Walpole 1966) for the bulk modulus of any cubic or isotropic
-arrangement and for both moduli of an isotropic one. The two shear moduli of a cubic arrangement
-obey them together: Milton and Kohn (J. Mech. Phys. Solids 36, 597, 1988) bound the trace over all
-five deviators.
+arrangement and for both moduli of an isotropic one.
 """
 
 from __future__ import annotations
@@ -56,31 +54,3 @@ def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
 def _around(bulk: float, shear: float) -> tuple[float, float]:
     """Terms that Hashin and Shtrikman add to bulk and shear moduli in a reference material."""
     return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)
-
-
-def shear_against_trace_bounds(
-    deviator: float, shear: float, limits: Array, phases: tuple[Phase, Phase]
-) -> float:
-    """Relative distance by which two shear moduli miss the trace bounds; 0 inside or unordered.
-
-    Args:
-        deviator: (C11 − C12)/2 in Pa.
-        shear: C44 in Pa.
-        limits: Hashin and Shtrikman's ends of μ at the same fraction, shape (2,), in Pa.
-        phases: Matrix and inclusion.
-    """
-    (bulk, shears), (other, others) = map(bulk_and_shear, phases)
-    softer, stiffer = sorted((shears, others))
-    ordered = (other - bulk) * (others - shears) >= 0
-    nearest = min(
-        abs(modulus / end - 1) for modulus in (deviator, shear) for end in (softer, stiffer)
-    )
-    if not ordered or nearest < 1e-9:  # too near a phase to tell from round-off
-        return 0.0
-
-    def mean(around: float) -> float:
-        """Mean over the five deviators, harmonic about a phase's shear modulus."""
-        return around + 5 / (2 / (deviator - around) + 3 / (shear - around))
-
-    low, high = limits
-    return max(0.0, float(low) - mean(softer), mean(stiffer) - float(high)) / mean(softer)

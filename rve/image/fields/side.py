@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System
-from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
+from alphacut.rve.image.fields.element import Element
 from alphacut.rve.image.fields.energy import Energies, energies
 from alphacut.rve.image.fields.grid import Operator
 from alphacut.rve.image.fields.preconditioner import FourierPreconditioner, Reference
@@ -21,27 +20,11 @@ SOLVED_LOADS = np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
 SMALL = 1 << 17  # pixels up to which the loads are solved together
 
 
-@dataclass(frozen=True)
-class Side:
-    """Space of trial fields with its coefficients: of displacements, or of stresses.
-
-    Args:
-        element: Maker of the element for a pixel's aspect ratio.
-        stiff: Coefficients are K + G/3 and G; else 1/(4 (K + G/3)) and 1/(4 G).
-    """
-
-    element: Callable[[float], Element]
-    stiff: bool
-
-    def coefficients(self, bulk: Array, shear: Array) -> tuple[Array, Array]:
-        """Coefficients of trace and deviator from plane bulk and shear moduli."""
-        if self.stiff:
-            return bulk, shear
+def coefficients(element: Element, bulk: Array, shear: Array) -> tuple[Array, Array]:
+    """Coefficients of trace and deviator: K + G/3 and G of strains, 1/4 over them of stresses."""
+    if element.stress:
         return np.asarray(0.25 / bulk), np.asarray(0.25 / shear)
-
-
-DISPLACEMENT = Side(displacement_element, stiff=True)
-STRESS = Side(airy_element, stiff=False)
+    return bulk, shear
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,29 +43,27 @@ class SideSolution:
 
 
 def solve_side(
-    side: Side,
+    element: Element,
     bulk: Array,
     shear: Array,
     *,
     solver: ConjugateGradient,
-    aspect: float = 1.0,
     division: int = 1,
     start: Array | None = None,
 ) -> SideSolution:
     """Fields of least energy under the three unit loads.
 
     Args:
-        side: Space of the fields.
+        element: Of displacements, whose energy bounds the stiffness from above, or of stresses,
+            whose energy bounds the compliance.
         bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), any unit.
         shear: Shear modulus, same shape and unit.
         solver: Stopping rule.
-        aspect: Height of a pixel over its width.
         division: Parts along each side into which every pixel is divided: the same image, a larger
             space of fields.
         start: Fields to start from, on the divided pixels.
     """
-    element, whole = side.element(aspect), side.coefficients(bulk, shear)
-    parts = np.ones((division, division))
+    whole, parts = coefficients(element, bulk, shear), np.ones((division, division))
     trace, deviator = (np.asarray(np.kron(one, parts)) for one in whole)
     begin = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
     fields, iterations = _fields(element, trace, deviator, solver, begin)
