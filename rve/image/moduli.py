@@ -56,18 +56,11 @@ class ModuliInterval:
 
     Args:
         lower: Least moduli.
-        upper: Greatest moduli.
-
-    Raises:
-        RefusedError: The ends are the wrong way round.
+        upper: Greatest moduli, none below its least.
     """
 
     lower: PlaneModuli
     upper: PlaneModuli
-
-    def __post_init__(self) -> None:
-        if not (self.lower.bulk <= self.upper.bulk and self.lower.shear <= self.upper.shear):
-            raise RefusedError("upper moduli of a phase", self.upper, f"{self.lower} or more")
 
     @classmethod
     def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:

@@ -17,10 +17,9 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError
 
 LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
-LEAST_ACCURATE = 0.1
 
 
 class Linear(Protocol):
@@ -65,17 +64,10 @@ class ConjugateGradient:
         accuracy: Energy that the fields may lack, relative to the system's scale, in (0, 0.1]; a
             bound of the stiffness is then within three times that of the one of solved fields.
         watch: Called before every iteration; what it raises ends it.
-
-    Raises:
-        RefusedError: A value lies outside its range.
     """
 
     accuracy: float = 3e-6
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
-
-    def __post_init__(self) -> None:
-        if not 0 < self.accuracy <= LEAST_ACCURATE:
-            raise RefusedError("accuracy of the energy", self.accuracy, "(0, 0.1]")
 
     def solve(self, system: System) -> tuple[Array, int]:
         """Fields that lack no more than the accuracy says, and the iterations.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -87,8 +86,8 @@ def _dipoles(
     far[sources, columns] = units
     for j, inclusion in enumerate(inclusions):
         spheres = scatterers(degree, matrix, inclusion, shear=shear)
-        system = np.eye(poles.n.size) - spheres.answer(images)
-        right = np.broadcast_to(spheres.answer(far), (*system.shape[:2], len(loads)))
+        system = np.eye(poles.n.size) - answer(spheres, images)
+        right = np.broadcast_to(answer(spheres, far), (*system.shape[:2], len(loads)))
         dipoles[:, j] = np.linalg.solve(system, right)[:, poles_of, columns]
     return dipoles
 
@@ -106,24 +105,17 @@ def multipoles(degree: int, *, shear: bool) -> Multipoles:
 
 
 @lru_cache(maxsize=1024)
-def scatterers(degree: int, matrix: Phase, inclusion: Phase, *, shear: bool) -> Scatterers:
-    """The answer of a sphere to each multipole of one load, made once."""
+def scatterers(degree: int, matrix: Phase, inclusion: Phase, *, shear: bool) -> tuple[Array, Array]:
+    """Answer of a sphere to the multipoles of one load: `scattering`, made once."""
     poles = multipoles(degree, shear=shear)
     pair, torsion = scattering(poles.n, matrix, inclusion)
-    return Scatterers(pair[poles.kind == 1], torsion[poles.kind == 2])
+    return pair[poles.kind == 1], torsion[poles.kind == 2]
 
 
-@dataclass(frozen=True, eq=False)
-class Scatterers:
-    """Answer of one sphere by multipoles: of solutions 1 and 3, (k, 2, 2), and 2, (l,)."""
-
-    pair: Array
-    torsion: Array
-
-    def answer(self, regular: Array) -> Array:
-        """Singular amplitudes for regular ones, shape (…, N, columns)."""
-        k = len(self.pair)
-        first, second, third = np.split(regular, [k, k + self.torsion.size], axis=-2)
-        (a, b), (c, d) = np.moveaxis(self.pair[..., None], 0, 2)
-        answers = (a * first + b * third, self.torsion[:, None] * second, c * first + d * third)
-        return np.concatenate(answers, axis=-2)
+def answer(spheres: tuple[Array, Array], regular: Array) -> Array:
+    """Singular amplitudes for regular ones, shape (…, N, columns)."""
+    pair, torsion = spheres
+    first, second, third = np.split(regular, [len(pair), len(pair) + torsion.size], axis=-2)
+    (a, b), (c, d) = np.moveaxis(pair[..., None], 0, 2)
+    answers = (a * first + b * third, torsion[:, None] * second, c * first + d * third)
+    return np.concatenate(answers, axis=-2)
