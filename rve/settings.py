@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
+from alphacut.stochastic import RadiusMap, require_map
 
 HALVES = "in halves of the cell's side"
+JUMP = 0.01
+"""Of radii over 1/2048 of the support of θ; twenty times as steep as maps of particles are."""
 STIFFEST = 0.45
 """Poisson's ratio above which quadratic elements lock."""
 
@@ -30,6 +36,26 @@ def require_points(points: int | None) -> None:
     """
     if points is not None and points < 2:
         raise RefusedError("number of points of the rule in θ", points, "2 or more")
+
+
+def require_continuous(radius_map: RadiusMap) -> Array:
+    """Refuse a map that jumps, of which no rule in θ tells its error; a narrow peak is not seen.
+
+    Returns:
+        Radii at even steps over the support, shape (2049,).
+
+    Raises:
+        RefusedError: The map jumps, or gives radii outside (0, 1), or its law of θ is none.
+    """
+    require_map(radius_map)
+    law = radius_map.distribution
+    theta = np.linspace(law.lower, law.upper, 2049)
+    radii = radius_map(theta)
+    place = int(np.argmax(abs(np.diff(radii))))
+    if abs(radii[place + 1] - radii[place]) > JUMP:
+        value = f"{radii[place]:.4g} and {radii[place + 1]:.4g} side by side"
+        raise RefusedError(f"r at θ = {theta[place]:.4g}", value, "maps without a jump")
+    return np.asarray(radii)
 
 
 def require_compressible(*phases: AnyPhase) -> None:

@@ -12,7 +12,8 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.result import StressCurve
 from alphacut.rve.series.truncation import CellModuli, error_by_more_terms
-from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule, require_map
+from alphacut.rve.settings import require_continuous
+from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 _MOST_POINTS = 1200
 _SAFETY = 1.6
@@ -78,9 +79,9 @@ def settled_means(
 
     Raises:
         RuleError: No rule in reach settles.
-        RefusedError: The map gives radii outside (0, 1), or its law of θ is none.
+        RefusedError: The map jumps, or gives radii outside (0, 1), or its law of θ is none.
     """
-    require_map(radius_map)
+    require_continuous(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     make_rule = _kept_rule if isinstance(radius_map.distribution, Hashable) else gauss_rule
     known: dict[int, _Averages] = {}

@@ -20,16 +20,16 @@ from alphacut.rve.mesh.outline import Outline, circle
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import (
     require_compressible,
+    require_continuous,
     require_mesh_size,
     require_parts,
     require_points,
 )
 from alphacut.rve.slices.theta_error import DIGITS, theta_error
-from alphacut.stochastic import RadiusMap, gauss_rule, require_map
+from alphacut.stochastic import RadiusMap, gauss_rule
 
 _FADE = 0.03  # least share of the last change that is taken to be left by order 4
 _ORDERS = 2, 3, 4
-_SAMPLES = 2049  # of a map, in which its extremes are sought
 _ROUND_OFF = 1e-13
 _CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
@@ -75,10 +75,9 @@ class SlicesModel:
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
-        require_map(radius_map)
-        start, law = perf_counter(), radius_map.distribution
-        rule = gauss_rule(law, points=self.points)
-        every = radius_map(np.linspace(law.lower, law.upper, _SAMPLES))
+        every = require_continuous(radius_map)
+        start = perf_counter()
+        rule = gauss_rule(radius_map.distribution, points=self.points)
         solved = np.concatenate([radius_map(rule.nodes), [every.min(), every.max()]])
         radii, places = np.unique(np.round(solved, DIGITS), return_inverse=True)
         nodes = places[: rule.nodes.size]

@@ -9,6 +9,7 @@ from alphacut.rve.series.means import RuleError
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import TRUNCATION, square_stiffness
 from alphacut.rve.series.truncation import SeriesError
+from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
 MATRIX = Phase(20e9)
@@ -170,12 +171,28 @@ def test_rule_in_theta_declares_its_error():
     assert 1e-8 < true < coarse.error["theta"] < 1e4 * true
 
 
-def test_a_map_that_jumps_is_refused_or_has_its_error_declared():
-    with pytest.raises(RuleError, match="the radius map is not smooth"):
-        SeriesModel().solve(Jumping(), MATRIX, [Phase(80e9)])
-    rough = SeriesModel(points=40).solve(Jumping(), MATRIX, [Phase(80e9)])[0]
-    finer = SeriesModel(points=400).solve(Jumping(), MATRIX, [Phase(80e9)])[0]
+@pytest.mark.parametrize("model", [SeriesModel(), SeriesModel(points=40), SlicesModel()])
+def test_a_map_that_jumps_is_refused(model):
+    with pytest.raises(RefusedError, match=r"r at θ = 0.29.* is 0.40.* and 0.70.* side by side"):
+        model.solve(Jumping(), MATRIX, [Phase(80e9)])
+
+
+class Bent:
+    """r = 0.4 + 0.12 |θ − 0.3|."""
+
+    distribution = TruncatedNormal()
+
+    def __call__(self, theta):
+        return 0.4 + 0.12 * np.abs(np.asarray(theta, float) - 0.3)
+
+
+def test_a_map_that_bends_has_its_error_declared_or_does_not_settle():
+    rough, finer = (
+        SeriesModel(points=n).solve(Bent(), MATRIX, [Phase(80e9)])[0] for n in (20, 300)
+    )
     assert abs(rough.modulus / finer.modulus - 1) < rough.estimated_error < 0.1
+    with pytest.raises(RuleError, match="the radius map is not smooth"):
+        SeriesModel().solve(Bent(), MATRIX, [Phase(80e9)])
 
 
 @pytest.mark.parametrize(
