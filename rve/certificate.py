@@ -107,18 +107,6 @@ def order_checks(energy: Array, low: Array, high: Array) -> dict[str, float]:
     }
 
 
-def hill_mandel(stress: Array, energy: Array, loads: Array) -> float:
-    """Relative gap between mean stress times mean strain and the mean of their product.
-
-    Args:
-        stress: Mean stress of each load, shape (3, loads), in Pa.
-        energy: Mean of σ_a : ε_b, shape (loads, loads), in Pa.
-        loads: As in `stress_checks`.
-    """
-    work = loads @ stress  # σ̄_b : ε̄_a
-    return float(abs(work.T - energy).max() / abs(energy).max())
-
-
 def mean(weights: Array, values: Array) -> Array:
     """Weighted sum over the first axis."""
     return np.asarray(np.tensordot(weights, values, axes=1))

@@ -12,7 +12,6 @@ from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.form import strain
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.krylov import solve
 from alphacut.stochastic import RadiusMap
 
@@ -53,15 +52,18 @@ def cell_fields(
     problem.assemble(cell.stiffness)
     loads = model.loads(cell)
     vectors = solve(problem.solver(model.options), problem.loads(loads)).vectors
-    fluctuations = [problem.field(vector) for vector in vectors]
+    fluctuation, own = fem.Function(form.space), np.arange(len(form.wedge), dtype=np.int32)
+    at_nodes = at_points(strain(fluctuation), vertices_and_midpoints())
     positions = grid.positions(radius_map)
     total = np.empty((grid.nodes, 2, len(vectors)))
     wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
-    for k, u in enumerate(fluctuations):
-        uniform: Array = loads[k]
+    for k, vector in enumerate(vectors):
+        u, uniform = problem.field(vector), np.asarray(loads[k], float)
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
         total[form.node, :, k] = u + positions[form.node, :2] @ tensor
-        wedges[form.wedge, ..., k] = _strain_at_nodes(problem, u) + uniform
+        fluctuation.x.array[:] = u.ravel()
+        strains = at_nodes.eval(form.mesh, own).reshape(len(own), NODES, 3)
+        wedges[form.wedge, ..., k] = strains + uniform
     inside: Rows = grid.inside.astype(np.intp)
     stress = np.stack(cell.stiffness)[inside][:, None] @ wedges
     numbered = grid.cells + inside[:, None] * grid.nodes
@@ -72,13 +74,3 @@ def cell_fields(
     mean /= np.bincount(cells.ravel())[:, None, None]
     nodes = kept % grid.nodes
     return CellFields(positions[nodes], cells, inside, total[nodes], mean)
-
-
-def _strain_at_nodes(problem: PrismProblem, displacement: Array) -> Array:
-    """Strains at the nodes of every wedge, shape (cells, 15, 3)."""
-    form = problem.form
-    u = fem.Function(form.space)
-    u.x.array[:] = displacement.ravel()
-    cells = np.arange(len(form.wedge), dtype=np.int32)
-    values = at_points(strain(u), vertices_and_midpoints()).eval(form.mesh, cells)
-    return np.asarray(values).reshape(len(cells), NODES, 3)

@@ -96,8 +96,7 @@ def test_projected_samples_are_those_solved_whatever_their_company():
         assert one.modulus == pytest.approx(other.modulus, rel=2e-10)
         assert len(one.iterations) == 2 * len(other.iterations)
     assert model.solve(PAPER, MATRIX, [Phase(77e9)])[0].modulus == projected[1].modulus
-    with pytest.raises(RefusedError, match="modulus of the particle is 9e\\+10 Pa; allowed"):
-        model.solve(PAPER, MATRIX, [Phase(90e9)])
+    assert len(model.solve(PAPER, MATRIX, [Phase(90e9)])[0].iterations) == 2
 
 
 def test_a_range_too_wide_for_two_solutions_is_solved_sample_by_sample():
