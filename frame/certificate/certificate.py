@@ -31,7 +31,6 @@ class Certificate:
         between: Bound of what each output exceeds both ends of the step to a node by, shape (T, m),
             in its unit.
         boxes: Boxes of parameters looked at.
-        scale: Size of each output beside the first, shape (m,).
     """
 
     bounds: Array
@@ -39,12 +38,6 @@ class Certificate:
     outer: Array
     between: Array
     boxes: int
-    scale: Array
-
-    @property
-    def gap(self) -> float:
-        """Largest difference of proved and attained bound, in units of the reference."""
-        return float(((self.outer - self.bounds) / self.scale[:, None]).max())
 
 
 def certify(
@@ -107,7 +100,6 @@ def certify(
         outer * unit,
         between * scale,
         sum(part.boxes for part in done),
-        scale,
     )
 
 

@@ -66,15 +66,6 @@ class ExactResponse:
         """Names of the observed quantities."""
         return self.model.outputs
 
-    @property
-    def fastest(self) -> float:
-        """Largest |λ| in the middle of the box, in 1/s."""
-        return self.model.fastest
-
-    def values(self, unit: Array) -> Array:
-        """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
-        return self.model.flow.values(self.model.boxes.to_physical(unit)) / self.scale
-
     def value_at(self, unit: Array, node: Rows, output: Rows) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
         return self._sloped(unit, node, output, 0)[0]

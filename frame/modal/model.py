@@ -74,11 +74,6 @@ class ModalModel:
         """Total degree of the polynomials."""
         return int(self.eigenvalue.index.sum(1).max())
 
-    @property
-    def fastest(self) -> float:
-        """Largest |λ| in the middle of the box, in 1/s."""
-        return float(np.abs(self.eigenvalue.coefficients[0]).max())
-
     def in_units(self, scale: Array) -> ModalModel:
         """The same with every output divided by its scale (m,)."""
         share = self.coefficient.divided(np.tile(scale, self.count))

@@ -7,6 +7,7 @@ import numpy as np
 from alphacut.frame.calculus.box_quadratic import gain, global_maximum, local_maximum
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
+from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
 
 SAMPLES = 256
@@ -25,7 +26,7 @@ ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
 
-def first_optima(model: Response, lower: Array, upper: Array, small: float) -> Optima:
+def first_optima(model: ModalModel, lower: Array, upper: Array, small: float) -> Optima:
     """Optima of all nodes, outputs and sides in the box [lower, upper], from a sample of it.
 
     Args:

@@ -104,7 +104,7 @@ def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int
     return pool
 
 
-def trajectories(model: Response, points: Array, nodes: Array | None = None) -> Array:
+def trajectories(model: ModalModel, points: Array, nodes: Array | None = None) -> Array:
     """Values of the model at points (P, d) and the nodes, all unless named, shape (P, T, m)."""
     rows = slice(None) if nodes is None else nodes
     return np.concatenate(
