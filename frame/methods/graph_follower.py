@@ -37,7 +37,6 @@ class Followed:
         guess: Index of the best stored graph when a node was reached, same shape (Figs. 21 to 23).
         new: Index of the graph computed there, or −1 where the guess stays, same shape.
         storage: All graphs.
-        exhausted: Whether the budget ended the search.
     """
 
     bounds: Array
@@ -46,7 +45,6 @@ class Followed:
     guess: Index
     new: Index
     storage: Storage
-    exhausted: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,6 @@ class GraphFollower:
         order: Degree κ of the Taylor models, 1 or 2.
         tolerance: Promised gain above which a new trajectory is computed, in the unit of the first
             output.
-        budget: Most trajectories to compute; None for no limit.
         record: Keep the trajectories themselves.
 
     Raises:
@@ -70,7 +67,6 @@ class GraphFollower:
     name: ClassVar[str] = "graph-follower"
     order: int = 2
     tolerance: float = 1e-4
-    budget: int | None = None
     record: bool = False
 
     def __post_init__(self) -> None:
@@ -78,8 +74,6 @@ class GraphFollower:
             raise RefusedError("order", self.order, "1 and 2, the degrees of a Taylor model")
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
             raise RefusedError("tolerance", self.tolerance, "a positive number")
-        if self.budget is not None and self.budget < 1:
-            raise RefusedError("budget", self.budget, "whole numbers from 1 on")
 
     def run(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Envelope:
         """Envelope of all outputs on all levels.
@@ -93,7 +87,6 @@ class GraphFollower:
         missed, count = beyond(flow, followed.bounds)
         apart = parted(followed.storage.steepest, followed.bounds[0])
         error = followed.left.max(-1) + SAFETY * missed[:, None]
-        notes = (f"stopped at the budget of {self.budget} trajectories",) * followed.exhausted
         return flow.envelope(
             followed.bounds,
             followed.storage.points[followed.best],
@@ -103,7 +96,6 @@ class GraphFollower:
             evaluations=len(followed.storage) + count,
             seconds=time.perf_counter() - begun,
             facts={"order": self.order, "gain": self.tolerance},
-            notes=notes,
         )
 
     def follow(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Followed:
@@ -132,10 +124,6 @@ class GraphFollower:
         for node in range(nodes):
             if progress and node % 100 == 0:
                 progress(start + node / nodes / levels)
-            if self.budget is not None and len(storage) >= self.budget:
-                out.exhausted = True
-                out.left[level] = np.maximum(promise - storage.top, 0.0)
-                return
             out.guess[level, node] = storage.best[node]
             points = self._new(out, level, node, promise, target)
             if points:

@@ -28,6 +28,10 @@ from alphacut.fuzzy.result import Nature
 
 MOST = 64e6
 """Most numbers of Taylor models computed at a time: 512 MB."""
+BATCH = 32
+"""Graphs computed together."""
+REACH = 0.6
+"""Trust region of a Taylor model, as a share of the half width of the box."""
 TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
@@ -44,8 +48,6 @@ class ImprovedFollower:
         tolerance: Predicted gain above which a new graph is computed, in units of the outputs.
         budget: Most graphs over all levels.
         spread: Graphs on a spread of points per level that start the search.
-        batch: Graphs computed together.
-        reach: Trust region of a Taylor model, as a share of the half width of the box.
         seed: Which points are spread.
 
     Raises:
@@ -56,16 +58,14 @@ class ImprovedFollower:
     tolerance: float = 7e-5
     budget: int = 5000
     spread: int = 64
-    batch: int = 32
-    reach: float = 0.6
     seed: int = 0
 
     def __post_init__(self) -> None:
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
             raise RefusedError("tolerance", self.tolerance, "a positive number")
-        if min(self.budget, self.spread, self.batch) < 1 or not 0 < self.reach <= 2:
-            values = (self.budget, self.spread, self.batch, self.reach)
-            raise RefusedError("budget, spread, batch, reach", values, "counts; a reach in (0, 2]")
+        if min(self.budget, self.spread) < 1:
+            values = self.budget, self.spread
+            raise RefusedError("budget, spread", values, "whole numbers from 1 on")
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of two passes from different points, corrected by what their models promise.
@@ -108,9 +108,9 @@ class ImprovedFollower:
         d, places = len(flow.boxes.names), storage.top.size // 2
         bounds, left = np.zeros((2, levels, *storage.top.shape))
         out = Pursued(bounds, np.zeros((*bounds.shape, d)), left, storage)
-        at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, self.batch))
+        at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
-            search = _Level(storage, flow.boxes.unit(level), self.tolerance, self.reach)
+            search = _Level(storage, flow.boxes.unit(level), self.tolerance)
             limit = self.budget * (done + 1) // levels
             points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):
@@ -118,7 +118,7 @@ class ImprovedFollower:
                     search.ask(storage.add(chunk))
                 if progress:
                     progress(min(1.0, len(storage) / self.budget))
-                points = search.proposals(min(self.batch, limit - len(storage)))
+                points = search.proposals(min(BATCH, limit - len(storage)))
             # post-processing of the level
             out.bounds[level], out.where[level] = storage.top, storage.points[storage.best]
             out.left[level] = np.maximum(search.promise - storage.top, 0.0)
@@ -156,11 +156,9 @@ class Pursued:
 class _Level:
     """Promises of the models of stored graphs in one box, and their places."""
 
-    def __init__(
-        self, storage: Storage, box: tuple[Array, Array], tolerance: float, reach: float
-    ) -> None:
+    def __init__(self, storage: Storage, box: tuple[Array, Array], tolerance: float) -> None:
         self.storage, self.box, self.tolerance = storage, box, tolerance
-        self.reach = reach * np.maximum((box[1] - box[0]) / 2, 1e-300)
+        self.reach = REACH * np.maximum((box[1] - box[0]) / 2, 1e-300)
         self.promise = storage.top.copy()
         self.target = np.zeros((*storage.top.shape, len(box[0])))
         if len(storage):

@@ -70,7 +70,6 @@ class Search:
     Args:
         tolerance: Error wanted, in m, or in the unit of the first output where none is a
             displacement; 1e-4 unless given.
-        budget: Most eigen-analyses that the polynomials are fitted to.
         passes: Most independent passes.
         seed: Of all that is drawn.
 
@@ -80,12 +79,11 @@ class Search:
 
     name: ClassVar[str] = "search"
     tolerance: float | None = None
-    budget: int = 280
     passes: int = 8
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for key in ("tolerance", "budget", "passes"):
+        for key in ("tolerance", "passes"):
             value = getattr(self, key)
             if value is not None and not value > 0:
                 raise RefusedError(key, value, "a positive number")
@@ -99,9 +97,7 @@ class Search:
         begun, tolerance = time.perf_counter(), flow.tolerance(self.tolerance)
         if not isinstance(flow.flow, LinearFlow):
             raise ModalError("search: the system is not linear; take the Graph Follower")
-        model = fit_modes(
-            flow.flow, flow.boxes, tolerance=SMALL * tolerance, budget=self.budget, scale=flow.scale
-        )
+        model = fit_modes(flow.flow, flow.boxes, tolerance=SMALL * tolerance, scale=flow.scale)
         rough = _rough(model, flow)
         exact = ExactResponse.of(model, flow.scale, bent=not rough)
         # what leads: polynomials where they are as good as is asked for, or the exact motions
