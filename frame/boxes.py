@@ -15,7 +15,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.knowledge.joint import joined_inputs as fuzzy_inputs
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -51,8 +51,7 @@ class Boxes:
     numbers: Mapping[str, FuzzyNumber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.names:
-            raise RefusedError("inputs", None, "fuzzy numbers by name, one at least")
+        require(bool(self.names), "inputs", None, "fuzzy numbers by name, one at least")
         levels = np.asarray(self.alpha)
         if not (levels.size and levels[0] >= 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()):
             raise RefusedError("alpha", levels.tolist(), "levels that rise within [0, 1]")

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 FINITE = "biuf"
 """Kinds of NumPy's data types that hold real numbers."""
@@ -34,5 +34,4 @@ def require_numbers(name: str, values: object, unit: str) -> None:
         raise RefusedError(name, repr(values), f"a list of numbers, in {unit}")
     for value in np.ravel(values) if isinstance(values, np.ndarray) else values:
         require_number(name, value, unit)
-        if not np.isfinite(value):
-            raise RefusedError(name, f"{value:g}", "finite numbers")
+        require(np.isfinite(value), name, f"{value:g}", "finite numbers")

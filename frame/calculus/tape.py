@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -86,8 +86,7 @@ class _Writer:
             return reduce(lambda x, y: self._apply(name, x, y), parts)
         if name == "Pow":
             return self._power(*e.args)
-        if name not in UNARY:
-            raise RefusedError("function of the lagrangian", name, ", ".join(UNARY))
+        require(name in UNARY, "function of the lagrangian", name, ", ".join(UNARY))
         return self._apply(name, self.place(e.args[0]))
 
     def _power(self, base: Expr, exponent: Expr) -> int:

@@ -12,7 +12,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 OTHER_UNITS = 500
 """From so many times the structure's own value on, or that part of it, units differ."""
@@ -64,15 +64,13 @@ def require_motion(system: LinearSystem, names: tuple[str, ...], points: Array) 
             positive = bool(np.linalg.eigvalsh(at_point.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by ratios, which divides by the mass
             positive = False
-        if not positive:
-            raise RefusedError("mass", f"not positive definite at {at}", "a mass for every unknown")
+        require(positive, "mass", f"not positive definite at {at}", "a mass for every unknown")
         moved = moved or at_point.q0.value.any() or at_point.v0.value.any()
         for kind, jet in (("stiffness", at_point.stiffness), ("damping", at_point.damping)):
             rates = np.linalg.eigvalsh((jet.value[0] + jet.value[0].T) / 2)
             if rates[0] < -1e-9 * np.abs(rates).max():
                 growing[kind] = f"{rates[0]:.3g} beside {rates[-1]:.3g} at {at}"
-    if not moved:
-        raise RefusedError("q0, v0 and ground", "zero", "a start or a record that moves something")
+    require(moved, "q0, v0 and ground", "zero", "a start or a record that moves something")
     for kind, seen in growing.items():
         what = (
             f"{kind}: the matrix has the negative eigenvalue {seen}: motions may grow without end"

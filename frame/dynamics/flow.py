@@ -15,7 +15,7 @@ from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, frequencies
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, RefusedError, require
 
 MOST_NODES = 10_000_000
 """Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
@@ -30,8 +30,7 @@ def nodes(duration: float, step: float) -> Array:
     """
     require_number("step", step, "s")
     require_number("duration", duration, "s")
-    if not (np.isfinite(step) and step > 0):
-        raise RefusedError("step", f"{step:g} s", "a positive time")
+    require(np.isfinite(step) and step > 0, "step", f"{step:g} s", "a positive time")
     count = round(duration / step) if np.isfinite(duration) else 0
     if not 1 <= count <= MOST_NODES or abs(count * step - duration) > 1e-9 * duration:
         allowed = f"1 to {MOST_NODES:,} whole steps of {step:g} s"

@@ -16,7 +16,7 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.structures.lagrangian import Equations, LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 TRIPLE_JUMP = (1 / (2 - 2 ** (1 / 3)), -(2 ** (1 / 3)) / (2 - 2 ** (1 / 3)), 1 / (2 - 2 ** (1 / 3)))
 """Lengths of three symmetric steps of order 2 that make one of order 4 (Yoshida 1990)."""
@@ -55,8 +55,7 @@ class LagrangianFlow(Flow):
             ("integrator", (self.scheme,), SCHEMES),
         ):
             for name in names:
-                if name not in known:
-                    raise RefusedError(kind, name, ", ".join(known))
+                require(name in known, kind, name, ", ".join(known))
         nodes(self.duration, self.step)
 
     @property
@@ -164,8 +163,7 @@ def flow_of(
     if isinstance(model, LagrangianSystem):
         return LagrangianFlow(model, tuple(names), duration, step, str(integrator))
     if isinstance(integrator, str):
-        if integrator not in INTEGRATORS:
-            raise RefusedError("integrator", integrator, ", ".join(INTEGRATORS))
+        require(integrator in INTEGRATORS, "integrator", integrator, ", ".join(INTEGRATORS))
         integrator = INTEGRATORS[integrator]
     return LinearFlow(model, tuple(names), duration, step, integrator)
 

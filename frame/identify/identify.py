@@ -23,7 +23,7 @@ from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.numbers import Cut
 from alphacut.fuzzy.sets.stepwise import outer_steps
@@ -210,8 +210,7 @@ def _refuse(
         ("modes", most, most <= floors, f"modes and floors from 1 to {floors}"),
         ("parameters", least, least > 0, "positive priors"),
     ):
-        if not meaningful:
-            raise RefusedError(f"identify.{key}", value, allowed)
+        require(meaningful, f"identify.{key}", value, allowed)
 
 
 def _prior_cut(number: FuzzyNumber, alpha: float, agreement: Agreement) -> Cut:

@@ -11,7 +11,7 @@ from scipy.special import chdtri
 from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import from_scatter
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.sets.claimed import Claimed
 
 NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
@@ -50,8 +50,7 @@ class MeasuredMode:
             ("frequency", self.frequency.modal, self.frequency.modal > 0, "positive values in Hz"),
             ("reference", self.reference, own, "a floor beside those of the shape"),
         ):
-            if not meaningful:
-                raise RefusedError(f"mode {self.mode}: {key}", value, allowed)
+            require(meaningful, f"mode {self.mode}: {key}", value, allowed)
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:

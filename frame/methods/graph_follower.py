@@ -21,7 +21,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
 from alphacut.frame.methods.independent import SAFETY, beyond, parted
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 
 
@@ -70,8 +70,7 @@ class GraphFollower:
     record: bool = False
 
     def __post_init__(self) -> None:
-        if self.order not in (1, 2):
-            raise RefusedError("order", self.order, "1 and 2, the degrees of a Taylor model")
+        require(self.order in (1, 2), "order", self.order, "1 and 2, the degrees of a Taylor model")
         if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
             raise RefusedError("tolerance", self.tolerance, "a positive number")
 

@@ -16,7 +16,7 @@ from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 
 class Method(Protocol):
@@ -44,11 +44,9 @@ def named(name: str, options: Mapping[str, object]) -> Method:
     Raises:
         RefusedError: The name or an option is unknown, or an option's value is out of its range.
     """
-    if name not in METHODS:
-        raise RefusedError("method", name, ", ".join(METHODS))
+    require(name in METHODS, "method", name, ", ".join(METHODS))
     allowed = options_of(name)
     for option in options:
-        if option not in allowed:
-            raise RefusedError(f"option of {name}", option, ", ".join(allowed) or "none")
+        require(option in allowed, f"option of {name}", option, ", ".join(allowed) or "none")
     method: Method = METHODS[name](**options)
     return method

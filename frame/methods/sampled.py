@@ -12,7 +12,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 
 MOST = 16e6
@@ -32,8 +32,7 @@ class Sampled:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.samples < 1:
-            raise RefusedError("samples", self.samples, "whole numbers from 1 on")
+        require(self.samples >= 1, "samples", self.samples, "whole numbers from 1 on")
 
     def points(self, lower: Array, upper: Array) -> Array:
         """Points of a box [lower, upper], shape (samples, d)."""

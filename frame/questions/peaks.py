@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends, Nature
 
 
@@ -110,10 +110,7 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     Raises:
         RefusedError: There is no limit, one is not positive, or it names no output.
     """
-    if not limits:
-        raise RefusedError("limits", None, "one limit or more, as {'q3': 0.1}")
+    require(bool(limits), "limits", None, "one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
-        if name not in outputs:
-            raise RefusedError("limits", name, ", ".join(outputs))
-        if not limit > 0:
-            raise RefusedError(f"limit of {name}", limit, "a positive number")
+        require(name in outputs, "limits", name, ", ".join(outputs))
+        require(limit > 0, f"limit of {name}", limit, "a positive number")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from alphacut.frame.calculus.jet import cos
 from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.structures.quantities import Output, Parameter
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -153,8 +153,7 @@ def _called(name: str, function: Callable[..., Any], *arguments: Symbols | Named
 def _listed(name: str, values: Any, count: int) -> list[Expr]:
     """The expressions of a sequence, one for each coordinate."""
     entries = list(values) if isinstance(values, Sequence) or hasattr(values, "tolist") else []
-    if len(entries) != count:
-        raise RefusedError(name, values, f"a list of {count}, one for each coordinate")
+    require(len(entries) == count, name, values, f"a list of {count}, one for each coordinate")
     return [_expression(name, x) for x in entries]
 
 
@@ -190,10 +189,8 @@ def pendulum(
         RefusedError: Mass, length or gravity is not positive, or the damping is negative.
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
-        if not value > 0:
-            raise RefusedError(name, value, "positive numbers")
-    if damping < 0:
-        raise RefusedError("damping", damping, "0 or greater")
+        require(value > 0, name, value, "positive numbers")
+    require(damping >= 0, "damping", damping, "0 or greater")
 
     def lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
         return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, variables
 from alphacut.frame.structures.quantities import Parameter
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +129,7 @@ def evaluate(
 def check_names(system: LinearSystem, names: Sequence[str]) -> None:
     """Raises RefusedError when a name is no parameter of `system`."""
     for name in names:
-        if name not in system.parameters:
-            raise RefusedError("parameter", name, ", ".join(system.parameters))
+        require(name in system.parameters, "parameter", name, ", ".join(system.parameters))
 
 
 def round_off(largest: float, slowest: float, time: Array) -> Array:

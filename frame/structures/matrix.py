@@ -14,7 +14,7 @@ from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 KINDS = ("mass", "damping", "stiffness")
 Factor = Callable[[Mapping[str, Any]], Any]
@@ -65,8 +65,7 @@ class MatrixStructure:
         for name, value in self.parameters.items():
             require_number(f"parameter {name}", value, "SI units")
         for kind in ("mass", "stiffness", "observed"):
-            if not getattr(self, kind):
-                raise RefusedError(kind, None, "one entry at least")
+            require(bool(getattr(self, kind)), kind, None, "one entry at least")
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
@@ -130,8 +129,7 @@ class MatrixStructure:
             if isinstance(ratio, str) and ratio not in self.parameters:
                 raise RefusedError("ratios", ratio, ", ".join(self.parameters))
             value = float(value_of(ratio, self.parameters))
-            if not Parameter("", range=RATIO).admits(value, value):
-                raise RefusedError("ratios", f"{value:g}", RATIO)
+            require(Parameter("", range=RATIO).admits(value, value), "ratios", f"{value:g}", RATIO)
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""

@@ -20,7 +20,7 @@ from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.quantities import NOT_NEGATIVE, Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
@@ -113,8 +113,7 @@ class StoreyFrame:
         ranges |= {"modulus": of_storey_frame("E").range}
         ranges |= {"rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}
         n = len(self.masses)
-        if not n:
-            raise RefusedError("masses", None, "one value a floor, from below")
+        require(n > 0, "masses", None, "one value a floor, from below")
         for name, rule in ranges.items():
             values = getattr(self, name)
             if values is None:
@@ -143,8 +142,7 @@ class StoreyFrame:
         if not len(self.stiffness) or self.gravity:
             made["lengths"] = self.lengths if len(self.lengths) else None
         for name, value in made.items():
-            if value is None:
-                raise RefusedError(name, None, MADE)
+            require(value is not None, name, None, MADE)
 
     @property
     def floors(self) -> int:
