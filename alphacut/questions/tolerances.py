@@ -76,7 +76,9 @@ def rows(document: Document) -> list[Row]:
 def _row(name: str, one: Document, document: Document) -> Row:
     modal, share = one["modal"], [end / one["modal"] - 1 for end in one["kept"] if one["modal"]]
     ends = ", ".join(f"{end:+.2%}".replace("-", "−") for end in share) or f"about {modal:g}"
-    own = " … ".join(engineering(end, of_storey_frame(name).unit) for end in one["kept"])
+    both = zip(one["kept"], ("lower", "upper"), strict=True)
+    inside = (rounded(end, side, Nature.ATTAINED) for end, side in both)
+    own = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
     kept = "–" if document["kept"] is None else own
     return f"tolerance of {name}", kept, document["nature"], ends if kept != "–" else ""
 

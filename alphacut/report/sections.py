@@ -178,7 +178,7 @@ class Page:
     def _envelopes(self, studies: Document) -> Markup:
         omega = self.summary.get("structure", {}).get("omega_rad_per_s", ())
         periods = ", ".join(f"{2 * math.pi / one:.3g}" for one in omega[:4])
-        words = f"First natural periods: {periods} s." if periods else ""
+        words = f"Linear elastic, with natural periods of {periods} s." if periods else ""
         natures = dict.fromkeys(nature_of(study["nature"]) for study in studies.values())
         tables = [
             folded(

@@ -73,7 +73,7 @@ def tolerances(
     error: float = 1e-3,
     progress: Progress | None = None,
 ) -> Tolerances:
-    """Largest scale of the supports at which no magnitude passes its limit.
+    """Largest scale of the supports at which no magnitude exceeds its limit.
 
     Args:
         model: The structure, whose outputs have the limits.
