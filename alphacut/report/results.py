@@ -25,7 +25,6 @@ AVERAGES = {"cylinders": "eq. 16", "axes": "eq. 16", "isotropic": "isotropic", "
 """Averages of the stiffness that E and ν are of."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
-"""Label of the bounds that hold for isotropic composites, at the modal values."""
 ANSWERS = ("question", "answer", "nature")
 EXCEEDED = {
     "exceeded": "yes",

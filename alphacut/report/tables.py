@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import xarray
 
 Table = tuple[Sequence[str], Iterable[Sequence[object]]]
-"""Titles of the columns, and the rows."""
 
 
 def write_tables(summary: Document, results: Path, folder: Path) -> list[Path]:

@@ -100,7 +100,7 @@ def _highest(alpha: Array, holds: Mask) -> float:
 
 
 def _excluded(alpha: Array, excluded: Mask) -> float:
-    """Level above which nothing is possible: the lowest from which on all are excluded, 1 without one."""
+    """Level that is not reached: the lowest from which on all are excluded, 1 without one."""
     open_ = np.flatnonzero(~excluded)
     first = open_[-1] + 1 if len(open_) else 0
     return float(alpha[first]) if first < len(alpha) else 1.0
