@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+os.environ["MPLBACKEND"] = "module://matplotlib_inline.backend_inline"  # demos show their pictures
 
 project = "alphacut"
 author = "The alphacut developers"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -44,6 +45,19 @@ class Nature(StrEnum):
             "estimated": "The true bounds lie within the error, as an independent pass tells.",
             "guaranteed": "No value in the α-cut lies outside these bounds; this is proved.",
         }[self]
+
+
+def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
+    """The lower or upper end of a range: attained ends inwards, others outwards.
+
+    Rounding in the tenth digit counts as none.
+    """
+    if value == 0 or not math.isfinite(value):
+        return value
+    up = (side == "upper") != (nature is Nature.ATTAINED)
+    scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
+    slack = 1e-10 * abs(value) * scale
+    return (math.ceil(value * scale - slack) if up else math.floor(value * scale + slack)) / scale
 
 
 class Ends(NamedTuple):
@@ -302,9 +316,11 @@ class Bounds:
         differs = f", {nature}" if nature != self.nature else ""
         words = "gap to attained" if nature is Nature.GUARANTEED else "error"
         worst = error if self.time is None else error.max(axis=1)
-        for row in zip(self.alpha, low, high, worst, strict=True):
-            alpha, *ends, miss = (_digits(x) for x in row)
-            yield f"{self.named[column]}, α = {alpha}: {' … '.join(ends)}, {words} {miss}{differs}"
+        for alpha, least, most, miss in zip(self.alpha, low, high, worst, strict=True):
+            both = rounded(least, "lower", nature, 6), rounded(most, "upper", nature, 6)
+            ends = both if both[0] <= both[1] else (least, most)  # attained, nearly one number
+            head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
+            yield f"{head}, {words} {_digits(miss)}{differs}"
 
     def to_dataset(self) -> xarray.Dataset:
         """Bounds over (alpha, time, output), where they are attained over (…, parameter)."""

@@ -9,7 +9,7 @@ from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING
 
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, rounded
 
 if TYPE_CHECKING:
     import pint
@@ -98,19 +98,6 @@ def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) 
 def fixed(value: float, places: int) -> str:
     """A number with so many decimals, or with six digits where these would leave two or fewer."""
     return f"{value:.{places}f}" if not 0 < abs(value) < 10.0 ** (2 - places) else f"{value:.6g}"
-
-
-def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
-    """The lower or upper end of a range: attained ends inwards, others outwards.
-
-    Rounding in the tenth digit counts as none.
-    """
-    if value == 0 or not math.isfinite(value):
-        return value
-    up = (side == "upper") != (nature is Nature.ATTAINED)
-    scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
-    slack = 1e-10 * abs(value) * scale
-    return (math.ceil(value * scale - slack) if up else math.floor(value * scale + slack)) / scale
 
 
 def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:

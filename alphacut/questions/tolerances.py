@@ -12,9 +12,9 @@ from alphacut.case.types import Quantity
 from alphacut.figures.style import BLUE, GREY, INK, figure
 from alphacut.frame.questions.tolerances import tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
-from alphacut.io.units import engineering, rounded
+from alphacut.io.units import engineering
 from alphacut.questions.decision import PRECISION
 from alphacut.questions.limits import in_si
 from alphacut.questions.question import Limited, Motion, Question, Row

@@ -5,17 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.text_table import text_table
-from alphacut.io.units import (
-    STANDARD_GRAVITY,
-    axis_prefix,
-    between,
-    engineering,
-    largest_by_unit,
-    rounded,
-)
+from alphacut.io.units import STANDARD_GRAVITY, axis_prefix, between, engineering, largest_by_unit
 from alphacut.questions.table import QUESTIONS
 
 Row = tuple[str, ...]

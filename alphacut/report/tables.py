@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.netcdf import read_dataset
-from alphacut.io.units import rounded
 from alphacut.questions.table import QUESTIONS
 from alphacut.report.results import nature_of, whole
 from alphacut.report.safe import cleaned, plain_name

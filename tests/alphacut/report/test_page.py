@@ -8,8 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.result import Nature
-from alphacut.io.units import rounded
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.report.page import report
 from alphacut.report.results import answers, drivers, motion, nature_of, run_text
 from alphacut.report.safe import MOST, cleaned, figures, plain_name
