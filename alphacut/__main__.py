@@ -1,6 +1,8 @@
 """``alphacut …`` and ``python -m alphacut …``."""
 
-from alphacut.entry import leave, main
+import sys
+
+from alphacut.entry import main
 
 if __name__ == "__main__":
-    leave(main())
+    sys.exit(main())

@@ -7,20 +7,17 @@ import os
 import signal
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 
-from alphacut.commands.options import require_prism
-from alphacut.commands.parser import Parser, split_petsc
+from alphacut.commands.parser import Parser, require_prism, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.files import leave as leave
-from alphacut.io.files import open_streams, rank, ranks, say, standard_output
+from alphacut.io.files import rank, ranks, say, standard_output
 from alphacut.io.output_paths import check_destinations
 from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.io.provenance import own_version
-from alphacut.rve.interruption import stoppable
+from alphacut.rve.interruption import stoppable, uninterrupted
 
 NAMES = ("run", "check", "microstructure", "cell", "modulus", "envelope", "identify", "report")
 COMMANDS = {name: name for name in NAMES}
@@ -75,7 +72,6 @@ def main(
     Returns:
         Exit status, see `STATUSES`.
     """
-    open_streams()
     with stoppable() as signals:
         try:
             return _run(sys.argv[1:] if arguments is None else arguments, program, names)
@@ -84,65 +80,46 @@ def main(
                 say(str(problem))
             return 2
         except KeyboardInterrupt:
-            return _stopped(signals)
+            number = (*signals, signal.SIGINT)[0]
+            how = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
+            what = f"{how}; a run continues from the stages and samples that it has finished"
+            return _ended(what, 128 + number)
         except BrokenPipeError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             return 0
         except CampaignError as error:
-            say(str(error))
-            return 3
+            return _ended(str(error), 3)
+        except ModuleNotFoundError as error:
+            return _ended(missing(error), 1)
         except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
-            return _failed(e)
+            return _ended(str(e) or type(e).__name__, 1)
 
 
 def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
     ours, petsc = split_petsc(arguments)
     own = {name: names[name] for name in ours[:1] if name in names}
-    top, made = parsers(program, own or names)
+    with uninterrupted():  # a signal amid imports is not lost to what they run
+        top, made = parsers(program, own or names)
     options, left = top.parse_known_args(ours)
     if left:
-        made[options.command].refuse([one for one in left if one.startswith("-")] or left)
+        made[options.command].refuse(next((one for one in left if one.startswith("-")), left[0]))
     if names[options.command] not in ("run", "cell", "modulus"):
         require_prism(petsc)
     check_destinations(made[options.command], options)
     command = import_module(f"alphacut.commands.{names[options.command]}")
-    with standard_output(options.json == "-") as out, _plain_warnings():
+    with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
+        warnings.showwarning = _warn
         return int(command.run(options, petsc, out))
 
 
-@contextmanager
-def _plain_warnings() -> Iterator[None]:
-    """Warnings of the libraries as lines of this program, each once."""
-    shown: set[str] = set()
-
-    def show(message: Warning | str, *_: object, **__: object) -> None:
-        if (text := " ".join(str(message).split())) not in shown:
-            shown.add(text)
-            say(f"warning: {text}")
-
-    with warnings.catch_warnings():
-        warnings.showwarning = show
-        yield
+def _warn(message: Warning | str, *_: object, **__: object) -> None:
+    say(f"warning: {message}")
 
 
-def _stopped(signals: Sequence[int]) -> int:
-    """Status of a command that was interrupted; other ranks, which may wait, are stopped."""
-    number = (*signals, signal.SIGINT)[0]
-    how = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
-    say(f"{how}; a run continues from the stages and samples that it has finished")
-    if signals and ranks() > 1 and "mpi4py.MPI" in sys.modules:
-        sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(128 + number)
-    return 128 + number
-
-
-def _failed(error: Exception) -> int:
-    """One line about a failed computation; other ranks under mpirun are stopped."""
-    if os.environ.get("ALPHACUT_TRACEBACK"):
-        raise error
-    text = missing(error) if isinstance(error, ModuleNotFoundError) else str(error)
-    message = text or type(error).__name__
+def _ended(message: str, status: int) -> int:
+    """Says why a command ended; other ranks under mpirun, which may wait, are stopped."""
+    say(message)
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:
         print(f"alphacut: rank {rank()}: {message}", file=sys.stderr, flush=True)
-        sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(1)
-    say(message)
-    return 1
+        sys.modules["mpi4py.MPI"].COMM_WORLD.Abort(status)
+    return status

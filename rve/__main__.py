@@ -1,7 +1,9 @@
 """``python -m rve solve CASE`` is ``alphacut cell``."""
 
-from alphacut.entry import leave, main
+import sys
+
+from alphacut.entry import main
 
 if __name__ == "__main__":
     names = {"solve": "cell"}
-    leave(main(program=f"python -m {__package__}", names=names))
+    sys.exit(main(program=f"python -m {__package__}", names=names))

@@ -1,6 +1,8 @@
 """Run ``python -m stochastic microstructure CASE``, the same as ``alphacut microstructure``."""
 
-from alphacut.entry import leave, main
+import sys
+
+from alphacut.entry import main
 
 if __name__ == "__main__":
-    leave(main(program=f"python -m {__package__}", names={"microstructure": "microstructure"}))
+    sys.exit(main(program=f"python -m {__package__}", names={"microstructure": "microstructure"}))

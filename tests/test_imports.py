@@ -28,7 +28,6 @@ HEAVY = {
     "pandas",
     "sklearn",
     "skimage",
-    "rich",
     "scipy.stats",
 }
 

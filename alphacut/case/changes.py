@@ -34,11 +34,7 @@ def apply_changes(table: Table, changes: Sequence[str]) -> tuple[str, ...]:
 
 
 def _full_name(name: str, table: Table) -> str:
-    """The one key of a name: of several, the one that the case has already.
-
-    Raises:
-        RefusedError: There is none, or it is not clear.
-    """
+    """The one key of a name: of several, the one that the case has already."""
     known = [key for key in every_key() if not key.startswith("study.")]
     full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
     if len(full) > 1:

@@ -20,8 +20,8 @@ from alphacut.case.particles import Microstructure
 from alphacut.case.structure import Structure
 from alphacut.case.structures import Frame, Pendulum
 from alphacut.case.types import Section, Some, after, unlike
-from alphacut.fuzzy.refused import RefusedError
-from alphacut.questions.question import Limited
+from alphacut.fuzzy.refused import require
+from alphacut.questions.question import Question
 from alphacut.questions.table import QUESTIONS
 
 Stage = Literal["microstructure", "modulus", "envelope"]
@@ -48,7 +48,7 @@ class Content(Section):
     identify: Identify | None = None
 
     @property
-    def questions(self) -> dict[str, Limited]:
+    def questions(self) -> dict[str, Question]:
         """Sections of questions to the motion, by their keys."""
         every = {question.key: getattr(self, question.key, None) for question in QUESTIONS}
         return {key: section for key, section in every.items() if section is not None}
@@ -64,6 +64,19 @@ class Content(Section):
         return self.cell if isinstance(self.cell, RoundCell) else None
 
     @property
+    def round_cell(self) -> tuple[RadiusMap, RoundCell]:
+        """The radius map and the phases of a round particle.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        there = self.radius is not None and self.round is not None
+        require(there, "radius", None, "sections [radius] and [cell]")
+        assert self.radius is not None
+        assert self.round is not None
+        return self.radius, self.round
+
+    @property
     def structure(self) -> Structure | None:
         """The structure, with a stand-in for a modulus that is yet to be computed."""
         section = self.frame or self.pendulum
@@ -71,70 +84,54 @@ class Content(Section):
 
     @model_validator(mode="after")
     def _stages(self) -> Self:
-        """Refuses stages without their sections.
-
-        Raises:
-            RefusedError: One lacks a section, or sections do not go together.
-        """
+        """Refuses stages without their sections."""
+        known = self.picture is not None or "microstructure" in self.stages
         needs = {
             "microstructure": ("microstructure",),
-            "modulus": ("cell",)
-            if self.picture or "microstructure" in self.stages
-            else ("radius", "cell"),
+            "modulus": ("cell",) if known else ("radius", "cell"),
             "envelope": ("envelope",),
         }
-        for stage in self.stages:
-            for section in needs[stage]:
-                if getattr(self, section) is None:
-                    raise RefusedError(section, None, f"[{section}], which stage {stage} needs")
-        if "microstructure" in self.stages and self.radius is not None:
-            raise RefusedError("radius", "beside stage microstructure", "one of them")
-        spheres = self.round is not None and self.round.particles == "spheres"
-        method, any_cell = self.modulus.method, self.round is not None and not self.round.square
-        if (spheres and method in ("prism", "slices")) or (any_cell and method == "series"):
-            other = "auto, slices or prism for ellipses or any stiffness"
-            allowed = "series or auto for spheres" if spheres else other
-            raise RefusedError("modulus.method", method, allowed)
+        for stage, section in ((x, y) for x in self.stages for y in needs[x]):
+            there = getattr(self, section) is not None
+            require(there, section, None, f"[{section}], which stage {stage} needs")
+        one = "microstructure" not in self.stages or self.radius is None
+        require(one, "radius", "beside stage microstructure", "one of them")
+        if self.round is not None:
+            methods = self.round.methods
+            allowed, method = ", ".join(methods), self.modulus.method
+            require(method in methods, "modulus.method", method, f"{allowed} for this cell")
         return self
 
     @model_validator(mode="after")
     def _motion(self) -> Self:
-        """Refuses inputs and outputs that the structure does not have.
-
-        Raises:
-            RefusedError: There are some, or no structure.
-        """
+        """Refuses inputs and outputs that the structure does not have."""
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return self
-        if (self.frame is None) == (self.pendulum is None) or structure is None:
-            value = None if self.frame is None else "beside [pendulum]"
-            raise RefusedError("frame", value, "one of [frame] and [pendulum]")
-        if self.frame and not self.frame.is_whole and "modulus" not in self.stages:
-            raise RefusedError("frame.modulus", None, "a modulus, or stage modulus")
-        fuzzy = [x for x in envelope.fuzzy if x != "E" or "modulus" not in self.stages]
-        structure.inputs(fuzzy)
-        envelope.require_steps("envelope.duration", envelope.duration)
-        for place, study in enumerate(self.study):
-            key = f"study[{place}]"
-            own = [x for x in study.fuzzy if x != "E" or "modulus" not in self.stages]
-            structure.inputs(own, f"{key}.fuzzy")
+        both = self.frame is not None and self.pendulum is not None
+        value, allowed = "beside [pendulum]" if both else None, "one of [frame] and [pendulum]"
+        require(structure is not None and not both, "frame", value, allowed)
+        assert structure is not None
+        whole = self.frame is None or self.frame.is_whole or "modulus" in self.stages
+        require(whole, "frame.modulus", None, "a modulus, or stage modulus")
+        own = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
+        studies = {"envelope": own} | {f"study[{k}]": x for k, x in enumerate(self.study)}
+        for key, study in studies.items():
+            made = {"E"} if "modulus" in self.stages else set()
+            structure.inputs([x for x in study.fuzzy if x not in made], f"{key}.fuzzy")
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
-            if study.name in (other.name for other in self.study[:place]):
-                raise RefusedError(f"{key}.name", study.name, "a name of its own")
-        self._questions(structure)
+        names = [study.name for study in self.study]
+        for key, name in enumerate(names):
+            require(name not in names[:key], f"study[{key}].name", name, "a name of its own")
+        for section in self.questions.values():
+            section.check(structure)
+        if self.identify is not None:
+            require(self.frame is not None, "identify", "without a frame", "beside [frame]")
+            structure.inputs(self.identify.learn, "identify.learn")
         return self
 
-    def _questions(self, structure: Structure) -> None:
-        for key, section in self.questions.items():
-            section.require(structure, key)
-        if self.identify is not None:
-            if self.frame is None:
-                raise RefusedError("identify", "without a frame", "beside [frame]")
-            structure.inputs(self.identify.learn, "identify.learn")
 
-
-_FIELDS: dict[str, Any] = {one.key: (one.section | None, None) for one in QUESTIONS}
+_FIELDS: dict[str, Any] = {one.key: (one | None, None) for one in QUESTIONS}
 CONTENT: type[Content] = create_model("CaseFile", __base__=Content, **_FIELDS)
 """The content of a case with a section for each question."""

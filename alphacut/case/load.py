@@ -14,10 +14,10 @@ from pydantic_core import ErrorDetails
 
 from alphacut.case.changes import apply_changes
 from alphacut.case.content import CONTENT, Content
-from alphacut.case.keys import Keys, every_key, sections
+from alphacut.case.keys import every_key, sections
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.problem import BadInput, Problem, nearest
-from alphacut.io.provenance import digest
+from alphacut.io.problem import BadInput, Problem, nearest, suggestion
+from alphacut.stochastic.particles.csv_columns import text_of
 
 KINDS = {
     "tuple_type": "an array",
@@ -58,12 +58,6 @@ class Case:
         """The stages that a run computes."""
         return self.content.stages
 
-    def traces(self) -> dict[str, str]:
-        """Digest of each section; "" of those that the file does not have."""
-        names = (name for name in CONTENT.model_fields if name not in ("title", "about"))
-        every: Mapping[str, object] = {name: getattr(self.content, name) for name in names}
-        return {name: digest(section) if section else "" for name, section in every.items()}
-
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     """Reads a case file.
@@ -77,7 +71,7 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
         BadInput: With every problem of the case.
     """
     path = Path(path)
-    text = _text(path)
+    text = text_of(path)
     table = _parsed(path, text)
     changed = apply_changes(table, changes)
     try:
@@ -86,46 +80,56 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
         lines = lines_of_keys(text)
         problems = [_located(p, path, lines, changed) for p in _problems(error)]
         raise BadInput(sorted(set(problems), key=lambda problem: problem.line)) from None
-    except BadInput as error:
-        raise error.within(str(path)) from None
     return Case(path, text, content, tuple(changes))
-
-
-def _text(path: Path) -> str:
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise BadInput.of(str(path), f"cannot be read: {reason}") from None
-    except UnicodeDecodeError as error:
-        raise BadInput.of(str(path), f"is not UTF-8 at byte {error.start}") from None
-    return text
 
 
 def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except RecursionError:
-        raise BadInput.of(str(path), "has a value that is nested too deeply") from None
+        raise BadInput(Problem(str(path), "has a value that is nested too deeply")) from None
     except tomllib.TOMLDecodeError as error:
         where = re.search(r"\(at line (\d+), column \d+\)", str(error))
         lines = text.splitlines()
         line = int(where[1]) if where else max(1, len(lines))
         shown = lines[line - 1].strip() if len(lines) >= line else ""
         what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
-        raise BadInput.of(shown or "the file", what, file=str(path), line=line) from None
+        raise BadInput(Problem(shown or "the file", what, file=str(path), line=line)) from None
 
 
 def _problems(error: ValidationError) -> Iterator[Problem]:
-    """The problem of each error that Pydantic reports."""
-    details = error.errors(include_url=False)
-    missing = {_key(d["loc"]) for d in details if d["type"] == "missing"}
-    for detail in details:
-        key = _key(detail["loc"])
-        if detail["type"] == "extra_forbidden":
-            yield _unknown(key, detail["input"], missing)
-        elif key not in _misspelt(details, missing):
+    """The problem of each error that Pydantic reports; what is misspelt is not missing too."""
+    details = [(_key(one["loc"]), one) for one in error.errors(include_url=False)]
+    extra = {key: _meant(key) for key, one in details if one["type"] == "extra_forbidden"}
+    for key, detail in details:
+        if key in extra:
+            kind = "section" if isinstance(detail["input"], dict) else "key"
+            close = extra[key].removeprefix(f"{_section(key)}.")
+            known = ", ".join(_names(key))
+            cure = f"did you mean {close}?" if close else ""
+            yield Problem(key, f"is an unknown {kind}", "", "" if close else known, cure)
+        elif key not in extra.values():
             yield _problem(key, detail)
+
+
+def _section(key: str) -> str:
+    return key.rpartition(".")[0]
+
+
+def _names(key: str) -> list[str]:
+    """Keys and sections beside a key."""
+    inside = re.sub(r"\[\d+\]", "", _section(key))
+    every = (*every_key(), *sections())
+    return [name.rpartition(".")[2] for name in every if name and _section(name) == inside]
+
+
+def _meant(key: str) -> str:
+    """Full name of the known key that comes nearest to one that is not; empty where none does."""
+    name = key.rpartition(".")[2]
+    if close := nearest(name, _names(key)):
+        return f"{_section(key)}.{close}".lstrip(".")
+    elsewhere = {x.rpartition(".")[2]: x for x in every_key()}
+    return elsewhere.get(nearest(name, elsewhere), "")
 
 
 def _problem(key: str, detail: ErrorDetails) -> Problem:
@@ -135,41 +139,12 @@ def _problem(key: str, detail: ErrorDetails) -> Problem:
     if detail["type"] == "missing":
         about = every_key().get(re.sub(r"\[\d+\]", "", key))
         return Problem(key, "is missing", allowed=about.description or "" if about else "a section")
+    value, words = _written(detail["input"]), KINDS.get(detail["type"], detail["msg"])
     if detail["type"] == "literal_error":
-        allowed = str(detail["ctx"]["expected"]).replace("'", '"')
-        close = nearest(str(detail["input"]), re.findall(r'"([^"]+)"', allowed))
-        return Problem(
-            key, "", _written(detail["input"]), allowed, close and f"did you mean {close}?"
-        )
-    words = str(cause) if cause else KINDS.get(detail["type"], detail["msg"])
-    return Problem(key, "", _written(detail["input"]), words)
-
-
-def _unknown(key: str, value: object, missing: set[str]) -> Problem:
-    section, _, name = key.rpartition(".")
-    plain = re.sub(r"\[\d+\]", "", section)
-    here: Keys = {x: y for x, y in every_key().items() if x.rpartition(".")[0] == plain}
-    inner = [x.removeprefix(f"{plain}.") for x in sections() if x.startswith(plain) and x != plain]
-    close = nearest(name, [*(x.rpartition(".")[2] for x in here), *inner])
-    lone = [x for x in missing if x.rpartition(".")[0] == section]
-    if not close:
-        elsewhere = {x.rpartition(".")[2]: x for x in every_key()}
-        close = lone[0] if len(lone) == 1 else elsewhere.get(nearest(name, elsewhere), "")
-    kind = "section" if isinstance(value, dict) else "key"
-    allowed = "" if close else ", ".join(x.rpartition(".")[2] for x in here)
-    return Problem(key, f"is an unknown {kind}", "", allowed, close and f"did you mean {close}?")
-
-
-def _misspelt(details: Sequence[ErrorDetails], missing: set[str]) -> set[str]:
-    """Missing keys that stand there under a name that is misspelt."""
-    every = [_key(d["loc"]) for d in details if d["type"] == "extra_forbidden"]
-    meant = set()
-    for section, name in ((x.rpartition(".")[0], x.rpartition(".")[2]) for x in every):
-        lone = [x for x in missing if x.rpartition(".")[0] == section]
-        names = [x.rpartition(".")[2] for x in lone]
-        meant |= {f"{section}.{nearest(name, names)}".lstrip(".")}
-        meant |= set(lone if len(lone) == 1 and not nearest(name, names) else ())
-    return meant
+        words = str(detail["ctx"]["expected"]).replace("'", '"')
+        cure = suggestion(str(detail["input"]), re.findall(r'"([^"]+)"', words))
+        return Problem(key, value=value, allowed=words, cure=cure)
+    return Problem(key, value=value, allowed=str(cause or words))
 
 
 def _key(place: tuple[int | str, ...]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
@@ -30,13 +31,12 @@ from alphacut.case.types import (
     rising,
 )
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.quantity import number
 from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
-CELL_METHODS = ("prism", "slices", "series", "auto")
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
@@ -68,21 +68,19 @@ class RadiusMap(Section):
         """Law of θ, a normal one cut off at both ends."""
         return TruncatedNormal(*self.theta)
 
-    @model_validator(mode="after")
-    def _monotone(self) -> Self:
-        """Refuses maps that leave (0, 1) at a corner of the supports, which are linear in a1 … a4.
+    def at(self, values: Mapping[str, float]) -> HermiteMap:
+        """The map at crisp values of its parameters."""
+        return HermiteMap(*(values[name] for name in self.numbers), self.law)
 
-        Raises:
-            RefusedError: One does.
-        """
-        names = list(self.numbers)
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        """Refuses maps that leave (0, 1) at a corner of the supports, linear in a1 … a4."""
         for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
-            values = dict(zip(names, corner, strict=True))
+            values = dict(zip(self.numbers, corner, strict=True))
             try:
-                HermiteMap(**values, distribution=self.law)
-            except ValueError as error:
-                at = ", ".join(f"{name} {value:g}" for name, value in values.items())
-                raise RefusedError("radius", at, "a map inside (0, 1)", str(error)) from None
+                self.at(values)
+            except RefusedError as error:
+                raise RefusedError("radius", values, error.allowed, error.cure) from None
         return self
 
 
@@ -114,18 +112,15 @@ class ModulusOrStiffness(Quantity):
 
 
 def _outline(particles: str) -> Ellipse | None:
-    """Outline of a particle that is not round.
-
-    Raises:
-        RefusedError: There is no such shape.
-    """
+    """Outline of a particle that is not round."""
     if particles in ("cylinders", "spheres"):
         return None
+    match = ELLIPSES.match(particles)
     try:
-        aspect, turn = ELLIPSES.findall(particles)[0]
-        return Ellipse(float(aspect), float(turn))
-    except (IndexError, ValueError):
+        aspect, turn = map(float, match.groups() if match else ())
+    except ValueError:
         raise RefusedError("", particles, SHAPES) from None
+    return Ellipse(aspect, turn)
 
 
 def _with_outline(particles: str) -> str:
@@ -175,20 +170,28 @@ class RoundCell(Section):
         """True for round particles of an isotropic material."""
         return self.outline is None and self.stiffness is None
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Models that can solve it."""
+        if self.particles == "spheres":
+            return "series", "auto"
+        return (*(["series"] if self.square else []), "auto", "slices", "prism")
+
+    @property
+    def fibres(self) -> bool:
+        """True for round fibres of an isotropic material."""
+        return self.square and self.particles == "cylinders"
+
     @model_validator(mode="after")
     def _one_material(self) -> Self:
-        """Refuses a material that is none, or that is none of spheres.
-
-        Raises:
-            RefusedError: It is none, or the shape is.
-        """
-        if (self.stiffness is None) == (self.inclusion_poisson is None):
-            allowed = "a number beside Young's modulus, none beside a stiffness"
-            value = "missing" if self.stiffness is None else "beside a stiffness"
-            raise RefusedError("cell.inclusion_poisson", value, allowed)
-        if self.outline is None and self.stiffness and self.particles == "spheres":
-            allowed = "Young's modulus of spheres"
-            raise RefusedError("cell.inclusion_modulus", "a plane stiffness", allowed)
+        """Refuses a material that is none, or that is none of spheres."""
+        ratio = self.inclusion_poisson is not None
+        allowed = "a number beside Young's modulus, none beside a stiffness"
+        value = "there" if ratio else "missing"
+        require((self.stiffness is None) == ratio, "cell.inclusion_poisson", value, allowed)
+        plane = self.stiffness is not None and self.particles == "spheres"
+        allowed = "Young's modulus of spheres"
+        require(not plane, "cell.inclusion_modulus", "a plane stiffness", allowed)
         return self
 
 
@@ -218,20 +221,17 @@ class ImageCell(Section):
 
     @model_validator(mode="after")
     def _parted(self) -> Self:
-        """Refuses phases that nothing or too much tells apart.
-
-        Raises:
-            RefusedError: They are.
-        """
-        if (self.threshold is None) == (self.labels is None):
-            value = None if self.threshold is None else "beside cell.labels"
-            raise RefusedError("cell.threshold", value, "one of cell.threshold and cell.labels")
-        count = len(self.threshold) + 1 if self.threshold is not None else len(self.labels or ())
-        if len(self.modulus) != count or len(self.poisson) not in (1, count):
-            value = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
-            raise RefusedError("cell.modulus", value, f"one for each of {count} phases")
-        if len(self.pixel) > 2:
-            raise RefusedError("cell.pixel", len(self.pixel), "a side, or a width and a height")
+        """Refuses phases that nothing or too much tells apart."""
+        both, none = self.threshold and self.labels, not self.threshold and not self.labels
+        value = "beside cell.labels" if both else None
+        allowed = "one of cell.threshold and cell.labels"
+        require(not both and not none, "cell.threshold", value, allowed)
+        count = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
+        fits = len(self.modulus) == count and len(self.poisson) in (1, count)
+        value = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
+        require(fits, "cell.modulus", value, f"one for each of {count} phases")
+        sides, allowed = len(self.pixel), "a side, or a width and a height"
+        require(sides <= 2, "cell.pixel", sides, allowed)
         return self
 
 

@@ -16,9 +16,9 @@ from alphacut.case.types import (
     Quantity,
     Section,
     Share,
-    Text,
     Time,
     after,
+    text,
 )
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io import quantity
@@ -85,8 +85,8 @@ class Envelope(Section):
     integrator: Literal["midpoint", "rk4", "exact", "composition4"] | None = Field(
         default=None, description="time stepping; by the method if left out"
     )
-    tolerance: Annotated[Tolerance, Text(_tolerance)] = Field(
-        default=Tolerance(1e-4),
+    tolerance: Annotated[Tolerance, text(_tolerance)] | None = Field(
+        default=None,
         description="error that is allowed: of displacements, of forces, or a share of each peak",
     )
     gain: Annotated[float, Quantity(least=1e-6, most=1)] = Field(

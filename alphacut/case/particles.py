@@ -7,7 +7,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from alphacut.case.types import CaseFile, Length, Quantity, Section, Share, after, rising
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.microstructure import Study
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
@@ -40,27 +40,24 @@ class Packing(Section):
         default=None, description="CSV file of radii or diameters, a column r [mm] or d [mm]"
     )
 
-    @property
-    def radii(self) -> RadiusLaw:
-        """Law of the radii."""
-        if self.file is not None:
-            return MeasuredRadii.read(self.file)
-        return LogNormalRadii(self.smallest_radius or 0.0, self.largest_radius or 0.0)
+    def source(self, spheres: bool) -> Simulated:
+        """Packings of discs or spheres."""
+        if self.file is None:
+            ends = self.smallest_radius or 0.0, self.largest_radius or 0.0
+            radii: RadiusLaw = LogNormalRadii(*ends)
+        else:
+            radii = MeasuredRadii.read(self.file)
+        shape = SPHERES if spheres else DISCS
+        each = Specification(self.particles, self.fraction, radii, shape=shape)
+        return Simulated(each, self.packings)
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:
-        """Refuses radii of two laws, or of none.
-
-        Raises:
-            RefusedError: They are.
-        """
+        """Refuses radii of two laws, or of none."""
         ends = (self.smallest_radius, self.largest_radius)
-        if self.file is None and None in ends:
-            name = "smallest_radius" if ends[0] is None else "largest_radius"
-            raise RefusedError(f"microstructure.packing.{name}", None, "a length, or a file")
-        if self.file is not None and ends != (None, None):
-            key = "microstructure.packing.file"
-            raise RefusedError(key, self.file.name, "a file, or both ends of the radii")
+        law = None not in ends if self.file is None else ends == (None, None)
+        allowed = "a file, or both ends of the radii"
+        require(law, "microstructure.packing.file", "beside or without ends", allowed)
         return self
 
 
@@ -70,12 +67,22 @@ class Circles(Section):
     file: CaseFile = Field(description="CSV file with the header x [mm], y [mm], r [mm]")
     size: tuple[Length, Length] = Field(description="width and height of the section")
 
+    @property
+    def source(self) -> CircleFile:
+        """The circles of the file."""
+        return CircleFile(self.file, self.size)
+
 
 class Photograph(Section):
     """Circles segmented from the image of a section."""
 
     file: CaseFile = Field(description="image file")
     pixel: Length = Field(description="side of a pixel")
+
+    @property
+    def source(self) -> SectionImage:
+        """The circles in the image."""
+        return SectionImage(self.file, self.pixel)
 
 
 class Microstructure(Section):
@@ -93,15 +100,10 @@ class Microstructure(Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        """Refuses several sources, or none.
-
-        Raises:
-            RefusedError: There are.
-        """
+        """Refuses several sources, or none."""
         names = [name for name in SOURCES if getattr(self, name) is not None]
-        if len(names) != 1:
-            allowed = "one of packing, circles and image"
-            raise RefusedError("microstructure", ", ".join(names) or None, allowed)
+        allowed = "one of packing, circles and image"
+        require(len(names) == 1, "microstructure", ", ".join(names) or None, allowed)
         return self
 
     def study(self, *, spheres: bool) -> Study:
@@ -110,16 +112,7 @@ class Microstructure(Section):
         Args:
             spheres: Whether packed particles are spheres.
         """
-        return Study(self._source(spheres), self.limits, seed=self.seed, sampling=not spheres)
-
-    def _source(self, spheres: bool) -> Simulated | Measured:
-        if self.circles is not None:
-            of = self.circles
-            return Measured(CircleFile(of.file, of.size))
-        if self.image is not None:
-            return Measured(SectionImage(self.image.file, self.image.pixel))
-        assert self.packing is not None
-        packing = self.packing
-        shape = SPHERES if spheres else DISCS
-        each = Specification(packing.particles, packing.fraction, packing.radii, shape=shape)
-        return Simulated(each, packing.packings)
+        source = self.circles or self.image
+        of = self.packing.source(spheres) if self.packing else source and Measured(source.source)
+        assert of is not None
+        return Study(of, self.limits, seed=self.seed, sampling=not spheres)

@@ -10,7 +10,6 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import suggestion
@@ -37,11 +36,6 @@ class Structure:
     def frame(self) -> StoreyFrame | None:
         """The model if it is a storey frame, else None."""
         return self.model if isinstance(self.model, StoreyFrame) else None
-
-    @property
-    def linear(self) -> LinearSystem | None:
-        """The model if it is linear, else None."""
-        return None if isinstance(self.model, LagrangianSystem) else self.model
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -25,24 +25,28 @@ from alphacut.case.types import (
     Span,
     Spin,
     Stiffness,
-    Text,
     Turning,
     Velocity,
     case_file,
+    text,
 )
 from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.structures.lagrangian import pendulum
+from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.accelerogram import accelerogram
 
 ZERO = Crisp(0.0)
+NAMES = {"q0": "displacements", "v0": "velocities", "output": "outputs"}
+"""Keys by the names of the frame's own arguments, where they differ."""
+DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
 STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
 
 
 def _record(value: object, info: ValidationInfo) -> Accelerogram:
-    return accelerogram(case_file(value, info), "frame.accelerogram")
+    return accelerogram(case_file(value, info))
 
 
 class Frame(Section):
@@ -84,7 +88,7 @@ class Frame(Section):
     )
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
-    accelerogram: Annotated[Accelerogram, Text(_record)] | None = Field(
+    accelerogram: Annotated[Accelerogram, text(_record)] | None = Field(
         default=None,
         description="CSV or AT2 file of the ground's acceleration; motion is relative to it",
     )
@@ -118,24 +122,21 @@ class Frame(Section):
         Raises:
             RefusedError: Its values make no frame.
         """
-        number = None if self.stiffness else modulus or self.modulus or STAND_IN
+        number = self.modulus if self.stiffness else modulus or self.modulus or STAND_IN
         try:
             model = self._model(number)
         except RefusedError as error:
-            key = f"frame.{error.key}"
+            key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        except ValueError as error:
-            raise RefusedError("frame", "of these values", "a frame", str(error)) from None
         every = self._numbers(number)
         return Structure(model, {name: every[name] for name in model.parameters})
 
     def _model(self, modulus: FuzzyNumber | None) -> StoreyFrame:
-        moments = self._modal(self.second_moment, spread=False)
         return StoreyFrame(
             self._modal(self.masses),
             self._modal(self.lengths),
             None if modulus is None else modulus.modal,
-            moments[0] if len(moments) == 1 else moments or None,
+            tuple(x.modal for x in self.second_moment or ()) or None,
             dampers=self._modal(self.dampers),
             damper_placement=self.damper_placement or "ground",
             q0=self._modal(self.displacements),
@@ -143,91 +144,42 @@ class Frame(Section):
             outputs=self.outputs,
             rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
             ground=self.accelerogram,
-            damping_ratio=self._modal(self.damping_ratio, spread=False),
+            damping_ratio=tuple(x.modal for x in self.damping_ratio or ()),
             columns=() if self.stiffness else self._modal(self.columns),
             stiffness=self._modal(self.stiffness),
         )
 
-    def _modal(
-        self, values: tuple[FuzzyNumber, ...] | None, *, spread: bool = True
-    ) -> tuple[float, ...]:
-        return tuple(x.modal for x in (self.per_floor(values) if spread else values or ()))
+    def _modal(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
+        return tuple(x.modal for x in self.per_floor(values))
 
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+        """Every number by the name of its parameter; some are none of this frame's."""
         numbers = {
+            "E": modulus or STAND_IN,
             "rayleigh_mass": self.rayleigh_mass,
             "rayleigh_stiffness": self.rayleigh_stiffness,
-            **({} if modulus is None else {"E": modulus}),
-            **_single("I", self.second_moment),
-            **_single("zeta", self.damping_ratio),
         }
-        lists = {
-            "I{}": self.second_moment,
-            "k{}": self.stiffness,
-            "m{}": self.masses,
-            "l{}": self.lengths,
-            "d{}": self.dampers,
-            "c{}": self.columns,
-            "q{}_0": self.displacements,
-            "v{}_0": self.velocities,
-        }
-        for pattern, values in lists.items():
-            each = enumerate(self.per_floor(values), start=1)
-            numbers |= {pattern.format(floor): value for floor, value in each}
+        for symbol, key in {"I": "second_moment", "zeta": "damping_ratio"}.items():
+            values = getattr(self, key) or ()
+            numbers |= {symbol: values[0]} if len(values) == 1 else {}
+        for key, symbol in SYMBOLS.items():
+            each = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)
+            numbers |= {symbol.format(place): value for place, value in each}
         return numbers
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        """Refuses a frame that lacks values, or has too many.
-
-        Raises:
-            RefusedError: It does.
-        """
-        for key in LISTS:
-            values = getattr(self, key) or (ZERO,)
-            if len(values) not in (1, self.floors):
-                allowed = f"one value, or as many as frame.masses: {self.floors}"
-                raise RefusedError(f"frame.{key}", f"a list of {len(values)}", allowed)
-        for key in ("lengths", "second_moment") if self.stiffness is None else ():
-            if getattr(self, key) is None:
-                raise RefusedError(f"frame.{key}", None, "this key, or frame.stiffness")
-        if self.stiffness is not None and (self.modulus or self.second_moment):
-            cure = "leave out modulus and second_moment"
-            raise RefusedError("frame.stiffness", "beside a modulus", "one of them", cure)
+        """Refuses a frame without damping or motion, or that is none."""
         if self.names("dampers") != (self.damper_placement is not None):
             raise RefusedError("frame.damper_placement", None, "both dampers and damper_placement")
         if not any(map(self.names, DAMPING)):
             raise RefusedError("frame.dampers", None, " or ".join(DAMPING), '"0 %" for none')
         starts = (*self.displacements, *self.velocities)
-        if self.accelerogram is None and not any(
-            x.support.upper or x.support.lower for x in starts
-        ):
+        if self.accelerogram is None and not any(any(x.support) for x in starts):
             cure = "nothing moves the frame"
             raise RefusedError("frame.displacements", None, "a start, or an accelerogram", cure)
         self.structure()
         return self
-
-
-LISTS = (
-    "lengths",
-    "dampers",
-    "displacements",
-    "velocities",
-    "second_moment",
-    "columns",
-    "stiffness",
-    "damping_ratio",
-)
-"""Keys of a frame with one value for each floor, or one for all."""
-DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
-
-
-def _single(name: str, values: tuple[FuzzyNumber, ...] | None) -> dict[str, FuzzyNumber]:
-    """A parameter that all floors share, or one for each of several values."""
-    several = values or ()
-    if len(several) == 1:
-        return {name: several[0]}
-    return {f"{name}{place}": value for place, value in enumerate(several, start=1)}
 
 
 class Pendulum(Section):
@@ -250,12 +202,6 @@ class Pendulum(Section):
             phi0=self.angle.modal,
             omega0=self.angular_velocity.modal,
         )
-        numbers = {
-            "m": self.mass,
-            "l": self.length,
-            "d": self.damping,
-            "g": self.gravity,
-            "phi_0": self.angle,
-            "omega_0": self.angular_velocity,
-        }
+        keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
+        numbers = {x: getattr(self, key) for x, key in zip(model.parameters, keys, strict=True)}
         return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)

@@ -9,7 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    PlainValidator,
+    ValidationInfo,
+)
 from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
@@ -113,27 +120,9 @@ class Quantity:
         return {"anyOf": kinds, "description": self.allowed}
 
 
-@dataclass(frozen=True)
-class Text:
-    """A key whose text a function reads.
-
-    Args:
-        read: Object that the text says, from the text and the context of the case.
-    """
-
-    read: Callable[[object, ValidationInfo], object]
-
-    def __get_pydantic_core_schema__(
-        self, source: object, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """The validation by `read`."""
-        return core_schema.with_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """The JSON Schema: text."""
-        return {"type": "string"}
+def text(read: Callable[[Any, ValidationInfo], object]) -> PlainValidator:
+    """A key whose text a function reads, from the text and the context of the case."""
+    return PlainValidator(read, json_schema_input_type=str)
 
 
 def one_or_many(value: object) -> object:
@@ -204,7 +193,7 @@ def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
 
 after = AfterValidator
 """A check of a value that has its type."""
-CaseFile = Annotated[Path, Text(case_file)]
+CaseFile = Annotated[Path, text(case_file)]
 Names = Annotated[tuple[str, ...], Each, after(unlike)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
 from alphacut.case.load import load
-from alphacut.case.material import CELL_METHODS, RadiusMap, RoundCell
+from alphacut.case.material import Mesh, RadiusMap, RoundCell
 from alphacut.commands import options as common
-from alphacut.commands.modulus import image_table
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.commands.modulus import image as image_text
+from alphacut.commands.parser import require_prism
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
-from alphacut.io.text_table import text_table
+from alphacut.io.netcdf import document_of
 from alphacut.io.units import fixed
 from alphacut.report.results import ISOTROPIC, fibre_label
+from alphacut.report.tables import tables, text_table
 from alphacut.rve.result import Homogenised
 from alphacut.stages import cell, image
+from alphacut.stages.store import Store
 
 ABOUT = "effective modulus and stresses of the cell at the modal values"
 
@@ -33,59 +34,46 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHOD",
         help="solve by a second method; fail if E differs by more than modulus.tolerance",
     )
-    parser.add_argument(
-        "--export", metavar="FILE", help="mesh, displacements, stresses: .vtu, .vtk, .xdmf, .msh"
-    )
+    parser.add_argument("--export", metavar="FILE", help="mesh, displacements and stresses as .vtu")
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Solves and reports."""
-    content = load(options.case, common.changes(options, common.SAMPLE)).content
-    common.require_prism(petsc, content)
+    case = load(options.case, common.changes(options, common.SAMPLE))
+    content = case.content
+    require_prism(petsc, content)
     if content.picture is not None:
-        data = image.stage(content.picture, (1.0,), content.modulus.average).once(
-            quiet=options.quiet
-        )
-        document: Document = json.loads(data.attrs["document"])
-        common.answer(options, document, out, image_table(document))
+        store = Store(None, case.text, quiet=options.quiet)
+        data = store.take(image.stage(content.picture, (1.0,), content.modulus.average))
+        document = document_of(data)
+        text = text_table(*tables({"image": document})["image"]) + image_text(document)
+        common.answer(options, document, out, text)
         return 0
-    if content.round is None or content.radius is None:
-        raise RefusedError("radius", None, "sections [radius] and [cell]")
-    choice = cell.CellChoice.of(content.round, content.mesh, content.modulus, petsc)
-    choice = replace(choice, parallel=ranks() > 1, estimate=True)
-    result = cell.solve(content.radius, content.round, choice)
+    radius, phases = content.round_cell
+    elements = {"petsc": petsc, "parallel": ranks() > 1, "estimate": True}
+    model = cell.model_of(phases, content.mesh, content.modulus, **elements)
+    result = cell.solve(radius, phases, model)
     cell.require_tolerance(result.error, content.modulus.tolerance)
-    document = {
-        **cell.document(result),
-        "references": cell.references(content.radius, content.round),
-    }
+    document = {**cell.document(result), "references": cell.references(radius, phases)}
     if options.cross_check:
-        document["difference"] = difference(
-            content.radius, content.round, choice, result, options.cross_check
-        )
+        method, methods = options.cross_check, {*phases.methods} - {"auto", result.method}
+        require(method in methods, "--cross-check", method, ", ".join(sorted(methods)))
+        modulus = content.modulus.model_copy(update={"method": method})
+        second = cell.solve(radius, phases, cell.model_of(phases, content.mesh, modulus))
+        document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)
     if options.export:
-        path, cross_section = Path(options.export), (content.radius, content.round)
-        document["export"] = export(*cross_section, choice, path)
+        document["export"] = export(radius, phases, content.mesh, Path(options.export))
     common.answer(options, document, out, summary(result, document))
     return 0
 
 
-def difference(
-    radius: RadiusMap, phases: RoundCell, choice: cell.CellChoice, first: Homogenised, method: str
-) -> float:
+def difference(first: Homogenised, second: Homogenised, tolerance: float) -> float:
     """Relative difference of E from that of a second method.
 
     Raises:
-        RefusedError: There is no such method, or it is the first one's.
-        FailedError: The difference is above the tolerance.
+        FailedError: It is above the tolerance.
     """
-    if method not in CELL_METHODS or method == choice.method:
-        known = ", ".join(x for x in CELL_METHODS if x != choice.method)
-        raise RefusedError("--cross-check", method, known)
-    second = cell.solve(radius, phases, replace(choice, method=method, petsc={}))
-    if first.method == second.method:
-        raise RefusedError("--cross-check", method, f"another method than {first.method}")
-    gap, tolerance = abs(first.modulus / second.modulus - 1), choice.tolerance or 1e-4
+    gap = abs(first.modulus / second.modulus - 1)
     if not gap <= tolerance:
         values = (f"{one.method} gives E = {one.modulus:.10g} Pa" for one in (first, second))
         raise FailedError(
@@ -95,14 +83,14 @@ def difference(
     return gap
 
 
-def export(radius: RadiusMap, phases: RoundCell, choice: cell.CellChoice, path: Path) -> Document:
+def export(radius: RadiusMap, phases: RoundCell, mesh: Mesh, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns counts."""
     from alphacut.export.fields import cell_fields, check_ending, write_mesh
 
     check_ending(path)
-    mesh = cell_fields(cell.modal_cell(radius, phases), choice.size, choice.layers)
-    write_mesh(mesh, path)
-    return {"file": str(path), "nodes": len(mesh.points)}
+    fields = cell_fields(cell.modal_cell(radius, phases), mesh.size, mesh.layers)
+    write_mesh(fields, path)
+    return {"file": str(path), "nodes": len(fields.points)}
 
 
 def summary(result: Homogenised, document: Document) -> str:

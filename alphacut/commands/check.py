@@ -13,12 +13,13 @@ from alphacut.case.keys import quantity_of
 from alphacut.case.load import load
 from alphacut.case.types import Section
 from alphacut.commands.options import add_common, answer
-from alphacut.frame.structures.linear import LinearSystem, frequencies
+from alphacut.frame import StoreyFrame
+from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
-from alphacut.io.text_table import text_table
 from alphacut.io.units import engineering
-from alphacut.stages.cell import CellChoice, solve
+from alphacut.report.tables import text_table
+from alphacut.stages.cell import model_of, solve
 
 ABOUT = "check a case, and print what it was read as and its first natural period"
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
@@ -58,7 +59,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     return 0
 
 
-def structure(content: Content) -> LinearSystem | None:
+def structure(content: Content) -> StoreyFrame | None:
     """The linear structure at the modal values; None where none vibrates.
 
     A modulus that is yet to be computed is that of the series at the modal values.
@@ -67,10 +68,12 @@ def structure(content: Content) -> LinearSystem | None:
         return None
     number = None
     if not content.frame.is_whole:
-        if content.round is None or content.radius is None:
+        if content.round is None or content.radius is None or not content.round.square:
             return None
-        number = Crisp(solve(content.radius, content.round, CellChoice(tolerance=1e-4)).modulus)
-    return content.frame.structure(number).linear
+        quick = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
+        model = model_of(content.round, content.mesh, quick)
+        number = Crisp(solve(content.radius, content.round, model).modulus)
+    return content.frame.structure(number).frame
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TextIO
 
-from alphacut.case.load import load
 from alphacut.commands import options as common
-from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.netcdf import write_dataset
-from alphacut.io.provenance import attributes
-from alphacut.report.results import run_text
-from alphacut.stages import envelope
+from alphacut.report.tables import run_text
+from alphacut.stages.chain import Chain
+from alphacut.stages.results import Results
 
 ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
@@ -28,26 +24,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     common.add_common(parser)
     common.add_keys(parser, KEYS)
     common.add_modulus(parser)
-    parser.add_argument("--out", metavar="FILE.nc", help="NetCDF file for the envelopes")
+    common.add_run(parser)
 
 
 def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
     """Computes and reports."""
-    case = load(options.case, common.changes(options, KEYS))
-    content, number = case.content, common.modulus_option(options.modulus)
-    section = content.frame or content.pendulum
-    if section is None or content.envelope is None:
-        raise RefusedError("envelope", None, "a structure and a section [envelope]")
-    if number is None and content.frame and not content.frame.is_whole:
-        raise RefusedError("frame.modulus", None, "a modulus, or --modulus FILE.nc")
-    structure = section.structure(number)
-    (task,) = envelope.tasks(content.envelope, ())
-    stage = envelope.stage(structure, task)
-    path = Path(options.out) if options.out else None
-    data = stage.once(quiet=options.quiet, kept=path.parent if path else None)
-    envelope.require_tolerance(data, task, structure)
-    if path:
-        write_dataset(data, path, attributes(case.text, stage.key))
-    document = envelope.document(data, task.fuzzy)
-    common.answer(options, document, out, run_text({"envelopes": {"all": document}}))
+    case, store = common.opened(options, KEYS)
+    chain, results = Chain(case.content, store), Results(case.content)
+    chain.motion(results, chain.structure(common.modulus_option(options.modulus)), studies=False)
+    document = results.document()
+    common.answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0

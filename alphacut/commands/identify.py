@@ -9,7 +9,7 @@ from typing import TextIO
 from alphacut.case.load import load
 from alphacut.commands.options import add_common, add_modulus, answer, modulus_option
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.report.results import identified
+from alphacut.report.tables import run_text
 from alphacut.stages.identify import learned
 
 ABOUT = "inputs of a frame from its measured natural modes"
@@ -27,6 +27,6 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
     if content.identify is None or content.frame is None or content.envelope is None:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
     frame = content.frame.structure(modulus_option(options.modulus))
-    document = learned(content.identify, frame, content.envelope.alpha).document()
-    answer(options, document, out, "".join(f"{line}\n" for line in identified(document)))
+    document, _ = learned(content.identify, frame, content.envelope.alpha)
+    answer(options, document, out, run_text({"update": document}))
     return 0

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TextIO
+from pathlib import Path
+from typing import TextIO
 
-from alphacut.commands.parser import PETSC_PREFIX
+from alphacut.case.load import Case, load
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.files import as_json, write_text
-from alphacut.io.problem import BadInput
-
-if TYPE_CHECKING:
-    from alphacut.case.content import Content
+from alphacut.stages.modulus import read_number
+from alphacut.stages.store import Store
 
 SAMPLE = {
     "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
@@ -54,8 +53,10 @@ def add_keys(parser: argparse.ArgumentParser, keys: Mapping[str, tuple[str, str]
         parser.add_argument(option, metavar="VALUE", help=about)
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Adds ``--workers``."""
+def add_run(parser: argparse.ArgumentParser, place: str = "nothing is kept") -> None:
+    """Adds ``--out`` and ``--workers``."""
+    about = f"folder for results ({place} if left out); what is up to date there is taken"
+    parser.add_argument("--out", metavar="FOLDER", help=about)
     parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes (default 1)")
 
 
@@ -68,13 +69,29 @@ def add_modulus(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def opened(
+    options: argparse.Namespace, keys: Mapping[str, tuple[str, str]] | None = None
+) -> tuple[Case, Store]:
+    """The case, changed as the options say, and the folder of the results.
+
+    Raises:
+        BadInput: The case has problems.
+        RefusedError: There are fewer than one worker.
+    """
+    require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
+    case = load(options.case, changes(options, keys or {}))
+    folder = Path(options.out) if options.out else None
+    return case, Store(folder, case.text, quiet=options.quiet, workers=options.workers)
+
+
 def changes(options: argparse.Namespace, keys: Mapping[str, tuple[str, str]]) -> list[str]:
     """Changes of the case by ``--set`` and by the options that stand for keys, as KEY=VALUE."""
-    values = {key: getattr(options, _attribute(option)) for option, (key, _) in keys.items()}
+    values = {key: getattr(options, destination(option)) for option, (key, _) in keys.items()}
     return [*options.set, *(f"{key}={x}" for key, x in values.items() if x is not None)]
 
 
-def _attribute(option: str) -> str:
+def destination(option: str) -> str:
+    """Name of the attribute of an option."""
     return option.removeprefix("--").replace("-", "_")
 
 
@@ -91,49 +108,20 @@ def answer(
         out.write(text)
 
 
-def require_workers(count: int) -> None:
-    """Refuses fewer than one worker.
-
-    Raises:
-        RefusedError: There are fewer.
-    """
-    if count < 1:
-        raise RefusedError("--workers", count, "a whole number 1 or more")
-
-
-def require_prism(petsc: Mapping[str, str], content: Content | None = None) -> None:
-    """Refuses PETSc options where no prism elements are solved.
-
-    Args:
-        petsc: The options, without their prefix.
-        content: The case; None for a command that solves no cell.
-
-    Raises:
-        RefusedError: There are such options.
-    """
-    prism = content is not None and content.round and content.modulus.method == "prism"
-    if petsc and not prism:
-        option = PETSC_PREFIX + next(iter(petsc))
-        raise RefusedError(option, "PETSc's", "options of run, cell, modulus with method prism")
-
-
 def modulus_option(text: str | None) -> FuzzyNumber | None:
     """The modulus of ``--modulus`` in Pa: a quantity, or the α-cuts of a file.
 
     Raises:
-        BadInput: It is no positive modulus.
+        RefusedError: It is no positive modulus.
     """
     if text is None:
         return None
     if text.endswith(".nc"):
-        from alphacut.stages.modulus import read_number
-
-        return read_number(text)
-    allowed = "a stress such as '[22.8, 24.8, 25.8] GPa', or FILE.nc"
+        return read_number(text, "--modulus")
+    allowed = "a stress above 0 such as '[22.8, 24.8, 25.8] GPa', or FILE.nc"
     try:
         number = quantity.fuzzy(text, "Pa")
     except ValueError as error:
-        raise BadInput.of("--modulus", str(error), text, allowed) from None
-    if not number.support.lower > 0:
-        raise BadInput.of("--modulus", "out of range", text, "greater than 0")
+        raise RefusedError("--modulus", text, allowed, str(error)) from None
+    require(number.support.lower > 0, "--modulus", text, allowed)
     return number

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
-from typing import NoReturn
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NoReturn
 
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.problem import BadInput, Problem, suggestion
+
+if TYPE_CHECKING:
+    from alphacut.case.content import Content
 
 PETSC_PREFIX = "-rve_"
 
@@ -22,22 +26,14 @@ class Parser(argparse.ArgumentParser):
         )
         if choice:
             known = [name.strip(" '") for name in choice[2].split(",")]
-            close = suggestion(choice[1], known)
-            raise BadInput.of("command", "", choice[1], ", ".join(known), close)
-        raise BadInput.of(self.prog.removeprefix("alphacut "), f"{message}; see --help")
+            raise RefusedError("command", choice[1], ", ".join(known), suggestion(choice[1], known))
+        raise BadInput(Problem(self.prog.removeprefix("alphacut "), f"{message}; see --help"))
 
-    def refuse(self, words: Sequence[str]) -> NoReturn:
-        """Raises a problem for each word that is no option of this command."""
+    def refuse(self, word: str) -> NoReturn:
+        """Raises the problem of a word that is no option of this command."""
         known = [name for name in self._option_string_actions if name.startswith("--")]
-        here = self.prog.removeprefix("alphacut ")
-        raise BadInput(
-            [
-                Problem(
-                    here, f"has no option {word}", "", ", ".join(known), suggestion(word, known)
-                )
-                for word in words
-            ]
-        )
+        allowed, cure = ", ".join(known), suggestion(word, known)
+        raise RefusedError(f"{self.prog.removeprefix('alphacut ')}: option", word, allowed, cure)
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
@@ -54,3 +50,19 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
         has_value = has_value and not rest[0].endswith(".toml")
         petsc[word.removeprefix(PETSC_PREFIX)] = rest.pop(0) if has_value else ""
     return ours, petsc
+
+
+def require_prism(petsc: Mapping[str, str], content: Content | None = None) -> None:
+    """Refuses PETSc options where no prism elements are solved.
+
+    Args:
+        petsc: The options, without their prefix.
+        content: The case; None for a command that solves no cell.
+
+    Raises:
+        RefusedError: There are such options.
+    """
+    prism = content is not None and content.round and content.modulus.method == "prism"
+    option = PETSC_PREFIX + next(iter(petsc), "")
+    allowed = "options of run, cell, modulus with method prism"
+    require(bool(prism or not petsc), option, "PETSc's", allowed)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.io.files import whole_file
 from alphacut.rve.cell import LOADS, Cell
 
@@ -17,48 +17,34 @@ if TYPE_CHECKING:
 
     from alphacut.rve.prism.fields import CellFields
 
-# From Basix's order of a wedge's edges to meshio's, Abaqus's and Gmsh's reader's: lower triangle,
-# upper triangle, vertical edges.
+# From Basix's order of a wedge's edges to that of meshio, Abaqus and Gmsh: lower triangle, upper
+# triangle, vertical edges; from there to VTK's, the lower triangle seen from outside.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
-# from there to VTK's: the lower triangle seen from outside
 MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
-VTK_ORDER = {".vtu", ".vtk", ".xdmf"}
-FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".xdmf": "xdmf", ".msh": "gmsh"}
 COMPONENTS = ("11", "22", "12")
 
 
 def check_ending(path: Path) -> None:
-    """Refuses an ending whose format holds no quadratic elements with fields.
+    """Refuses a name of another format than VTK's.
 
     Raises:
-        RefusedError: It names none.
+        RefusedError: It is one.
     """
-    if path.suffix not in FORMATS:
-        raise RefusedError("--export", str(path), f"names that end in {', '.join(FORMATS)}")
+    require(path.suffix == ".vtu", "--export", str(path), "names that end in .vtu")
 
 
 def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
-    """Writes a mesh in the format that the file's ending names, whole or not at all.
-
-    Raises:
-        RefusedError: See `check_ending`.
-    """
+    """Writes a mesh for VTK, whole or not at all."""
     import meshio
 
-    check_ending(path)
-    if path.suffix in VTK_ORDER:
-        wedges = [("wedge15", mesh.cells[0].data[:, MIRRORED])]
-        mesh = meshio.Mesh(mesh.points, wedges, mesh.point_data, mesh.cell_data)
-    # else its numbers are in a second file, by the partial one's name
-    own = {"data_format": "XML"} if path.suffix == ".xdmf" else {}
     with whole_file(path) as partial:
-        meshio.write(partial, mesh, file_format=FORMATS[path.suffix], **own)
+        meshio.write(partial, mesh, file_format="vtu")
 
 
 def wedges(
     points: Array, cells: Rows, phase: Rows, data: dict[str, Array] | None = None
 ) -> meshio.Mesh:
-    """Quadratic wedges with their phase, 0 the matrix, 1 the particle.
+    """Quadratic wedges in VTK's order with their phase, 0 the matrix, 1 the particle.
 
     Args:
         points: (x1, x2, θ), shape (n, 3).
@@ -71,7 +57,8 @@ def wedges(
 
     # meshio 5.3 reads and writes this cell but has forgotten its dimension
     topological_dimension.setdefault("wedge15", 3)
-    return meshio.Mesh(points, [("wedge15", cells[:, ORDER])], data, {"phase": [phase]})
+    cells = cells[:, ORDER][:, MIRRORED]
+    return meshio.Mesh(points, [("wedge15", cells)], data, {"phase": [phase]})
 
 
 def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.figures import envelope, follower, frame, identified, image, modulus, radius, shares
+from alphacut.figures import envelope, follower, frame, identified, modulus, radius
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
@@ -34,13 +34,13 @@ def drawings(results: Results) -> Iterator[Drawing]:
     """Name and function of each figure that the results allow."""
     yield from _material(results)
     yield from _structure(results)
-    yield from _identified(results)
+    if results.learned is not None and "refuted" not in results.learned:
+        yield "update-inputs", partial(identified.inputs, results.learned)
     for question in QUESTIONS:
         if question.key in results.answers:
             yield question.key, partial(question.figure, results.answers[question.key])
     for task in results.tasks:
         yield from envelope.drawings(task, results.envelopes[task.name])
-    yield from _shares(results)
 
 
 def _material(results: Results) -> Iterator[Drawing]:
@@ -59,52 +59,37 @@ def _material(results: Results) -> Iterator[Drawing]:
         if results.is_paper:
             yield "fig19-membership", partial(modulus.membership, data)
     if results.image is not None:
-        yield "image", partial(image.image, results.image)
+        yield "image", partial(modulus.image, results.image)
     if results.response is not None:
         yield "response", partial(modulus.response, results.response)
 
 
 def _structure(results: Results) -> Iterator[Drawing]:
-    """The structure, its record, its fuzzy mapping and the walk of the Graph Follower."""
+    """The structure, its fuzzy mapping and the walk of the Graph Follower."""
     if not results.envelopes or results.structure is None:
         return
     yield "fig20-mapping", partial(envelope.mapping, results)
     if (section := results.content.frame) is not None:
         yield "fig26-frame", partial(frame.frame, section)
         yield "fig27-chain", partial(frame.chain, section)
-    if results.structure.linear is not None and results.structure.linear.ground is not None:
-        yield "record", partial(envelope.record, results.structure.linear.ground)
     richest = max(results.tasks, key=lambda task: len(task.fuzzy))
     if richest.section.method == "graph-follower":
         yield "fig21-25-graph-follower", partial(follower.follower, results, richest)
 
 
-def _identified(results: Results) -> Iterator[Drawing]:
-    """Inputs and envelopes before and after measured modes, unless they refute the frame."""
-    bands, learned = results.update, results.learned
-    if learned is None or bands is None or learned.posterior is None:
-        return
-    yield "update-inputs", partial(identified.inputs, learned.document())
-    for output in map(str, bands["output"].values):
-        yield f"update-{output}", partial(identified.bands, bands, output)
-
-
-def _shares(results: Results) -> Iterator[Drawing]:
-    if (data := results.shares) is None:
-        return
-    if "modulus_share" in data:
-        yield "shares-modulus", partial(shares.of_modulus, data)
-    if "share" in data:
-        yield "shares-over-time", partial(shares.over_time, data)
-
-
 def drawn(
-    results: Results, executor: Executor | None, *, fresh: bool = False, quiet: bool = False
+    results: Results,
+    folder: Path,
+    executor: Executor | None,
+    *,
+    fresh: bool = False,
+    quiet: bool = False,
 ) -> list[str]:
     """Draws every figure as SVG and PNG into figures/, unless they show the same already.
 
     Args:
         results: Of the run.
+        folder: Folder of the results.
         executor: Processes that draw side by side; None: this one draws.
         fresh: Whether figures that are up to date are drawn as well.
         quiet: Whether no progress is shown.
@@ -112,27 +97,21 @@ def drawn(
     Returns:
         Names of the files, in the folder of the results.
     """
-    key = fingerprint(
-        {
-            "content": results.content,
-            "answers": results.answers,
-            "results": {name: x.attrs.get("fingerprint") for name, x in results.datasets.items()},
-            "libraries": [version_of(name) for name in ("matplotlib", "pyvista")],
-        },
-        (*NESTED, "alphacut"),
-    )
-    before = _kept(results.folder)
+    content = [results.content, results.answers]
+    content += [sorted(x.attrs["fingerprint"] for x in results.datasets.values())]
+    content += [version_of(name) for name in ("matplotlib", "pyvista")]
+    key = fingerprint(content, (*NESTED, "alphacut"))
+    before = _kept(folder)
     names = list(map(str, before.get("figures", ())))
-    there = bool(names) and all((results.folder / name).is_file() for name in names)
-    if there and not fresh and before.get("fingerprint") == key:
-        return [*_particles(results), *names]
-    for name in names:
-        if re.fullmatch(r"figures/[\w+-][\w.+-]*\.(svg|png)", name):
-            (results.folder / name).unlink(missing_ok=True)
-    names, whole = _draw(results, executor, quiet=quiet)
-    if whole:
-        write_text(results.folder / KEPT, as_json({"fingerprint": key, "figures": names}))
-    return [*_particles(results), *names]
+    there = bool(names) and all((folder / name).is_file() for name in names)
+    if fresh or not there or before.get("fingerprint") != key:
+        for name in filter(re.compile(r"figures/[\w+-][\w.+-]*\.(svg|png)").fullmatch, names):
+            (folder / name).unlink(missing_ok=True)
+        names, whole = _draw(results, folder, executor, quiet=quiet)
+        if whole:
+            write_text(folder / KEPT, as_json({"fingerprint": key, "figures": names}))
+    particles = microstructure.pictures(folder) if results.microstructure is not None else []
+    return [*(str(path.relative_to(folder)) for path in particles), *names]
 
 
 def _kept(folder: Path) -> Document:
@@ -143,27 +122,29 @@ def _kept(folder: Path) -> Document:
         return {}
 
 
-def _draw(results: Results, executor: Executor | None, *, quiet: bool) -> tuple[list[str], bool]:
-    """Draws all figures in parts; their names, and False where a mesh found no display."""
-    meshes = {name: _mesh(results, executor, name, kind) for name, kind in _meshes(results)}
-    parts = [submitted(executor, draw_part, results, part) for part in range(PARTS)]
+def _draw(
+    results: Results, folder: Path, executor: Executor | None, *, quiet: bool
+) -> tuple[list[str], bool]:
+    """Draws all figures in parts; their names, and False where the mesh found no display."""
+    mesh = _mesh(results, folder, executor)
+    parts = [submitted(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
     with progress("figures", quiet=quiet) as tick:
         for count, part in enumerate(parts, start=1):
             names += part.result()
             if tick:
                 tick(count / PARTS)
-    made = {name: mesh.result() for name, mesh in meshes.items()}
+    made = {name: future.result() for name, future in mesh.items()}
     return [*sorted(names), *(name for name in made if made[name])], all(made.values())
 
 
-def draw_part(results: Results, part: int) -> list[str]:
+def draw_part(results: Results, folder: Path, part: int) -> list[str]:
     """Draws every figure whose place leaves the rest `part`; names of their files."""
     with style():
         return [
-            str(path.relative_to(results.folder))
+            str(path.relative_to(folder))
             for name, make in list(drawings(results))[part::PARTS]
-            for path in save(make(), results.folder / "figures" / file_stem(name, results))
+            for path in save(make(), folder / "figures" / file_stem(name, results))
         ]
 
 
@@ -172,22 +153,10 @@ def file_stem(name: str, results: Results) -> str:
     return name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
 
 
-def _particles(results: Results) -> list[str]:
-    """Names of the figures of the microstructure stage, where the case has it."""
-    pictures = microstructure.pictures(results.folder) if results.microstructure is not None else []
-    return [str(path.relative_to(results.folder)) for path in pictures]
-
-
-def _meshes(results: Results) -> Iterator[tuple[str, str]]:
-    """Files and kinds of fig. 15 and of the stress on slices, where prisms gave the modulus."""
-    if results.modulus is not None and results.content.modulus.method == "prism":
-        yield f"figures/{file_stem('fig15-prism-mesh', results)}.png", "mesh"
-        yield "figures/stress-on-slices.png", "stress"
-
-
-def _mesh(results: Results, executor: Executor | None, name: str, kind: str) -> Future[bool]:
-    content = results.content
-    assert content.radius is not None
-    assert content.round is not None
-    cell = modal_cell(content.radius, content.round)
-    return submitted(executor, draw_mesh, cell, content.mesh, results.folder / name, kind)
+def _mesh(results: Results, folder: Path, executor: Executor | None) -> dict[str, Future[bool]]:
+    """Fig. 15 under way by its file, where prisms gave the modulus."""
+    if results.modulus is None or results.content.modulus.method != "prism":
+        return {}
+    name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
+    cell = modal_cell(*results.content.round_cell)
+    return {name: submitted(executor, draw_mesh, cell, results.content.mesh, folder / name)}

@@ -26,8 +26,6 @@ def caption(stem: str, *, paper: bool) -> str:
     number, name = (parts[1], parts[2]) if parts else ("", stem)
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):
         words = f"Envelope of {match[2]}" + ("" if match[1] == "all" else f", study {match[1]}")
-    elif name.startswith("update-") and name not in FIGURES:
-        words = f"Envelope of {name.removeprefix('update-')} before and after the measurement"
     else:
         words = FIGURES.get(name.replace("_", "-"), name.replace("-", " "))
     if not (paper and number):

@@ -1,4 +1,4 @@
-"""Envelopes over time (Figs. 28 to 35), the fuzzy mapping behind them (Fig. 20), the record."""
+"""Envelopes over time (Figs. 28 to 35), and the fuzzy mapping behind them (Fig. 20)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from alphacut.figures import style as look
 from alphacut.figures.captions import INPUTS
-from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.units import engineering
@@ -85,7 +84,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     output = names[-1 if "q" in names[-1] else 0]
     inputs, step = structure.inputs(task.fuzzy), task.section.step
     end = round(min(duration, task.duration) / step) * step
-    scheme = task.section.integrator or ("exact" if structure.linear else None)
+    scheme = task.section.integrator or ("exact" if structure.frame else None)
     flow = structure.flow(tuple(inputs), end, step, scheme)
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
@@ -98,19 +97,4 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     time_axes(axes, flow.time, output)
     level = f"α = {float(dataset['alpha']):g}"
     look.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
-    return drawn
-
-
-def record(ground: Accelerogram) -> Figure:
-    """The record as it is read, its peak marked."""
-    drawn, axes = look.figure(look.WIDTH, 2.4)
-    acceleration = np.asarray(ground.acceleration)
-    time, peak = np.arange(len(acceleration)) * ground.step, int(np.abs(acceleration).argmax())
-    axes.plot(time, acceleration, color=look.INK, lw=0.7)
-    axes.plot(time[peak], acceleration[peak], "o", color=look.ORANGE, ms=4)
-    strongest = engineering(float(acceleration[peak]), "m/s^2", digits=3)
-    look.title(axes, f"peak {strongest} at {time[peak]:.4g} s")
-    axes.set_xlabel("time t (s)")
-    axes.set_ylabel("ground acceleration (m/s²)")
-    axes.set_xlim(time[0], time[-1])
     return drawn

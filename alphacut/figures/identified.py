@@ -1,4 +1,4 @@
-"""Inputs and envelopes before and after measured modes."""
+"""Inputs before and after measured modes."""
 
 from __future__ import annotations
 
@@ -6,37 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.figures.envelope import time_axes
-from alphacut.figures.style import BLUE, GREY, Look, figure, title
+from alphacut.figures.style import BLUE, GREY, Look, figure
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-def bands(dataset: xarray.Dataset, output: str) -> Figure:
-    """Envelope with the priors and with what was identified, at the lowest level."""
-    drawn, axes = figure()
-    shown, time = dataset.sel(output=output).isel(alpha=0), dataset["time"].values
-    looks = ("prior", GREY, 0.55, "before"), ("posterior", BLUE, 0.9, "after")
-    for knowledge, colour, opacity, words in looks:
-        band = shown.sel(knowledge=knowledge)
-        fill: Look = {"color": colour, "alpha": opacity, "label": f"{words} the measurement"}
-        axes.fill_between(time, band["lower"], band["upper"], lw=0, **fill)
-    time_axes(axes, time, output)
-    title(axes, f"{output} at α = {float(dataset['alpha'].values[0]):g}")
-    axes.legend(fontsize=8, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
-    return drawn
 
 
 def inputs(document: Document) -> Figure:
     """Each input's interval at every level over that of its prior, over the middle of that.
 
     Args:
-        document: What `Learned.document` says.
+        document: What `stages.identify.learned` gives.
     """
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
     drawn, axes = figure(height=0.9 + 0.32 * len(names))

@@ -1,4 +1,4 @@
-"""Fuzzy modulus and stress: curves (Fig. 16), means (17), E and ν (18), a cut (19), p-boxes."""
+"""Fuzzy modulus and stress: Figs. 16 to 19, p-boxes, and the proved modulus of an image."""
 
 from __future__ import annotations
 
@@ -150,3 +150,18 @@ def quantiles(axes: Axes, dataset: xarray.Dataset) -> None:
         line: look.Look = {"color": MARKS[number % len(MARKS)], "lw": 1.3, "marker": "o", "ms": 3}
         line["label"] = f"{probability:g}"
         axes.plot(look.outline(*ends.values / GPA), look.outline(alpha, alpha), **line)
+
+
+def image(dataset: xarray.Dataset) -> Figure:
+    """Phases as greys to the left, α-cuts of E to the right."""
+    import matplotlib.pyplot as plt
+
+    drawn, (picture, cuts) = plt.subplots(1, 2, figsize=(look.WIDTH, 3.4), width_ratios=(1, 1.4))
+    picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
+    picture.set_xticks([])
+    picture.set_yticks([])
+    look.title(picture, "phases as segmented")
+    lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
+    look.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
+    look.membership_axes(cuts, "Young's modulus E, plane strain (GPa)")
+    return drawn

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import atexit
-import json
-import math
 import os
 import shutil
 import sys
-import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any, NoReturn, TextIO
+from typing import Any, TextIO
 
 import numpy as np
+from pydantic_core import to_json
 
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.problem import printable
@@ -38,33 +35,6 @@ def rank() -> int:
 def ranks() -> int:
     """The number of MPI ranks as mpirun tells it; 1 where there is none."""
     return next((int(os.environ[name]) for name in SIZES if name in os.environ), 1)
-
-
-def open_streams() -> None:
-    """Give standard streams that are closed the null device, for other files would take them."""
-    while (handle := os.open(os.devnull, os.O_RDWR)) < 3:
-        os.set_inheritable(handle, True)
-    os.close(handle)
-    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - to the end
-    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-
-
-def leave(status: int) -> NoReturn:
-    """End the program; its memory is not taken apart first, up to 0.2 s once PETSc is loaded."""
-    mpi = sys.modules.get("mpi4py.MPI")
-    if threading.active_count() > 1:  # waited for
-        sys.exit(status)
-    try:
-        atexit._run_exitfuncs()  # as multiprocessing does
-        sys.stdout.flush()
-    except OSError as error:  # BrokenPipeError where its reader wanted no more
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        if not isinstance(error, BrokenPipeError):
-            say(f"standard output cannot be written: {error.strerror}")
-            status = status or 1
-    if mpi and not mpi.Is_finalized() and any(name in os.environ for name in (*RANKS, *SIZES)):
-        mpi.Finalize()  # for mpirun or its like
-    os._exit(status)
 
 
 def is_special(path: Path) -> bool:
@@ -106,55 +76,39 @@ def write_text(path: Path | str, text: str) -> None:
         partial.write_text(text, encoding="utf-8")
 
 
-def plain(value: object) -> object:
-    """A value that JSON can hold; what is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if isinstance(value, str | int | bool | None) else str(value)
-
-
 def as_json(document: Mapping[str, object], *, indent: int | None = None) -> str:
-    """One JSON object, ending in a line feed; arrays of numbers stay on one line."""
-    return json.dumps(plain(document), indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
+    """One JSON object, ending in a line feed; what is not finite becomes null."""
+    options: dict[str, Any] = {"indent": indent, "inf_nan_mode": "null", "fallback": _plain}
+    return to_json(document, **options).decode() + "\n"
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return dict(value)
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)
 
 
 @contextmanager
-def standard_output(json_to_stdout: bool) -> Iterator[TextIO]:
-    """The stream that answers go to.
+def standard_output(*, alone: bool) -> Iterator[TextIO]:
+    """The stream that answers go to, of the first MPI rank only.
 
-    With ``--json -`` everything that libraries print, C ones too, goes to standard error, so that
-    the one JSON object stands alone; on every MPI rank but the first, nothing is printed at all.
+    Args:
+        alone: Whether all else that is printed, by C libraries too, goes to standard error.
     """
-    closed = getattr(sys.stdout, "name", "") == os.devnull  # another file may stand in its place
-    if rank() == 0 and (closed or not json_to_stdout):
+    if not alone and rank() == 0:
         yield sys.stdout
+        sys.stdout.flush()
         return
     sys.stdout.flush()
     kept = os.dup(1)
-    target = os.open(os.devnull, os.O_WRONLY) if rank() else 2
-    os.dup2(target, 1)
-    stream = os.fdopen(
-        kept if rank() == 0 else os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8"
-    )
+    os.dup2(2, 1)
     try:
-        with redirect_stdout(sys.stderr if rank() == 0 else stream):
+        target = os.dup(kept) if rank() == 0 else os.open(os.devnull, os.O_WRONLY)
+        with redirect_stdout(sys.stderr), os.fdopen(target, "w", encoding="utf-8") as stream:
             yield stream
     finally:
-        stream.flush()
-        sys.stdout.flush()
         os.dup2(kept, 1)
-        if rank():
-            os.close(kept)
-            os.close(target)
-        stream.close()
+        os.close(kept)
 
 
 def say(message: str) -> None:

@@ -1,4 +1,4 @@
-"""Measured natural modes, ``mode,frequency,q1,q2``, or a recorded motion from a CSV file."""
+"""Measured natural modes from a CSV file: ``mode,frequency [Hz],q1,q2``."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.io.csv_rows import CsvFile
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.stochastic.particles.csv_columns import fields, number
 
-KEY = "update.measured"
+HEADER = re.compile(r"mode\s*,\s*frequency(\s*\[Hz\])?(\s*,\s*q[1-9]\d*)*\s*")
 ALLOWED = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
-MOST = 1e9
-"""Largest frequency in Hz, and amplitude."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,64 +32,37 @@ class ModeRows:
 
 
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
-    """The measurements of each mode, by rising number.
+    """The measurements of each mode, by rising number; an empty amplitude was not measured.
 
     Raises:
-        BadInput: The file is missing, its header or a row is wrong, or a mode has some amplitudes
-            in one row and not in another.
+        RefusedError: The file is missing, its header or a row is wrong, or a mode has some
+            amplitudes in one row and not in another.
     """
-    file = CsvFile(path, KEY, "file of modes", ALLOWED)
-    (line, head), *rows = file.rows()
-    floors = _floors(file, line, head)
-    numbers = [(line, _numbers(file, line, row, len(head))) for line, row in rows]
-    modes = sorted({row[0] for _, row in numbers})
-    return tuple(
-        _mode(int(mode), [(line, row) for line, row in numbers if row[0] == mode], floors, file)
-        for mode in modes
+    (_, head), *rows = fields(path)
+    floors = (
+        [int(cell.strip()[1:]) for cell in head[2:]] if HEADER.fullmatch(",".join(head)) else []
     )
+    whole = len(set(floors)) == len(head) - 2
+    require(whole, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
+    modes: dict[int, list[list[float]]] = {}
+    for row, cells in rows:
+        mode, frequency = (number(path, row, cells, k) for k in (0, 1))
+        allowed = "a mode from 1 and a frequency above 0"
+        right = mode >= 1 and mode % 1 == 0 and frequency > 0
+        require(right, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
+        shape = [
+            number(path, row, cells, k) if cells[k : k + 1] != [""] else np.nan
+            for k in range(2, len(head))
+        ]
+        modes.setdefault(int(mode), []).append([frequency, *shape])
+    return tuple(_mode(mode, np.array(modes[mode]), floors, path) for mode in sorted(modes))
 
 
-def _floors(file: CsvFile, line: int, head: list[str]) -> tuple[int, ...]:
-    words = [word.strip() for word in head]
-    floors = [re.fullmatch(r"q([1-9]\d*)", word) for word in words[2:]]
-    known = tuple(int(match[1]) for match in floors if match)
-    first = len(words) > 1 and re.fullmatch(r"frequency(\s*\[Hz\])?", words[1])
-    if words[0] != "mode" or not first or len(set(known)) != len(floors):
-        raise file.refuse(line, "the header is wrong", ",".join(head), ALLOWED)
-    return known
-
-
-def _numbers(file: CsvFile, line: int, row: list[str], count: int) -> list[float]:
-    """Entries of a row; an empty amplitude was not measured."""
-    try:
-        values = [float(text) if text.strip() else float("nan") for text in row]
-    except ValueError:
-        values = []
-    if (
-        len(values) != count
-        or not (values[0] >= 1 and values[0] % 1 == 0)
-        or not 1 / MOST < values[1] < MOST
-        or (np.abs(values[2:]) > MOST).any()
-    ):
-        allowed = (
-            f"a mode from 1, a frequency in Hz above 0 and amplitudes, none above {MOST:g}, with"
-            " points in the numbers"
-        )
-        raise file.refuse(line, "this row is no measured mode", ",".join(row), allowed)
-    return values
-
-
-def _mode(
-    mode: int, rows: list[tuple[int, list[float]]], floors: tuple[int, ...], file: CsvFile
-) -> ModeRows:
-    values = np.array([row for _, row in rows])
-    amplitudes = {}
-    for column, floor in enumerate(floors, start=2):
-        missing = np.isnan(values[:, column])
-        if missing.any() and not missing.all():
-            line = rows[int(missing.argmax())][0]
-            what = f"mode {mode} has an amplitude of floor {floor} in some rows only"
-            raise file.refuse(line, what, allowed="one in each row of the mode, or none")
-        if not missing.any():
-            amplitudes[floor] = values[:, column]
-    return ModeRows(mode, values[:, 1], amplitudes if len(amplitudes) > 1 else {})
+def _mode(mode: int, values: Array, floors: list[int], path: Path) -> ModeRows:
+    """The measurements of one mode, shape (rows, 1 + floors)."""
+    missing = np.isnan(values[:, 1:])
+    if (missing.any(axis=0) != missing.all(axis=0)).any():
+        allowed = "an amplitude of a floor in every row of a mode, or in none"
+        raise RefusedError(f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
+    shape = {floor: values[:, k] for k, floor in enumerate(floors, 1) if not missing[0, k - 1]}
+    return ModeRows(mode, values[:, 0], shape if len(shape) > 1 else {})

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document, whole_file
 from alphacut.io.provenance import FORMAT, door
 
@@ -38,9 +38,9 @@ def require_known(facts: Mapping[str, object], path: Path) -> None:
         RefusedError: The format is another one.
     """
     version = facts.get("format_version", FORMAT)
-    if version != FORMAT:
-        cure = f"make it anew by {door('run', 'CASE.toml', '--fresh')}"
-        raise RefusedError(str(path), f"of format {version}", f"files of format {FORMAT}", cure)
+    cure = f"make it anew by {door('run', 'CASE.toml', '--fresh')}"
+    allowed = f"files of format {FORMAT}"
+    require(version == FORMAT, str(path), f"of format {version}", allowed, cure)
 
 
 def write_dataset(dataset: xarray.Dataset, path: Path | str, facts: Mapping[str, object]) -> None:
@@ -66,6 +66,12 @@ def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:
     return data
 
 
+def document_of(data: xarray.Dataset) -> Document:
+    """Numbers that a dataset states as JSON."""
+    document: Document = json.loads(data.attrs["document"])
+    return document
+
+
 def fingerprint_of(path: Path) -> str:
     """The fingerprint in a NetCDF file; empty if it cannot be read.
 
@@ -89,20 +95,18 @@ def read_summary(folder: Path) -> Document:
     Raises:
         RefusedError: There is none, it is damaged, or its format is another one.
     """
-    path, cure = folder / "summary.json", f"make it anew by {door('run', 'CASE.toml')}"
+    path = folder / "summary.json"
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
-    except OSError:
-        raise RefusedError(str(folder), "without summary.json", "results of a run", cure) from None
-    except (ValueError, RecursionError):
-        raise RefusedError(str(path), "no JSON", "the summary of a run", cure) from None
-    whole = isinstance(summary, dict) and all(
-        isinstance(summary.get(name), kind) for name, kind in NEEDED.items()
-    )
+        whole = all(isinstance(summary[name], kind) for name, kind in NEEDED.items())
+    except OSError as error:
+        raise damaged(folder, "without summary.json") from error
+    except (ValueError, RecursionError, KeyError, TypeError) as error:
+        raise damaged(path, f"damaged ({type(error).__name__})") from error
     if not whole:
-        raise RefusedError(str(path), "damaged", "the summary of a run", cure)
+        raise damaged(path, "damaged")
     require_known(summary, path)
-    return summary
+    return dict(summary)
 
 
 def own_files(summary: Document, folder: Path) -> list[Path]:
@@ -114,15 +118,12 @@ def own_files(summary: Document, folder: Path) -> list[Path]:
     keys: dict[str, str] = summary["fingerprints"]
     files = [folder / f"{name}.nc" for name in keys if re.fullmatch(r"[\w+-][\w.+-]*", name)]
     there = [file for file in files if file.is_file()]
-    other = [file.name for file in there if fingerprint_of(file) != keys[file.stem]]
-    if other:
-        raise RefusedError(
-            str(folder), f"with {', '.join(other)} of another run", "one run's files"
-        )
+    other = ", ".join(file.name for file in there if fingerprint_of(file) != keys[file.stem])
+    require(not other, str(folder), f"with {other} of another run", "one run's files")
     return there
 
 
-def damaged(path: Path, error: Exception) -> RefusedError:
-    """The error of a summary whose entries cannot be used."""
+def damaged(path: Path, what: str) -> RefusedError:
+    """The error of results that cannot be used."""
     cure = f"make it anew by {door('run', 'CASE.toml')}"
-    return RefusedError(str(path), f"damaged ({type(error).__name__})", "a whole summary", cure)
+    return RefusedError(str(path), what, "whole results of a run", cure)

@@ -12,7 +12,6 @@ from pathlib import Path
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import is_special
 
-ENDINGS = {"FILE.nc": (".nc",), "FILE.html": (".html",)}
 OUTPUTS = ("out", "json", "export", "csv")
 """Options that name what is written."""
 
@@ -26,11 +25,8 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
     for action in parser._actions:
         value = getattr(options, action.dest, None)
         if action.dest in OUTPUTS and isinstance(value, str) and value != "-":
-            option, kind = action.option_strings[-1], str(action.metavar)
-            require_writable(option, value, folder=kind == "FOLDER")
-            endings = ENDINGS.get(kind, ())
-            if endings and Path(value).suffix.lower() not in endings:
-                raise RefusedError(option, value, f"a name that ends with {' or '.join(endings)}")
+            folder = action.metavar == "FOLDER"
+            require_writable(action.option_strings[-1], value, folder=folder)
 
 
 def require_writable(option: str, value: str, *, folder: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Self
 
@@ -63,25 +63,6 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
     def __init__(self, problems: Problem | Sequence[Problem]) -> None:
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(map(str, self.problems)))
-
-    @classmethod
-    def of(
-        cls,
-        key: str,
-        what: str = "",
-        value: str = "",
-        allowed: str = "",
-        cure: str = "",
-        *,
-        file: str = "",
-        line: int = 0,
-    ) -> Self:
-        """The error of one problem, from its fields."""
-        return cls(Problem(key, what, value, allowed, cure, file, line))
-
-    def within(self, file: str) -> Self:
-        """The error with a file in every problem that names none."""
-        return type(self)([p if p.file else replace(p, file=file) for p in self.problems])
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from alphacut.fuzzy.progress_bar import showing
 from alphacut.io.files import rank, say
 
 Tick = Callable[[float], None]
@@ -16,24 +17,14 @@ EVERY = 20.0
 
 @contextmanager
 def progress(title: str, *, quiet: bool = False) -> Iterator[Tick | None]:
-    """A bar on standard error for a task that reports the fraction done, 0 … 1.
-
-    Where standard error is no terminal, a line every `EVERY` seconds takes its place.
+    """A bar on standard error, or lines, for a task that reports the fraction done, 0 … 1.
 
     Yields:
         The function to report to; None where nothing is to be shown.
     """
-    if quiet or rank():
-        yield None
-    elif not sys.stderr.isatty():
-        yield _lines(title)
-    else:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        with Progress(console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(title, total=1.0)
-            yield lambda done: bar.update(task, completed=min(done, 0.99))
+    lines = None if quiet or sys.stderr.isatty() else _lines(title)
+    with showing(False if quiet or rank() else lines) as tick:
+        yield tick
 
 
 def _lines(title: str) -> Tick:

@@ -29,20 +29,18 @@ PACKAGES = {
     "scipy": "scipy",
     "xarray": "xarray",
 }
-
 NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own
 
 
 @cache
 def own_version() -> str:
     """Version of alphacut: from its installation, else from pyproject.toml beside it."""
-    try:
-        return version("alphacut")
-    except PackageNotFoundError:
-        import tomllib
+    if known := version_of("alphacut"):
+        return known
+    import tomllib
 
-        project = Path(__file__).resolve().parents[2] / "pyproject.toml"
-        return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
+    project = Path(__file__).resolve().parents[2] / "pyproject.toml"
+    return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
 
 
 def version_of(distribution: str) -> str:
@@ -61,39 +59,22 @@ def versions() -> dict[str, str]:
     return own | {name: known for name, known in others.items() if known}
 
 
-def sources(package: str) -> list[tuple[str, Path]]:
-    """Sources, Python and C, of one of this project's packages by name relative to it, sorted."""
-    root = Path(__file__).resolve().parents[1]
-    folder = root if package == "alphacut" else (root / package).resolve()
-    every = (file for kind in ("*.py", "*.c") for file in folder.rglob(kind))
-    files = ((file.relative_to(folder).as_posix(), file) for file in every)
-    other = () if package != "alphacut" else NESTED
-    return sorted(pair for pair in files if pair[0].partition("/")[0] not in other)
-
-
 @cache
 def source_digest(packages: tuple[str, ...]) -> str:
     """Digest of the source of some of this project's packages."""
-    digest = hashlib.sha256()
+    root, digest = Path(__file__).resolve().parents[1], hashlib.sha256()
     for package in packages:
-        for name, file in sources(package):
-            digest.update(name.encode() + file.read_bytes())
+        folder = root if package == "alphacut" else (root / package).resolve()
+        names = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
+        for name in sorted(names):
+            if package != "alphacut" or name.partition("/")[0] not in NESTED:
+                digest.update(name.encode() + names[name].read_bytes())
     return digest.hexdigest()
 
 
-def fingerprint(inputs: Mapping[str, object], packages: Sequence[str]) -> str:
+def fingerprint(inputs: object, packages: Sequence[str]) -> str:
     """Digest of everything that a result depends on: inputs, source, library versions."""
-    content = {
-        "inputs": inputs,
-        "source": source_digest(tuple(packages)),
-        "versions": versions(),
-        "format": FORMAT,
-    }
-    return digest(content)
-
-
-def digest(content: object) -> str:
-    """Digest of sections, numbers and texts."""
+    content = [inputs, source_digest(tuple(packages)), versions(), FORMAT]
     text = json.dumps(content, sort_keys=True, default=_canonical)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -117,7 +98,7 @@ def _canonical(value: object) -> object:
 def door(*words: object) -> str:
     """This program here, ``./enter python -m alphacut`` or ``alphacut``, and words to paste."""
     program = "./enter python -m alphacut" if os.environ.get("ALPHACUT_INSIDE") else "alphacut"
-    return f"{program} {shlex.join(map(str, words))}".strip()
+    return f"{program} {shlex.join(map(str, words))}"
 
 
 def command() -> str:
@@ -127,7 +108,7 @@ def command() -> str:
     return f"{name} {shlex.join(sys.argv[1:])}".strip()
 
 
-def attributes(case_text: str, key: str) -> dict[str, str | int]:
+def attributes(case_text: str, key: str) -> Mapping[str, str | int]:
     """Attributes that every NetCDF file carries."""
     return {
         "format_version": FORMAT,

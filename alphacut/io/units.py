@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from decimal import Decimal
 from functools import cache
 from typing import TYPE_CHECKING
@@ -79,20 +78,21 @@ MINUS = "\u2212"
 PREFIXED = ("m", "m/s", "m/s^2", "N", "N/m", "Pa", "s", "rad", "W", "J")
 
 
-def engineering(value: float, si: str, *, digits: int = 4, beside: float = 0.0) -> str:
-    """A value in `si` for people, ``−3.590 MN``, with the prefix of `beside` if larger."""
-    if si not in PREFIXED or not math.isfinite(value) or not (value or beside):
-        short = f"{value:.{digits}g}"
+def engineering(value: float, si: str, *, digits: int = 4) -> str:
+    """A value in `si` for people, with a prefix: ``−3.590 MN``."""
+    short = f"{value:.{digits}g}"
+    if si not in PREFIXED or not 1e-12 <= abs(float(short)) < 1e12:
         plain = f"{float(short):.0f}" if 1e4 <= abs(value) < 1e7 else short
         return f"{plain} {si}".strip().replace("-", MINUS)
-    largest = float(f"{max(abs(value), abs(beside)):.{digits}g}")
-    if not 1e-12 <= largest < 1e15:
-        return f"{value:.{digits}g} {si}".replace("-", MINUS)
-    exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
-    scaled = float(f"{value:.{digits}g}") / 10.0**exponent
-    places = max(0, digits - 1 - math.floor(math.log10(abs(scaled)))) if scaled else 0
-    number = f"{scaled:.{places}f}" if places < digits + 3 else f"{scaled:.{digits}g}"
+    exponent = _exponent(abs(float(short)))
+    scaled = float(short) / 10.0**exponent
+    places = max(digits, len(f"{abs(scaled):.0f}"))
+    number = f"{scaled:#.{places}g}".rstrip(".")
     return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+
+
+def _exponent(largest: float) -> int:
+    return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
 
 
 def fixed(value: float, places: int) -> str:
@@ -116,22 +116,8 @@ def between(low: float, high: float, nature: Nature, digits: int = 4) -> str:
     return " … ".join(dict.fromkeys(ends(low, high, nature, digits)))
 
 
-def largest_by_unit(values: Iterable[tuple[float, str]]) -> dict[str, float]:
-    """Largest magnitude among values of the same unit, for `engineering`."""
-    largest: dict[str, float] = {}
-    for value, si in values:
-        largest[si] = max(largest.get(si, 0.0), abs(value))
-    return largest
-
-
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:
     """Factor and unit for an axis whose values reach `largest`."""
     if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
         return 1.0, si
-    exponent = min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
-    return 10.0**-exponent, f"{PREFIXES[exponent]}{si}"
-
-
-def shown(value: float, unit: str, si: str) -> float:
-    """A value in `si`, in `unit`, for people."""
-    return float(Decimal(repr(float(value))) / factor(unit, si))
+    return 10.0 ** -_exponent(largest), f"{PREFIXES[_exponent(largest)]}{si}"

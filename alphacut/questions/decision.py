@@ -6,43 +6,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures.style import GREY, INK, ORANGE, colours, figure
+from alphacut.figures import style
+from alphacut.figures.style import GREY, INK, ORANGE, colours
 from alphacut.frame import envelope
 from alphacut.frame.questions.passing import ANY, Passing, passing
 from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
-from alphacut.questions.limits import in_si, in_words
-from alphacut.questions.question import Limited, Motion, Question, Row
+from alphacut.questions.limits import in_words
+from alphacut.questions.question import Motion, Question, Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PRECISION = 5e-3
 """Error of the peaks that is aimed at, as a share of each."""
-
-
-class Decision(Limited):
-    """Possibility and necessity that limits are exceeded."""
-
-
-def answer(section: Decision, motion: Motion) -> Document:
-    """Degrees and margins of every limit, from the envelope of the limited outputs."""
-    limits = in_si(section.limits, motion.structure, "decision.limits")
-    bounds = envelope(
-        motion.observed(tuple(limits)),
-        motion.inputs,
-        duration=motion.duration,
-        step=motion.step,
-        alpha=motion.alpha,
-        relative=True,
-        tolerance=PRECISION,
-        progress=motion.progress or False,
-    )
-    answers = passing(peaks(bounds), limits)
-    each = {name: _document(name, one, limits) for name, one in answers.items()}
-    return {"alpha": motion.alpha, "step": motion.step, "limits": each}
 
 
 def _document(name: str, one: Passing, limits: dict[str, float]) -> Document:
@@ -62,21 +41,6 @@ def degree(ends: Row) -> str:
     return " … ".join(dict.fromkeys(f"{float(end):.4g}" for end in ends))
 
 
-def rows(document: Document) -> list[Row]:
-    """A row for each limit."""
-    return [
-        (
-            in_words(name, one["limit"], one["unit"]).replace(">", "≤").removesuffix(" exceeded"),
-            one["verdict"],
-            one["nature"],
-            degree(one["possibility"]),
-            degree(one["necessity"]),
-            _left(one),
-        )
-        for name, one in document["limits"].items()
-    ]
-
-
 def _left(one: Document) -> str:
     """Least that is left of a limit at the lowest level."""
     left = one["margin"]["lower"][0]
@@ -85,48 +49,86 @@ def _left(one: Document) -> str:
     return engineering(left, one["unit"]) if one["unit"] else f"{left:.1%}"
 
 
-def words(document: Document) -> str:
-    """How to read the degrees."""
-    return (
-        "A limit is not exceeded where no motion exceeds it, exceeded where every motion does, and"
-        " can be exceeded where a motion is known that does."
-        " Attained bounds show what is possible and exclude nothing."
-    )
+class Decision(Question):
+    """Possibility and necessity that limits are exceeded."""
 
+    key = "decision"
+    title = "Can or must limits be exceeded?"
+    caption = "Fuzzy peak of each limited output over its limit"
+    head = ("limit", "verdict", "nature", "possibility", "necessity", "least margin")
 
-def draw(document: Document) -> Figure:
-    """Peak of each limited output over its limit, a bar for each level."""
-    each = {name: one for name, one in document["limits"].items() if name != ANY}
-    drawn, axes = figure(7.2, 1.2 + 0.7 * len(each))
-    alpha = np.asarray(document["alpha"], float)
-    places = np.arange(len(each))[::-1]
-    for place, one in zip(places, each.values(), strict=True):
-        low, high = (
-            1 - np.array([np.nan if x is None else x for x in one["margin"][side]]) / one["limit"]
-            for side in ("upper", "lower")
+    def answer(self, motion: Motion) -> Document:
+        """Degrees and margins of every limit, from the envelope of the limited outputs."""
+        limits = self.in_si(motion.structure)
+        bounds = envelope(
+            motion.observed(tuple(limits)),
+            motion.inputs,
+            duration=motion.duration,
+            step=motion.step,
+            alpha=motion.alpha,
+            relative=True,
+            tolerance=PRECISION,
+            progress=motion.progress or False,
         )
-        high = np.where(np.isfinite(high), high, np.nan)
-        for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
-            axes.barh(place, right - left, left=left, height=0.66 - 0.4 * level, color=shade, lw=0)
-        text = f"possible to {degree(one['possibility'])}, necessary to {degree(one['necessity'])}"
-        text = f"{one['verdict']} ({one['nature']}): {text}"
-        axes.text(0.01, place + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
-    axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
-    axes.axvline(0.0, color=GREY, lw=0.4)
-    axes.set_ylim(-0.5, len(each) - 0.2)
-    axes.set_yticks(places, list(each), color=INK)
-    axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
-    return drawn
+        answers = passing(peaks(bounds), limits)
+        each = {name: _document(name, one, limits) for name, one in answers.items()}
+        return {"alpha": motion.alpha, "step": motion.step, "limits": each}
+
+    @staticmethod
+    def rows(document: Document) -> list[Row]:
+        """A row for each limit."""
+        return [
+            (
+                in_words(name, one["limit"], one["unit"])
+                .replace(">", "≤")
+                .removesuffix(" exceeded"),
+                one["verdict"],
+                one["nature"],
+                degree(one["possibility"]),
+                degree(one["necessity"]),
+                _left(one),
+            )
+            for name, one in document["limits"].items()
+        ]
+
+    @staticmethod
+    def words(document: Document) -> str:
+        """How to read the degrees."""
+        return (
+            "A limit is not exceeded where no motion exceeds it, exceeded where every motion does,"
+            " and can be exceeded where a motion is known that does."
+            " Attained bounds show what is possible and exclude nothing."
+        )
+
+    @staticmethod
+    def figure(document: Document) -> Figure:
+        """Peak of each limited output over its limit, a bar for each level."""
+        each = {name: one for name, one in document["limits"].items() if name != ANY}
+        drawn, axes = style.figure(7.2, 1.2 + 0.7 * len(each))
+        alpha = np.asarray(document["alpha"], float)
+        places = np.arange(len(each))[::-1]
+        for place, one in zip(places, each.values(), strict=True):
+            low, high = (
+                1
+                - np.array([np.nan if x is None else x for x in one["margin"][side]]) / one["limit"]
+                for side in ("upper", "lower")
+            )
+            high = np.where(np.isfinite(high), high, np.nan)
+            for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
+                axes.barh(
+                    place, right - left, left=left, height=0.66 - 0.4 * level, color=shade, lw=0
+                )
+            text = (
+                f"possible to {degree(one['possibility'])}, necessary to {degree(one['necessity'])}"
+            )
+            text = f"{one['verdict']} ({one['nature']}): {text}"
+            axes.text(0.01, place + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
+        axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
+        axes.axvline(0.0, color=GREY, lw=0.4)
+        axes.set_ylim(-0.5, len(each) - 0.2)
+        axes.set_yticks(places, list(each), color=INK)
+        axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
+        return drawn
 
 
-QUESTION = Question(
-    key="decision",
-    section=Decision,
-    title="Can or must limits be exceeded?",
-    caption="Fuzzy peak of each limited output over its limit",
-    answer=answer,
-    figure=draw,
-    head=("limit", "verdict", "nature", "possibility", "necessity", "least margin"),
-    rows=rows,
-    words=words,
-)
+QUESTION = Decision

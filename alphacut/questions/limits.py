@@ -6,8 +6,10 @@ import re
 from dataclasses import dataclass
 from typing import Annotated
 
+from pydantic import PlainValidator
+
 from alphacut.case.structure import Structure
-from alphacut.case.types import Some, Text
+from alphacut.case.types import Some
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io import quantity
@@ -47,11 +49,7 @@ class Limit:
 
 
 def _limit(value: object) -> Limit:
-    """Limit that a text says.
-
-    Raises:
-        RefusedError: It says none.
-    """
+    """Limit that a text says."""
     if isinstance(value, Limit):
         return value
     name, bound, text = (part.strip() for part in str(value).partition("<="))
@@ -66,19 +64,8 @@ def _limit(value: object) -> Limit:
     return Limit(name, number, share, str(value))
 
 
-Limits = Annotated[tuple[Annotated[Limit, Text(lambda value, info: _limit(value))], ...], Some]
-
-
-def in_si(limits: tuple[Limit, ...], structure: Structure, key: str) -> dict[str, float]:
-    """The limit of each output in its SI unit.
-
-    Raises:
-        RefusedError: The structure has no such output, or an output has two limits.
-    """
-    values = {limit.output: limit.si(structure, key) for limit in limits}
-    if len(values) < len(limits):
-        raise RefusedError(key, ", ".join(x.text for x in limits), "one limit for each output")
-    return values
+One = Annotated[Limit, PlainValidator(_limit, json_schema_input_type=str)]
+Limits = Annotated[tuple[One, ...], Some]
 
 
 def in_words(output: str, limit: float, unit: str) -> str:

@@ -10,7 +10,8 @@ from pydantic import Field
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import Quantity
-from alphacut.figures.style import INK, ORANGE, alpha_legend, colours, figure
+from alphacut.figures import style
+from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
 from alphacut.frame.questions.passing import ANY
 from alphacut.frame.questions.probability import Probability, probabilities
 from alphacut.frame.structures.quantities import Output
@@ -19,32 +20,12 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.units import axis_prefix, between, engineering
-from alphacut.questions.limits import in_si, in_words
-from alphacut.questions.question import Limited, Motion, Question, Row
+from alphacut.questions.limits import in_words
+from alphacut.questions.question import Motion, Question, Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-class ProbabilitySection(Limited):
-    """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
-
-    random: tuple[str, ...] = Field(
-        default=(), description="inputs that are random, with the shape of their membership"
-    )
-    samples: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
-        default=200, description="random draws at each fuzzy point"
-    )
-
-    def require(self, structure: Structure, key: str) -> None:
-        """Refuses limits and random inputs that the structure does not have.
-
-        Raises:
-            RefusedError: It has no such output or input.
-        """
-        super().require(structure, key)
-        structure.inputs([x for x in self.random if x != "E"], f"{key}.random")
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
@@ -64,35 +45,6 @@ def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Arr
     return draw
 
 
-def answer(section: ProbabilitySection, motion: Motion) -> Document:
-    """Probabilities of exceeding each limit, and any of several."""
-    structure = motion.structure
-    limits = in_si(section.limits, structure, "probability.limits")
-    random = structure.inputs(section.random, "probability.random")
-    fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
-    crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
-    answers = probabilities(
-        motion.observed(tuple(limits)),
-        fuzzy or dict([next(iter(crisp.items()))]),
-        {name: shaped_like(number) for name, number in random.items()},
-        limits,
-        duration=motion.duration,
-        step=motion.step,
-        alpha=motion.alpha,
-        samples=section.samples,
-        rng=np.random.default_rng(0),
-        progress=motion.progress,
-    )
-    return {
-        "fuzzy": list(fuzzy),
-        "random": list(random),
-        "samples": section.samples,
-        "step": motion.step,
-        "alpha": motion.alpha,
-        "events": {name: _document(name, one, limits) for name, one in answers.items()},
-    }
-
-
 def _document(name: str, one: Probability, limits: dict[str, float]) -> Document:
     return {
         "limit": limits.get(name, 1.0),
@@ -107,56 +59,9 @@ def _document(name: str, one: Probability, limits: dict[str, float]) -> Document
     }
 
 
-def rows(document: Document) -> list[Row]:
-    """A row for each limit."""
-    return [
-        (
-            in_words(name, one["limit"], one["unit"]),
-            cut(one, 0),
-            one["nature"],
-            cut(one, -1),
-            f"{one['deviation']:.2g}",
-            f"{max(one['error']):.2g}",
-        )
-        for name, one in document["events"].items()
-    ]
-
-
 def cut(one: Document, level: int) -> str:
     """Bounds of a probability on a level."""
     return between(one["lower"][level], one["upper"][level], Nature.ATTAINED, 3)
-
-
-def words(document: Document) -> str:
-    """How the probability was computed."""
-    random = ", ".join(document["random"]) or "no input"
-    return (
-        f"Random: {random}, with {document['samples']} draws at each fuzzy point. The bounds are"
-        " those of the fuzzy points tried; other points may have more or less. Peaks are those at"
-        f" nodes every {document['step']:g} s; the last column says what lies between them."
-    )
-
-
-def draw(document: Document) -> Figure:
-    """Probability over the limit for the event that names no other, between its bounds by level."""
-    name, one = list(document["events"].items())[-1]
-    alpha = np.asarray(document["alpha"], float)
-    limits = np.asarray(one["curve"]["limit"], float)
-    lower, upper = (np.asarray(one["curve"][side], float) for side in ("lower", "upper"))
-    drawn, axes = figure(7.2, 3.6)
-    for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):
-        axes.fill_between(limits, low, high, color=shade, lw=0)
-    for end in (lower[-1], upper[-1]):
-        axes.plot(limits, end, color=INK, lw=1)
-    _mark(axes, one["limit"], limits, one["unit"])
-    title = f"limit of |{name}|" if one["unit"] else "all limits, over those of the case"
-    factor, unit = axis_prefix(float(limits[-1]), one["unit"])
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}")
-    axes.set_xlabel(f"{title} ({unit})".replace("^2", "²") if unit else title)
-    axes.set_ylabel("probability of exceeding it")
-    axes.set_ylim(0, 1.02)
-    alpha_legend(axes, alpha)
-    return drawn
 
 
 def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
@@ -168,14 +73,112 @@ def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
     axes.set_title(f"limit {words} ({'dashed' if near else 'far off'})", loc="left", fontsize=10)
 
 
-QUESTION = Question(
-    key="probability",
-    section=ProbabilitySection,
-    title="How probable is it that limits are exceeded?",
-    caption="Fuzzy probability of exceeding a limit, over the limit",
-    answer=answer,
-    figure=draw,
-    head=("limit", "at the lowest α", "nature", "at the highest α", "scatter", "between nodes"),
-    rows=rows,
-    words=words,
-)
+class ProbabilitySection(Question):
+    """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
+
+    key = "probability"
+    title = "How probable is it that limits are exceeded?"
+    caption = "Fuzzy probability of exceeding a limit, over the limit"
+    head = (
+        "limit",
+        "at the lowest α",
+        "nature",
+        "at the highest α",
+        "scatter",
+        "between nodes",
+    )
+
+    random: tuple[str, ...] = Field(
+        default=(), description="inputs that are random, with the shape of their membership"
+    )
+    samples: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
+        default=200, description="random draws at each fuzzy point"
+    )
+
+    def check(self, structure: Structure) -> None:
+        """Refuses limits and random inputs that the structure does not have.
+
+        Raises:
+            RefusedError: It has no such output or input.
+        """
+        super().check(structure)
+        structure.inputs([x for x in self.random if x != "E"], "probability.random")
+
+    def answer(self, motion: Motion) -> Document:
+        """Probabilities of exceeding each limit, and any of several."""
+        structure = motion.structure
+        limits = self.in_si(structure)
+        random = structure.inputs(self.random, "probability.random")
+        fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
+        crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
+        answers = probabilities(
+            motion.observed(tuple(limits)),
+            fuzzy or dict([next(iter(crisp.items()))]),
+            {name: shaped_like(number) for name, number in random.items()},
+            limits,
+            duration=motion.duration,
+            step=motion.step,
+            alpha=motion.alpha,
+            samples=self.samples,
+            rng=np.random.default_rng(0),
+            progress=motion.progress,
+        )
+        return {
+            "fuzzy": list(fuzzy),
+            "random": list(random),
+            "samples": self.samples,
+            "step": motion.step,
+            "alpha": motion.alpha,
+            "events": {name: _document(name, one, limits) for name, one in answers.items()},
+        }
+
+    @staticmethod
+    def rows(document: Document) -> list[Row]:
+        """A row for each limit."""
+        return [
+            (
+                in_words(name, one["limit"], one["unit"]),
+                cut(one, 0),
+                one["nature"],
+                cut(one, -1),
+                f"{one['deviation']:.2g}",
+                f"{max(one['error']):.2g}",
+            )
+            for name, one in document["events"].items()
+        ]
+
+    @staticmethod
+    def words(document: Document) -> str:
+        """How the probability was computed."""
+        random = ", ".join(document["random"]) or "no input"
+        return (
+            f"Random: {random}, with {document['samples']} draws at each fuzzy point. The bounds"
+            " are those of the fuzzy points tried; other points may have more or less. Peaks are"
+            f" those at nodes every {document['step']:g} s; the last column says what lies between"
+            " them."
+        )
+
+    @staticmethod
+    def figure(document: Document) -> Figure:
+        """Probability over the limit, for the last event, between its bounds by level."""
+        name, one = list(document["events"].items())[-1]
+        alpha = np.asarray(document["alpha"], float)
+        limits = np.asarray(one["curve"]["limit"], float)
+        lower, upper = (np.asarray(one["curve"][side], float) for side in ("lower", "upper"))
+        drawn, axes = style.figure(7.2, 3.6)
+        for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):
+            axes.fill_between(limits, low, high, color=shade, lw=0)
+        for end in (lower[-1], upper[-1]):
+            axes.plot(limits, end, color=INK, lw=1)
+        _mark(axes, one["limit"], limits, one["unit"])
+        title = f"limit of |{name}|" if one["unit"] else "all limits, over those of the case"
+        factor, unit = axis_prefix(float(limits[-1]), one["unit"])
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}")
+        axes.set_xlabel(f"{title} ({unit})".replace("^2", "²") if unit else title)
+        axes.set_ylabel("probability of exceeding it")
+        axes.set_ylim(0, 1.02)
+        alpha_legend(axes, alpha)
+        return drawn
+
+
+QUESTION = ProbabilitySection

@@ -5,9 +5,9 @@ Each question is one file beside this one, and one line of `alphacut.questions.t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
@@ -17,25 +17,12 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.refused import require
 from alphacut.io.files import Document
-from alphacut.questions.limits import Limits, in_si
+from alphacut.questions.limits import Limits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class Limited(Section):
-    """Section of a question about limits of outputs."""
-
-    limits: Limits = Field(description="limits of outputs, 'drift1 <= 0.5 %', 'a3 <= 2 m/s^2'")
-
-    def require(self, structure: Structure, key: str) -> None:
-        """Refuses what the structure does not have.
-
-        Raises:
-            RefusedError: It has no such output or input.
-        """
-        in_si(self.limits, structure, f"{key}.limits")
 
 
 @dataclass(frozen=True)
@@ -72,28 +59,54 @@ class Motion:
 Row = tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Question:
-    """One question.
+class Question(Section, ABC):
+    """A question about limits of outputs, as a section of the case.
 
-    Args:
-        key: Name of its section, its file of results and its figure.
-        section: The section.
-        title: Heading in the report.
-        caption: Of the figure.
-        answer: Numbers of the answer, in SI, as JSON holds them.
-        figure: Draws an answer.
-        head: Titles of the columns of `rows`.
-        rows: The answer as a table: what, answer, nature first.
-        words: Sentence on how to read it.
+    Its attributes are the name of the section, of its results and its figure; the heading in the
+    report; the caption of the figure; and the titles of the columns of `rows`.
     """
 
-    key: str
-    section: type[Section]
-    title: str
-    caption: str
-    answer: Callable[[Any, Motion], Document]
-    figure: Callable[[Document], Figure]
-    head: Row
-    rows: Callable[[Document], list[Row]]
-    words: Callable[[Document], str]
+    key: ClassVar[str]
+    title: ClassVar[str]
+    caption: ClassVar[str]
+    head: ClassVar[Row]
+    limits: Limits = Field(description="limits of outputs, 'drift1 <= 0.5 %', 'a3 <= 2 m/s^2'")
+
+    def in_si(self, structure: Structure) -> dict[str, float]:
+        """The limit of each output in its SI unit.
+
+        Raises:
+            RefusedError: The structure has no such output, or an output has two limits.
+        """
+        key = f"{self.key}.limits"
+        values = {limit.output: limit.si(structure, key) for limit in self.limits}
+        every = ", ".join(limit.text for limit in self.limits)
+        require(len(values) == len(self.limits), key, every, "one limit for each output")
+        return values
+
+    def check(self, structure: Structure) -> None:
+        """Refuses what the structure does not have.
+
+        Raises:
+            RefusedError: It has no such output or input.
+        """
+        self.in_si(structure)
+
+    @abstractmethod
+    def answer(self, motion: Motion) -> Document:
+        """Numbers of the answer, in SI, as JSON holds them."""
+
+    @staticmethod
+    @abstractmethod
+    def rows(document: Document) -> list[Row]:
+        """The answer as a table: what, answer, nature first."""
+
+    @staticmethod
+    @abstractmethod
+    def words(document: Document) -> str:
+        """Sentence on how to read it."""
+
+    @staticmethod
+    @abstractmethod
+    def figure(document: Document) -> Figure:
+        """Drawing of an answer."""

@@ -7,6 +7,6 @@ from importlib import import_module
 from alphacut.questions.question import Question
 
 NAMES = ("probability", "decision", "tolerances")
-QUESTIONS: tuple[Question, ...] = tuple(
+QUESTIONS: tuple[type[Question], ...] = tuple(
     import_module(f"alphacut.questions.{name}").QUESTION for name in NAMES
 )

@@ -9,68 +9,18 @@ import numpy as np
 from pydantic import Field
 
 from alphacut.case.types import Quantity
-from alphacut.figures.style import BLUE, GREY, INK, figure
+from alphacut.figures import style
+from alphacut.figures.style import BLUE, GREY, INK
 from alphacut.frame.questions.tolerances import tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
 from alphacut.questions.decision import PRECISION
-from alphacut.questions.limits import in_si
-from alphacut.questions.question import Limited, Motion, Question, Row
+from alphacut.questions.question import Motion, Question, Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-class Tolerances(Limited):
-    """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
-
-    most: Annotated[float, Quantity(above=0, most=100)] = Field(
-        default=2.0, description="largest scale that is tried; 1 is that of the case"
-    )
-
-
-def answer(section: Tolerances, motion: Motion) -> Document:
-    """Scales at which no limit and one is exceeded, and the supports at the first."""
-    limits = in_si(section.limits, motion.structure, "tolerances.limits")
-    scale = tolerances(
-        motion.observed(tuple(limits)),
-        motion.inputs,
-        limits,
-        duration=motion.duration,
-        step=motion.step,
-        most=section.most,
-        error=PRECISION,
-        progress=motion.progress,
-    )
-    modal = {name: number.modal for name, number in motion.inputs.items()}
-    supports = {
-        name: {"modal": modal[name], "own": motion.inputs[name].support, "kept": ends}
-        for name, ends in scale.supports.items()
-    }
-    return {
-        "limits": limits,
-        "kept": scale.kept,
-        "clear": scale.clear,
-        "passed": scale.passed if math.isfinite(scale.passed) else None,
-        "most": section.most,
-        "nature": str(scale.nature),
-        "envelopes": scale.envelopes,
-        "step": motion.step,
-        "supports": supports,
-    }
-
-
-def rows(document: Document) -> list[Row]:
-    """The scale, then each input's tolerance."""
-    kept, passed = document["kept"], document["passed"]
-    scale = "none" if kept is None else f"up to {rounded(kept, 'upper', Nature.ATTAINED):.4g}"
-    beyond = f"exceeded at {passed:.4g}" if passed is not None else "none is exceeded"
-    if passed is not None and document["clear"] is not None:
-        beyond = f"none seen up to {document['clear']:.4g}, {beyond}"
-    head = ("scale of all tolerances", scale, document["nature"], beyond)
-    return [head, *(_row(name, one, document) for name, one in document["supports"].items())]
 
 
 def _row(name: str, one: Document, document: Document) -> Row:
@@ -83,39 +33,85 @@ def _row(name: str, one: Document, document: Document) -> Row:
     return f"tolerance of {name}", kept, document["nature"], ends if kept != "–" else ""
 
 
-def words(document: Document) -> str:
-    """How to read the scale."""
-    return (
-        "All supports are scaled together about their modal values; 1 is the case as it stands."
-        f" Scales up to {document['most']:g} were tried, each with an envelope of its own."
+class Tolerances(Question):
+    """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
+
+    key = "tolerances"
+    title = "How far may tolerances go?"
+    caption = "Supports of the inputs in the case, and at the scale that exceeds no limit"
+    head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
+
+    most: Annotated[float, Quantity(above=0, most=100)] = Field(
+        default=2.0, description="largest scale that is tried; 1 is that of the case"
     )
 
+    def answer(self, motion: Motion) -> Document:
+        """Scales at which no limit and one is exceeded, and the supports at the first."""
+        limits = self.in_si(motion.structure)
+        scale = tolerances(
+            motion.observed(tuple(limits)),
+            motion.inputs,
+            limits,
+            duration=motion.duration,
+            step=motion.step,
+            most=self.most,
+            error=PRECISION,
+            progress=motion.progress,
+        )
+        modal = {name: number.modal for name, number in motion.inputs.items()}
+        supports = {
+            name: {"modal": modal[name], "own": motion.inputs[name].support, "kept": ends}
+            for name, ends in scale.supports.items()
+        }
+        return {
+            "limits": limits,
+            "kept": scale.kept,
+            "clear": scale.clear,
+            "passed": scale.passed if math.isfinite(scale.passed) else None,
+            "most": self.most,
+            "nature": str(scale.nature),
+            "envelopes": scale.envelopes,
+            "step": motion.step,
+            "supports": supports,
+        }
 
-def draw(document: Document) -> Figure:
-    """Supports of the case and at the scale that exceeds no limit, over their modal values."""
-    each = document["supports"]
-    drawn, axes = figure(7.2, 1.0 + 0.4 * len(each))
-    places = np.arange(len(each))[::-1]
-    series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "no limit exceeded"))
-    for kind, colour, height, label in series:
-        ends = np.array([np.asarray(one[kind]) / (one["modal"] or 1.0) for one in each.values()])
-        wide = ends[:, 1] - ends[:, 0]
-        axes.barh(places, wide, left=ends[:, 0], height=height, color=colour, lw=0, label=label)
-    axes.axvline(1.0, color=INK, lw=0.8)
-    axes.set_yticks(places, list(each))
-    axes.set_xlabel("value over the modal one")
-    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
+    @staticmethod
+    def rows(document: Document) -> list[Row]:
+        """The scale, then each input's tolerance."""
+        kept, passed = document["kept"], document["passed"]
+        scale = "none" if kept is None else f"up to {rounded(kept, 'upper', Nature.ATTAINED):.4g}"
+        beyond = f"exceeded at {passed:.4g}" if passed is not None else "none is exceeded"
+        if passed is not None and document["clear"] is not None:
+            beyond = f"none seen up to {document['clear']:.4g}, {beyond}"
+        head = ("scale of all tolerances", scale, document["nature"], beyond)
+        return [head, *(_row(name, one, document) for name, one in document["supports"].items())]
+
+    @staticmethod
+    def words(document: Document) -> str:
+        """How to read the scale."""
+        return (
+            "All supports are scaled together about their modal values; 1 is the case as it stands."
+            f" Scales up to {document['most']:g} were tried, each with an envelope of its own."
+        )
+
+    @staticmethod
+    def figure(document: Document) -> Figure:
+        """Supports of the case and at the scale that exceeds no limit, over their modal values."""
+        each = document["supports"]
+        drawn, axes = style.figure(7.2, 1.0 + 0.4 * len(each))
+        places = np.arange(len(each))[::-1]
+        series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "no limit exceeded"))
+        for kind, colour, height, label in series:
+            ends = np.array(
+                [np.asarray(one[kind]) / (one["modal"] or 1.0) for one in each.values()]
+            )
+            wide = ends[:, 1] - ends[:, 0]
+            axes.barh(places, wide, left=ends[:, 0], height=height, color=colour, lw=0, label=label)
+        axes.axvline(1.0, color=INK, lw=0.8)
+        axes.set_yticks(places, list(each))
+        axes.set_xlabel("value over the modal one")
+        axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        return drawn
 
 
-QUESTION = Question(
-    key="tolerances",
-    section=Tolerances,
-    title="How far may tolerances go?",
-    caption="Supports of the inputs in the case, and at the scale that exceeds no limit",
-    answer=answer,
-    figure=draw,
-    head=("quantity", "no limit exceeded", "nature", "limit exceeded, or relative"),
-    rows=rows,
-    words=words,
-)
+QUESTION = Tolerances

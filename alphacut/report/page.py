@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import base64
-import json
 from pathlib import Path
 
 import numpy as np
-from markupsafe import Markup
 
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import damaged, own_files, read_dataset, read_summary
-from alphacut.report.html import HERE, environment
-from alphacut.report.results import nature_of
-from alphacut.report.safe import cleaned, plain_name
+from alphacut.report.results import nature_of, plain_name
 from alphacut.report.sections import Page
 
 
@@ -24,34 +20,29 @@ def report(folder: Path) -> str:
     """The page for the results in a folder.
 
     Raises:
-        BadInput: The folder holds no results of a run, those of two, or of a newer program.
+        RefusedError: The folder holds no results of a run, those of two, or of a newer program.
     """
     summary = read_summary(folder)
     try:
         own_files(summary, folder)
-        return page(cleaned(summary), folder)
+        return page(summary, folder)
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
-        raise damaged(folder / "summary.json", error) from error
+        raise damaged(folder / "summary.json", f"damaged ({type(error).__name__})") from error
 
 
 def page(summary: Document, folder: Path) -> str:
-    """The page for a summary."""
-    text = {name: (HERE / f"report.{name}").read_text(encoding="utf-8") for name in ("css", "js")}
+    """The page for a summary; all texts of it are escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = FileSystemLoader(Path(__file__).parent)
+    templates = Environment(autoescape=True, loader=loader, undefined=StrictUndefined)
     studies = summary.get("envelopes", {}).items()
-    data = [plot(name, study, folder) for name, study in studies if plain_name(name)]
-    return (
-        environment()
-        .get_template("report.html")
-        .render(
-            title=summary["title"],
-            name=summary["case"],
-            about=" ".join(summary.get("about", "").split()),
-            css=Markup(text["css"]),
-            js=Markup(text["js"]),
-            sections=Markup("\n").join(Page(summary, folder).sections()),
-            # JSON that may stand inside a script element
-            envelopes=Markup(json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")),
-        )
+    return templates.get_template("report.html").render(
+        title=summary["title"],
+        name=summary["case"],
+        about=" ".join(summary.get("about", "").split()),
+        sections=Page(summary, folder).sections(),
+        envelopes=[plot(name, study, folder) for name, study in studies if plain_name(name)],
     )
 
 

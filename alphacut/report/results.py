@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature, rounded
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.text_table import text_table
-from alphacut.io.units import STANDARD_GRAVITY, axis_prefix, between, engineering, largest_by_unit
+from alphacut.io.units import STANDARD_GRAVITY, axis_prefix, between
 from alphacut.questions.table import QUESTIONS
 
 Row = tuple[str, ...]
@@ -27,15 +28,6 @@ EXCEEDED = {
 }
 """Verdicts on a limit as they stand in a column."""
 GRAVITY = float(STANDARD_GRAVITY)
-
-
-def run_text(summary: Document) -> str:
-    """Every table of a run, and what drives the peak."""
-    tables = [one for one in (material(summary), motion(summary)) if one[1]]
-    lines = [*natures(summary), *identified(summary.get("update"))]
-    lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(summary)]
-    lines += drivers(summary)
-    return "".join(text_table(*one) for one in tables) + "".join(f"{line}\n" for line in lines)
 
 
 def nature_of(text: object) -> Nature:
@@ -180,47 +172,23 @@ def answers(summary: Document) -> list[Row]:
 
 def drivers(summary: Document) -> Iterator[str]:
     """Lines on what drives the modulus, and the peak of the last output: the largest shares."""
-    of = {name: one for name, one in summary.get("shares", {}).items() if name == "E"}
-    of |= {f"the peak of {x}": one for x, one in [*summary.get("peak_shares", {}).items()][-1:]}
-    for name, shares in of.items():
-        first, *others = sorted(shares.items(), key=lambda pair: -pair[1])[:3]
+    of = dict(summary.get("shares", {}))
+    shown = [name for name in of if name == "E"] + [name for name in of if "peak" in name][-1:]
+    for name in shown:
+        first, *others = sorted(of[name].items(), key=lambda pair: -pair[1])[:3]
         more = "".join(f", {x} by {share:.0%}" for x, share in others)
         yield f"Fixing {first[0]} narrows {name} by {first[1]:.0%}{more}"
 
 
-def identified(document: Document | None) -> Iterator[str]:
-    """A line for each input and each mode that was predicted, from `Learned.document`."""
-    if document is None or "refuted" in document:
-        yield from [str(document["refuted"])] if document else []
-        return
-    for name, ends in document["inputs"].items():
-        unit, wider = document["units"][name], Nature.GUARANTEED
-        both = (rounded(ends[side][0], side, wider) for side in ("lower", "upper"))
-        words = " … ".join(engineering(end, unit) for end in both)
-        yield f"{name}: {words}, {document['narrowed'][name]:.0%} of its width before"
-    for mode in document["held_out"]:
-        low, high = mode["predicted"]
-        where = f"{mode['measured']:.4g}, {'inside' if mode['inside'] else 'outside'}"
-        words = between(low, high, Nature.GUARANTEED)
-        yield f"mode {mode['mode']}: {words} Hz predicted, measured {where}"
+def figures(summary: Document, folder: Path) -> Iterator[tuple[str, Path]]:
+    """Stem and PNG of each figure that the summary names, and that lies in the folder's figures."""
+    home = (folder / "figures").resolve()
+    for path in (folder / str(name) for name in summary.get("figures", ())):
+        inside = path.resolve().parent == home and path.is_file()
+        if inside and path.suffix == ".png" and plain_name(path.name):
+            yield path.stem, path
 
 
-def extremes(study: Document) -> Table:
-    """Least and greatest value of each output at the lowest level, with the error beside them."""
-    units = {name: Output(name).unit for name in study["min"]}
-    values = ((study[side][x], units[x]) for side in ("min", "max") for x in units)
-    largest, nature = largest_by_unit(values), nature_of(study["nature"])
-    error = "gap inside" if nature is Nature.GUARANTEED else "error"
-    rows = [
-        (
-            name,
-            *(
-                engineering(rounded(study[x][name], side, nature), unit, beside=largest[unit])
-                for x, side in (("min", "lower"), ("max", "upper"))
-            ),
-            engineering(study["error"][name], unit, digits=2),
-            str(nature),
-        )
-        for name, unit in units.items()
-    ]
-    return ("output", "least", "greatest", f"{error} up to", "nature"), rows
+def plain_name(name: str) -> bool:
+    """True of a name that stands for a file in its folder and leads to no other."""
+    return bool(re.fullmatch(r"[\w+-][\w.+-]{0,100}", name)) and ".." not in name

@@ -1,10 +1,10 @@
-"""CSV files of a run, for spreadsheets: a row a time or a level, units in the head."""
+"""Every result as a table of texts: for the console, the page and CSV files."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,18 +12,40 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.netcdf import read_dataset
+from alphacut.io.units import between, ends, engineering
 from alphacut.questions.table import QUESTIONS
-from alphacut.report.results import nature_of, whole
-from alphacut.report.safe import cleaned, plain_name
+from alphacut.report.results import (
+    Row,
+    Table,
+    answers,
+    drivers,
+    material,
+    motion,
+    nature_of,
+    natures,
+    plain_name,
+    whole,
+)
 
 if TYPE_CHECKING:
     import xarray
 
-Table = tuple[Sequence[str], Iterable[Sequence[object]]]
+DIGITS = 6
+
+
+def run_text(summary: Document) -> str:
+    """Every table of a run, and what drives the peak."""
+    learned = summary.get("update", {})
+    shown = [one for one in (material(summary), motion(summary)) if one[1]]
+    shown += [update(learned)] if "inputs" in learned else []
+    lines = [*natures(summary), *([learned["refuted"]] if "refuted" in learned else [])]
+    lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(summary)]
+    lines += drivers(summary)
+    return "".join(text_table(*one) for one in shown) + "".join(f"{line}\n" for line in lines)
 
 
 def write_tables(summary: Document, results: Path, folder: Path) -> list[Path]:
-    """Writes the results of a run as CSV files with six digits.
+    """Writes the results of a run as CSV files.
 
     Args:
         summary: Of the run.
@@ -33,91 +55,175 @@ def write_tables(summary: Document, results: Path, folder: Path) -> list[Path]:
     Returns:
         The files.
     """
-    files = []
-    for name, (head, rows) in tables(cleaned(summary), results):
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(head)
-        writer.writerows([_cell(value) for value in row] for row in rows)
-        files.append(folder / f"{name}.csv")
-        write_text(files[-1], text.getvalue())
-    return files
-
-
-def _cell(value: object) -> object:
-    return f"{value:.6g}" if isinstance(value, float) else value
-
-
-def tables(summary: Document, results: Path) -> Iterator[tuple[str, Table]]:
-    """Name and content of each table."""
-    if "modulus" in summary:
-        yield "modulus", modulus(summary["modulus"])
-    if "image" in summary:
-        yield "image", image(summary["image"])
-    studies = summary.get("envelopes", {})
-    for name, study in studies.items():
+    every = {name: table for name, table in tables(summary).items() if table[1]}
+    for name, study in summary.get("envelopes", {}).items():
         if plain_name(name):
             data = read_dataset(results / f"envelope_{name}.nc", key=str(results))
             for output in filter(plain_name, study["min"]):
-                yield f"envelope_{name}-{output}", envelope(data, output)
-    if studies:
-        yield "peaks", (PEAKS, peaks(studies))
-    if shares := summary.get("shares"):
-        inputs = dict.fromkeys(name for entry in shares.values() for name in entry)
-        rows = [(name, *(shares[of].get(name, "") for of in shares)) for name in inputs]
-        yield "shares", (("input", *(f"share of {of} [1]" for of in shares)), rows)
-    for question in QUESTIONS:
-        if question.key in summary:
-            yield question.key, (question.head, question.rows(summary[question.key]))
+                every[f"envelope_{name}-{output}"] = over_time(data, output)
+    for name, (head, rows) in every.items():
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([head, *rows])
+        write_text(folder / f"{name}.csv", text.getvalue())
+    return [folder / f"{name}.csv" for name in every]
+
+
+def tables(summary: Document) -> dict[str, Table]:
+    """The table of every result by its name."""
+    every = {
+        name: make(summary[key])
+        for name, (key, make) in MAKERS.items()
+        if summary.get(key) and "refuted" not in summary[key]
+    }
+    answers = {
+        one.key: (one.head, one.rows(summary[one.key])) for one in QUESTIONS if one.key in summary
+    }
+    return every | answers
+
+
+def ends_of(of: Document, level: int, nature: Nature) -> Row:
+    """Both ends of a cut, rounded as their nature allows."""
+    return ends(float(of["lower"][level]), float(of["upper"][level]), nature, DIGITS)
+
+
+def radius_map(part: Document) -> Table:
+    """Parameters of the radius map."""
+    each = {name: part[name] for name in ("a1", "a2", "a3", "a4")}
+    rows = [
+        (x, " … ".join(map(_number, y if isinstance(y, list) else [y]))) for x, y in each.items()
+    ]
+    return ("parameter of the radius map", "least … modal … greatest"), rows
+
+
+def _number(value: float) -> str:
+    return f"{value:.{DIGITS}g}"
 
 
 def modulus(part: Document) -> Table:
     """α-cuts of E and ν, with the error of E."""
-    error, nature = sum(part.get("error", {}).values()), nature_of(part["nature"])
-    columns = [part["alpha"], *_ends(part["E_GPa"], nature), *_ends(part["nu_cuts"], nature)]
-    head = ("alpha", "E from [GPa]", "E to [GPa]", "nu from", "nu to")
-    rows = [(*row, error * row[2], nature) for row in zip(*columns, strict=True)]
-    return (*head, "error of E [GPa]", "nature"), rows
+    error, nature = sum(part["error"].values()), nature_of(part["nature"])
+    rows = [
+        (
+            f"{alpha:g}",
+            *ends_of(part["E_GPa"], level, nature),
+            *ends_of(part["nu_cuts"], level, nature),
+            f"{error * part['E_GPa']['upper'][level]:.2g}",
+            str(nature),
+        )
+        for level, alpha in enumerate(part["alpha"])
+    ]
+    return ("α", "E from [GPa]", "E to [GPa]", "ν from", "ν to", "± E [GPa]", "nature"), rows
 
 
 def image(part: Document) -> Table:
     """Proved α-cuts of E of an image."""
     cuts, nature = part["cuts"], nature_of(part["nature"])
-    rows = zip(cuts["alpha"], *_ends(cuts["E_GPa"], nature), strict=True)
-    return ("alpha", "E from [GPa]", "E to [GPa]", "nature"), [(*row, nature) for row in rows]
+    rows = [
+        (f"{alpha:g}", *ends_of(cuts["E_GPa"], level, nature), str(nature))
+        for level, alpha in enumerate(cuts["alpha"])
+    ]
+    return ("α", "E from [GPa]", "E to [GPa]", "nature"), rows
 
 
-def _ends(cuts: Document, nature: Nature) -> Iterator[list[float]]:
-    for side in ("lower", "upper"):
-        yield [rounded(end, side, nature, 6) for end in cuts[side]]
+def response(part: Document) -> Table:
+    """Mean, quantiles and exceedance of the stress of the cell, at the lowest level."""
+    each = {"mean [GPa]": part["mean_GPa"]}
+    each |= {f"quantile {one['probability']:g} [GPa]": one["GPa"] for one in part["quantiles"]}
+    if "exceedance" in part:
+        over = part["exceedance"]
+        each[f"probability above {over['limit_GPa']:g} GPa"] = over
+    rows = [
+        (name, between(ends["lower"][0], ends["upper"][0], Nature.ESTIMATED))
+        for name, ends in each.items()
+    ]
+    return ("quantity", f"at α = {part['alpha'][0]:g}"), rows
 
 
-def envelope(data: xarray.Dataset, output: str) -> Table:
-    """Bounds of one output by time, those of each level beside each other with their error."""
-    one, unit = data.sel(output=output), Output(output).unit
-    nature = nature_of(data.attrs["nature"])
-    error = "gap to attained" if nature is Nature.GUARANTEED else "error"
-    columns = {"time [s]": [*map(float, one["time"].values)]}
-    for level in one["alpha"].values:
-        at = one.sel(alpha=level)
-        for band in ("lower", "upper", "error"):
-            if band in at:
-                title = f"{nature} {band}" if band != "error" else error
-                ends = (rounded(float(x), band, nature, 6) for x in at[band].values)
-                columns[f"{title} at alpha {level:g} [{unit}]"] = [*ends]
-    return tuple(columns), zip(*columns.values(), strict=True)
+def update(part: Document) -> Table:
+    """Inputs before and after measured modes; then the modes that were predicted."""
+    rows: list[Row] = []
+    for name, of in part["inputs"].items():
+        after, unit = (of["lower"][0], of["upper"][0]), part["units"][name]
+        share = f"{part['narrowed'][name]:.0%} of the width"
+        rows.append((name, _wide(part["prior"][name], unit), _wide(after, unit), share))
+    for one in part["held_out"]:
+        where, measured = "inside" if one["inside"] else "outside", f"{one['measured']:.4g} Hz"
+        rows.append((f"mode {one['mode']}", measured, _wide(one["predicted"], "Hz"), where))
+    return ("input or mode", "before, measured", "learned, predicted", ""), rows
 
 
-PEAKS = ("study", "output", "unit", "alpha", "least peak", "greatest peak", "error", "nature")
+def _wide(ends: Sequence[float], unit: str) -> str:
+    sides = zip(ends, ("lower", "upper"), strict=True)
+    return " … ".join(engineering(rounded(x, y, Nature.GUARANTEED), unit) for x, y in sides)
 
 
-def peaks(studies: Document) -> Iterator[Sequence[object]]:
-    """Rows of the peaks of all studies, an output and a level each."""
+def peaks(studies: Document) -> Table:
+    """Peaks of all studies, an output and a level each, in SI."""
+    rows = []
     for name, study in studies.items():
-        for output, peak in study.get("peak", {}).items():
-            nature, unit = nature_of(study["nature"]), Output(output).unit
+        nature = nature_of(study["nature"])
+        for output, peak in study["peak"].items():
             for level, alpha in enumerate(study["alpha"]):
                 error = peak["error"][level] if "error" in peak else 0.0
                 low, high, rest = whole(peak, level, error, nature)
-                ends = rounded(low, "lower", nature, 6), rounded(high, "upper", nature, 6)
-                yield name, output, unit, alpha, *ends, rest, nature
+                both = ends(low, high, nature, DIGITS)
+                first = (name, output, Output(output).unit, f"{alpha:g}")
+                rows.append((*first, *both, f"{rest:.2g}", str(nature)))
+    return ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature"), rows
+
+
+def shares(part: Document) -> Table:
+    """Shares of the inputs in the width of each result, on the lowest level."""
+    inputs = dict.fromkeys(name for of in part.values() for name in of)
+    rows = [
+        (name, *(f"{of[name]:.3f}" if name in of else "" for of in part.values()))
+        for name in inputs
+    ]
+    return ("input", *(f"share of the width of {name}" for name in part)), rows
+
+
+MAKERS = {
+    "radius_map": ("microstructure", radius_map),
+    "modulus": ("modulus", modulus),
+    "image": ("image", image),
+    "response": ("response", response),
+    "update": ("update", update),
+    "peaks": ("envelopes", peaks),
+    "shares": ("shares", shares),
+}
+"""Part of the summary of each table, and the function that makes it."""
+
+
+def over_time(data: xarray.Dataset, output: str) -> Table:
+    """Bounds of one output by time, those of each level beside each other with their error."""
+    one, unit = data.sel(output=output), Output(output).unit
+    nature = nature_of(data.attrs["nature"])
+    words = {"lower": f"{nature} lower", "upper": f"{nature} upper", "error": "error"}
+    words["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
+    columns = {"time [s]": [_number(time) for time in one["time"].values]}
+    for level in one["alpha"].values:
+        at = one.sel(alpha=level)
+        for band in filter(at.__contains__, words):
+            ends = (rounded(float(x), band, nature, DIGITS) for x in at[band].values)
+            columns[f"{words[band]} at alpha {level:g} [{unit}]"] = [*map(_number, ends)]
+    return tuple(columns), [*zip(*columns.values(), strict=True)]
+
+
+def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Lines of a table: the first column to the left, the others to the right.
+
+    Args:
+        head: Titles of the n columns.
+        rows: Each of n cells.
+    """
+    lines = [list(head), *(list(row) for row in rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
+    return "".join(f"{_aligned(line, widths)}\n" for line in lines)
+
+
+def _aligned(line: Sequence[str], widths: Sequence[int]) -> str:
+    first, *others = (
+        cell.ljust(width) if k == 0 else cell.rjust(width)
+        for k, (cell, width) in enumerate(zip(line, widths, strict=True))
+    )
+    return "  ".join([first, *others]).rstrip()

@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 
+from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
-from alphacut.io.problem import BadInput, missing
+from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
 from alphacut.rve import bounds as plane
-from alphacut.rve.cell import STRAIN, AnyPhase, Cell, Phase, VoigtPhase
+from alphacut.rve.cell import STRAIN, AnyPhase, Cell, Phase
 from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.mesh.outline import Ellipse, circle
+from alphacut.rve.mesh.outline import circle
 from alphacut.rve.result import Homogenised, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
 from alphacut.rve.spheres.series.model import SphereSeriesModel
-from alphacut.stochastic import HermiteMap, ThetaLaw, gauss_rule
 from alphacut.stochastic import RadiusMap as Radii
-
-if TYPE_CHECKING:
-    from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
+from alphacut.stochastic import gauss_rule
 
 GPA = 1e9
 SHARE = 0.4
@@ -46,108 +44,6 @@ class CellModel(Protocol):
 
 
 @dataclass(frozen=True)
-class CellChoice:
-    """A cell model and its resolution, small enough for workers.
-
-    Args:
-        method: prism, slices, series, or auto: the series, or slices where it has no formula.
-        layers: Element layers in θ.
-        size: Element size over half the cell's side.
-        tolerance: Relative error of E; None for the model's own accuracy.
-        petsc: PETSc options that override the solver's, without their prefix.
-        parallel: Whether all MPI ranks work on one cell together.
-        moduli: Moduli of the particle that all samples together span, in Pa.
-        estimate: Whether elements estimate their error at an extra cost.
-        particles: cylinders, spheres or ellipses.
-        outline: Of ellipses.
-        stiffness: Of a particle that is not isotropic.
-        average: "axes", eq. 16, or "isotropic": the average over all directions of the plane.
-    """
-
-    method: str = "auto"
-    layers: int = 12
-    size: float = 0.15
-    tolerance: float | None = None
-    petsc: Mapping[str, str] = field(default_factory=dict)
-    parallel: bool = False
-    moduli: tuple[float, float] | None = None
-    estimate: bool = False
-    particles: str = "cylinders"
-    outline: Ellipse | None = None
-    stiffness: VoigtPhase | None = None
-    average: str = "isotropic"
-
-    @classmethod
-    def of(
-        cls, cell: RoundCell, mesh: Mesh, modulus: ModulusSection, petsc: Mapping[str, str]
-    ) -> CellChoice:
-        """The model that the sections of a case name."""
-        return cls(
-            modulus.method,
-            mesh.layers,
-            mesh.size,
-            modulus.tolerance,
-            petsc,
-            particles=cell.particles,
-            outline=cell.outline,
-            stiffness=cell.stiffness,
-            average=modulus.average,
-        )
-
-    @property
-    def averages(self) -> bool:
-        """True if E and ν are those of the isotropic average of a plane stiffness."""
-        return self.average == "isotropic" and self.particles != "spheres"
-
-    @property
-    def meaning(self) -> str:
-        """Average that E and ν are of: cylinders (eq. 16), isotropic or spheres."""
-        return "isotropic" if self.averages else self.particles
-
-    @property
-    def square(self) -> bool:
-        """True for round particles of an isotropic material."""
-        return self.outline is None and self.stiffness is None
-
-    def model(self) -> CellModel:
-        """The model.
-
-        Raises:
-            BadInput: It needs what is not installed.
-            RefusedError: An option of it is out of range.
-        """
-        try:
-            return Averaged(self._axes()) if self.averages else self._axes()
-        except ImportError as error:
-            raise BadInput.of("modulus.method", missing(error), self.method, "series") from None
-
-    def _axes(self) -> CellModel:
-        tolerance = self.tolerance
-        if self.particles == "spheres":
-            return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11))
-        outline = self.outline or circle
-        if self.square and self.method in ("auto", "series"):
-            own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
-            return SeriesModel(accuracy=own)
-        if self.method in ("auto", "slices"):
-            from alphacut.rve.slices.model import SlicesModel
-
-            return SlicesModel(mesh_size=self.size, outline=outline)
-        from alphacut.rve.prism.model import PrismModel
-
-        return PrismModel(
-            self.size,
-            self.layers,
-            petsc=dict(self.petsc),
-            parallel=self.parallel,
-            stiffness=self.averages,
-            estimate=self.estimate,
-            moduli=self.moduli,
-            outline=outline,
-        )
-
-
-@dataclass(frozen=True)
 class Averaged:
     """A model whose E and ν are those of the isotropic average of the plane stiffness.
 
@@ -163,32 +59,76 @@ class Averaged:
         return [result.averaged("isotropic") for result in results]
 
 
+def meaning(cell: RoundCell, modulus: ModulusSection) -> str:
+    """Average that E and ν are of: cylinders (eq. 16), isotropic or spheres."""
+    plane_average = modulus.average == "isotropic" and cell.particles != "spheres"
+    return "isotropic" if plane_average else cell.particles
+
+
+def model_of(cell: RoundCell, mesh: Mesh, modulus: ModulusSection, **elements: object) -> CellModel:
+    """The model that the sections of a case name.
+
+    Args:
+        cell: Phases.
+        mesh: Resolution of elements.
+        modulus: Method, tolerance and average.
+        elements: Options of the product-space elements: petsc, parallel, estimate, moduli.
+
+    Raises:
+        RefusedError: It needs what is not installed, or an option is out of range.
+    """
+    averages = meaning(cell, modulus) == "isotropic"
+    try:
+        model = _model(cell, mesh, modulus, {"stiffness": averages, **elements})
+    except ImportError as error:
+        raise RefusedError("modulus.method", modulus.method, "series", missing(error)) from None
+    return Averaged(model) if averages else model
+
+
+def _model(
+    cell: RoundCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
+) -> CellModel:
+    tolerance, method = modulus.tolerance, modulus.method
+    if cell.particles == "spheres":
+        return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11))
+    if cell.square and method in ("auto", "series"):
+        own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
+        return SeriesModel(accuracy=own)
+    outline = cell.outline or circle
+    if method in ("auto", "slices"):
+        from alphacut.rve.slices.model import SlicesModel
+
+        return SlicesModel(mesh_size=mesh.size, outline=outline)
+    from alphacut.rve.prism.model import PrismModel
+
+    return PrismModel(mesh.size, mesh.layers, outline=outline, **elements)
+
+
 def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
     """Inputs of the cell by name, crisp or fuzzy, in SI."""
     return radius.numbers | cell.phases
 
 
 def parts(
-    values: Mapping[str, float], law: ThetaLaw, stiffness: VoigtPhase | None = None
-) -> tuple[HermiteMap, Phase, AnyPhase]:
+    values: Mapping[str, float], radius: RadiusMap, cell: RoundCell
+) -> tuple[Radii, Phase, AnyPhase]:
     """Radius map, matrix and inclusion from crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
-    inclusion = stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-    a1, a2, a3, a4 = (values[name] for name in ("a1", "a2", "a3", "a4"))
-    return HermiteMap(a1, a2, a3, a4, law), matrix, inclusion
+    inclusion = cell.stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
+    return radius.at(values), matrix, inclusion
 
 
 def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    map_of, matrix, inclusion = parts(values, radius.law, cell.stiffness)
+    map_of, matrix, inclusion = parts(values, radius, cell)
     return Cell(matrix, inclusion, map_of, cell.outline or circle)
 
 
-def solve(radius: RadiusMap, cell: RoundCell, choice: CellChoice) -> Homogenised:
+def solve(radius: RadiusMap, cell: RoundCell, model: CellModel) -> Homogenised:
     """The cell's result at the modal values of its inputs."""
     modal = modal_cell(radius, cell)
-    return choice.model().solve(modal.radius, modal.matrix, [modal.inclusion])[0]
+    return model.solve(modal.radius, modal.matrix, [modal.inclusion])[0]
 
 
 def references(radius: RadiusMap, cell: RoundCell) -> Document:

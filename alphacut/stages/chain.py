@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass, field, replace
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.progress import progress
+from alphacut.fuzzy.refused import require
+from alphacut.io.netcdf import document_of
 from alphacut.stages import (
     cell,
     envelope,
@@ -23,7 +23,7 @@ from alphacut.stages import (
     response,
     shares,
 )
-from alphacut.stages.modulus import Campaign, campaign
+from alphacut.stages.modulus import Campaign
 from alphacut.stages.results import Results
 from alphacut.stages.store import Store
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-@dataclass(frozen=True)
+@dataclass
 class Chain:
     """A run of the stages of a case.
 
@@ -51,124 +51,90 @@ class Chain:
 
     def run(self) -> Results:
         """The results of every stage."""
-        self.store.folder.mkdir(parents=True, exist_ok=True)
-        content, results = self.content, Results(self.store.folder, self.content)
-        if "microstructure" in content.stages and content.microstructure:
-            results = replace(results, microstructure=self._particles())
+        results = Results(self.content)
+        if "microstructure" in self.content.stages:
+            results.microstructure = self.particles()
             radius = microstructure.radius_of(results.microstructure)
-            content = content.model_copy(update={"radius": radius})
-            self, results = replace(self, content=content), replace(results, content=content)
-        if "modulus" in content.stages:
-            results = self._image(results) if content.picture else self._modulus(results)
-        return self._motion(results) if "envelope" in content.stages else self._shares(results)
+            self.content = results.content = self.content.model_copy(update={"radius": radius})
+        if "modulus" in self.content.stages:
+            self.material(results)
+        if "envelope" in self.content.stages:
+            self._motion(results, self.structure(self._number(results)))
+        self._shares(results)
+        return results
 
-    def _particles(self) -> xarray.Dataset:
-        content = self.content
-        assert content.microstructure is not None
-        spheres = content.round is not None and content.round.particles == "spheres"
-        stage = microstructure.stage(content.microstructure, spheres=spheres, figures=self.figures)
-        return self.store.take(stage)
+    def particles(self) -> xarray.Dataset:
+        """The particles and their radius map."""
+        section = self.content.microstructure
+        require(section is not None, "microstructure", None, "a section [microstructure]")
+        assert section is not None
+        spheres = self.content.round is not None and self.content.round.particles == "spheres"
+        return self.store.take(microstructure.stage(section, spheres, self.figures))
 
     @property
-    def campaign(self) -> Campaign | None:
-        """Samples of a round cell, where the modulus is computed by them."""
-        content = self.content
-        if "modulus" not in content.stages or content.round is None or content.radius is None:
-            return None
-        return campaign(
-            content.radius,
-            content.round,
-            content.mesh,
-            content.modulus,
-            petsc=self.petsc,
-            curves=content.response is not None,
-        )
+    def campaign(self) -> Campaign:
+        """Samples of a round cell."""
+        content, curves = self.content, self.content.response is not None
+        sections = (*content.round_cell, content.mesh, content.modulus)
+        return Campaign(*sections, self.petsc, curves)
 
-    def _modulus(self, results: Results) -> Results:
-        content, samples = self.content, self.campaign
-        assert samples is not None
-        assert content.radius is not None
-        assert content.round is not None
-        data = self.store.take(modulus.stage(samples))
-        cell.require_tolerance(modulus.listed(data, "error"), content.modulus.tolerance)
-        beside = cell.references(content.radius, content.round)
-        results = replace(results, modulus=data, references=beside)
-        if content.response is None:
-            return results
-        stage = response.stage(content.response, samples, data)
-        return replace(results, response=self.store.take(stage))
-
-    def _image(self, results: Results) -> Results:
-        assert self.content.picture is not None
+    def material(self, results: Results) -> None:
+        """The modulus of the cell, round or an image."""
         section = self.content.modulus
-        stage = image.stage(self.content.picture, section.alpha, section.average)
-        return replace(results, image=self.store.take(stage))
+        if self.content.picture is not None:
+            stage = image.stage(self.content.picture, section.alpha, section.average)
+            results.image = self.store.take(stage)
+            return
+        samples = self.campaign
+        results.modulus = data = self.store.take(modulus.stage(samples))
+        cell.require_tolerance(modulus.errors_of(data), section.tolerance)
+        results.references = cell.references(*self.content.round_cell)
+        if self.content.response is not None and "modulus" in self.content.stages:
+            results.response = self.store.take(response.stage(self.content.response, samples, data))
 
     def _number(self, results: Results) -> FuzzyNumber | None:
         """The modulus for the structure, in Pa; None for its own."""
         data = results.modulus if results.image is None else results.image
         return None if data is None else modulus.number_of(data)
 
-    def _motion(self, results: Results) -> Results:
-        content, section = self.content, self.content.frame or self.content.pendulum
+    def structure(self, number: FuzzyNumber | None) -> Structure:
+        """The structure with a modulus in Pa, None for its own."""
+        content = self.content
+        section = content.frame or content.pendulum
+        whole = section is not None and content.envelope is not None
+        require(whole, "envelope", None, "a structure and a section [envelope]")
         assert section is not None
-        assert content.envelope is not None
-        structure = section.structure(self._number(results))
-        tasks = envelope.tasks(content.envelope, content.study)
-        results = replace(results, structure=structure, tasks=tasks)
-        if content.identify is not None:
-            results = self._identified(results, structure)
-        results = self._envelopes(results)
-        return self._shares(self._questions(results))
+        young = number is not None or content.frame is None or content.frame.is_whole
+        require(young, "frame.modulus", None, "a modulus, or --modulus FILE.nc")
+        return section.structure(number)
 
-    def _identified(self, results: Results, structure: Structure) -> Results:
-        section, motion = self.content.identify, self.content.envelope
-        assert section is not None
-        assert motion is not None
-        learned = identify.learned(section, structure, motion.alpha)
-        (task,) = envelope.tasks(motion, ())
-        if not set(learned.prior) <= set(structure.inputs(task.fuzzy)):
-            allowed = "all inputs that are learned, among others"
-            raise RefusedError("envelope.fuzzy", ", ".join(task.fuzzy), allowed)
-        bands = self.store.take(identify.stage(section, structure, learned, task))
-        return replace(results, structure=learned.structure, learned=learned, update=bands)
-
-    def _envelopes(self, results: Results) -> Results:
-        """Every study's envelope; several are computed side by side."""
-        structure, store = results.structure, self.store
-        assert structure is not None
-        if self.executor is not None and len(results.tasks) > 1:
-            self._side_by_side(results, structure, self.executor)
-            store = replace(store, fresh=False)
-        every = {}
+    def motion(self, results: Results, structure: Structure, studies: bool = True) -> None:
+        """Envelopes of the structure, of every study or of [envelope] alone."""
+        assert self.content.envelope is not None
+        results.structure = structure
+        results.tasks = envelope.tasks(self.content.envelope, self.content.study if studies else ())
+        longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
+        stages = [envelope.stage(structure, task) for task in longest]
+        every = self.store.take_all(stages, self.executor)
         for task in results.tasks:
-            data = store.take(envelope.stage(structure, task))
+            data = every[f"envelope_{task.name}"]
             envelope.require_tolerance(data, task, structure)
-            every[task.name] = data
-        return replace(results, envelopes=every)
+            results.envelopes[task.name] = data
 
-    def _side_by_side(self, results: Results, structure: Structure, executor: Executor) -> None:
-        quiet = replace(self.store, quiet=True)
-        under_way = envelope.side_by_side(quiet, structure, results.tasks, executor)
-        with progress("envelopes", quiet=self.store.quiet) as tick:
-            for done, future in enumerate(as_completed(under_way), start=1):
-                self.store.put(under_way[future], future.result())
-                if tick:
-                    tick(done / len(under_way))
-
-    def _questions(self, results: Results) -> Results:
-        """The answers to what the case asks of the motion of [envelope]."""
-        content, structure = self.content, results.structure
-        assert structure is not None
+    def _motion(self, results: Results, structure: Structure) -> None:
+        """Envelopes after what was identified, and the answers to what the case asks of them."""
+        content = self.content
         assert content.envelope is not None
         (task,) = envelope.tasks(content.envelope, ())
-        answers = {
-            key: question.document(self.store.take(question.stage(key, section, structure, task)))
-            for key, section in content.questions.items()
-        }
-        return replace(results, answers=answers)
+        if content.identify is not None:
+            section = content.identify
+            results.learned, structure = identify.learned(section, structure, task.section.alpha)
+        self.motion(results, structure)
+        for key, section in content.questions.items():
+            answer = self.store.take(question.stage(section, structure, task))
+            results.answers[key] = document_of(answer)
 
-    def _shares(self, results: Results) -> Results:
+    def _shares(self, results: Results) -> None:
+        samples = self.campaign if results.modulus is not None else None
         richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
-        stage = shares.stage(self.campaign, results.structure, richest)
-        return replace(results, shares=self.store.take(stage))
+        results.shares = self.store.take(shares.stage(samples, results.structure, richest))

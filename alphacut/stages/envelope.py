@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,16 +15,15 @@ from alphacut.case.structure import Structure
 from alphacut.frame.methods.named import options_of
 from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, say
-from alphacut.stages.store import Stage, Store, Work
+from alphacut.stages.store import Stage, Work
 
 if TYPE_CHECKING:
     import xarray
 
-FORCES = Tolerance(1e-3, "")
-"""Tolerance where none is named and no output is a displacement: a share of each peak."""
+USUAL = {True: Tolerance(1e-4), False: Tolerance(1e-3, "")}
+"""Tolerance where none is named: of displacements, or where there are none of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 
 
@@ -54,23 +53,19 @@ class EnvelopeTask:
         Raises:
             RefusedError: No output has that unit.
         """
-        units = {Output(name).unit for name in structure.outputs}
-        own = self.section.tolerance
-        if own.unit in units or not own.unit:
-            return own
-        if not self.section.names("tolerance"):
-            return FORCES
-        value = f"{own.value:g} {own.unit}"
-        raise RefusedError("envelope.tolerance", value, f"a share, or {', '.join(sorted(units))}")
+        units = {Output(x).unit for x in structure.outputs}
+        own = self.section.tolerance or USUAL["m" in units]
+        value, allowed = f"{own.value:g} {own.unit}", f"a share, or {', '.join(sorted(units))}"
+        require(own.unit in {"", *units}, "envelope.tolerance", value, allowed)
+        return own
 
     def options(self, structure: Structure) -> dict[str, object]:
         """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
         method, own = self.section.method, self.tolerance(structure).value
-        if method == "auto" and not self.section.names("tolerance"):
+        auto = method == "auto" and self.section.tolerance is None
+        if auto or "tolerance" not in options_of(method):
             return {}
-        share = self.section.gain if method in FOLLOWERS else 1.0
-        every: dict[str, object] = {"tolerance": own * share}
-        return {name: every[name] for name in every if name in options_of(method)}
+        return {"tolerance": own * (self.section.gain if method in FOLLOWERS else 1.0)}
 
     def compute(self, structure: Structure, work: Work) -> xarray.Dataset:
         """The envelope with the fuzzy peak of each output's magnitude.
@@ -81,24 +76,18 @@ class EnvelopeTask:
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
-        try:
-            result = frame.envelope(
-                structure.model,
-                structure.inputs(self.fuzzy),
-                duration=self.duration,
-                step=self.section.step,
-                alpha=self.section.alpha,
-                method=self.section.method,
-                integrator=self.section.integrator,
-                relative=not self.tolerance(structure).unit,
-                progress=work.tick or False,
-                **self.options(structure),
-            )
-        except RefusedError:
-            raise
-        except ValueError as error:
-            value, allowed = self.section.method, "a method that takes this structure"
-            raise RefusedError("envelope", value, allowed, str(error)) from None
+        result = frame.envelope(
+            structure.model,
+            structure.inputs(self.fuzzy),
+            duration=self.duration,
+            step=self.section.step,
+            alpha=self.section.alpha,
+            method=self.section.method,
+            integrator=self.section.integrator,
+            relative=not self.tolerance(structure).unit,
+            progress=work.tick or False,
+            **self.options(structure),
+        )
         return with_peaks(result)
 
 
@@ -130,62 +119,35 @@ def _only(study: Study) -> str:
 def stage(structure: Structure, task: EnvelopeTask) -> Stage:
     """The stage of one study."""
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
-
-    def compute(work: Work) -> xarray.Dataset:
-        return task.compute(structure, work)
-
+    compute = partial(task.compute, structure)
     return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), compute)
-
-
-def side_by_side(
-    store: Store, structure: Structure, every: Sequence[EnvelopeTask], executor: Executor
-) -> dict[Future[xarray.Dataset], Stage]:
-    """Stale envelopes under way in the executor's processes, the longest first."""
-    stages = {task: stage(structure, task) for task in every}
-    stale = store.stale(stages.values())
-    longest = sorted(every, key=lambda task: -len(task.fuzzy) * task.duration)
-    return {
-        executor.submit(task.compute, structure, store.work(stages[task])): stages[task]
-        for task in longest
-        if stages[task] in stale
-    }
 
 
 def document(data: xarray.Dataset, fuzzy: Sequence[str]) -> Document:
     """Extremes over time at the lowest level, peaks, errors, cost, in SI."""
-    lowest = data.isel(alpha=0)
+    lowest, facts = data.isel(alpha=0), ("trajectories", "seconds", "method", "nature")
     columns = {
-        "min": lowest["lower"].min("time").values,
-        "max": lowest["upper"].max("time").values,
-        "mean_width": (lowest["upper"] - lowest["lower"]).mean("time").values,
+        "min": lowest["lower"].min("time"),
+        "max": lowest["upper"].max("time"),
+        "mean_width": (lowest["upper"] - lowest["lower"]).mean("time"),
+        "error": lowest["error"].max("time"),
     }
-    if "error" in data:
-        columns["error"] = lowest["error"].max("time").values
-    facts = ("trajectories", "seconds", "method", "nature", "claim", "unproved")
+    names = [*map(str, data["output"].values)]
+    peaks_of = {
+        name: {
+            **{end: data["peak"].sel(bound=end, output=name).values for end in ("lower", "upper")},
+            "error": data["peak_error"].sel(output=name).values,
+        }
+        for name in names
+    }
     return {
         "fuzzy": list(fuzzy),
-        **{key: by_output(data, column) for key, column in columns.items()},
+        **{key: dict(zip(names, map(float, x.values), strict=True)) for key, x in columns.items()},
         "alpha": data["alpha"].values,
-        "peak": _peak_document(data),
-        **{name: data.attrs[name] for name in facts if name in data.attrs},
+        "peak": peaks_of,
+        **{name: data.attrs[name] for name in facts},
         "step": float(data["time"].values[1]),
     }
-
-
-def by_output(data: xarray.Dataset, column: Array) -> dict[str, float]:
-    """A number for each output, by its name."""
-    return dict(zip(map(str, data["output"].values), map(float, column), strict=True))
-
-
-def _peak_document(data: xarray.Dataset) -> Mapping[str, dict[str, Array]]:
-    """Fuzzy peak of each output by level: ends, and error where there is one."""
-    peaks_of = {}
-    for name in map(str, data["output"].values):
-        ends = {x: data["peak"].sel(bound=x, output=name).values for x in ("lower", "upper")}
-        if "peak_error" in data:
-            ends["error"] = data["peak_error"].sel(output=name).values
-        peaks_of[name] = ends
-    return peaks_of
 
 
 def require_tolerance(data: xarray.Dataset, task: EnvelopeTask, structure: Structure) -> None:
@@ -197,18 +159,17 @@ def require_tolerance(data: xarray.Dataset, task: EnvelopeTask, structure: Struc
     Raises:
         FailedError: One is larger.
     """
-    if "error" not in data or not task.section.names("tolerance"):
+    if task.section.tolerance is None:
         return
     allowed = task.tolerance(structure)
-    errors = data["error"].max(("alpha", "time")).values
-    peak = data["peak"].sel(bound="upper").max("alpha").values
-    for name, error, size in zip(map(str, data["output"].values), errors, peak, strict=True):
-        reached = error / size if not allowed.unit and size else error
-        if (not allowed.unit or Output(name).unit == allowed.unit) and reached > allowed.value * (
-            1 + 1e-9
-        ):
-            what = f"the error of {name} is {reached:.2g}; the case allows {allowed.value:.2g}"
+    errors = data["error"].max(("alpha", "time"))
+    if not allowed.unit:
+        errors = errors / data["peak"].sel(bound="upper").max("alpha")
+    for name, error in zip(map(str, data["output"].values), errors.values, strict=True):
+        meant = allowed.unit in ("", Output(name).unit)
+        if meant and error > allowed.value * (1 + 1e-9):
+            what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
             cure = "method auto, or a smaller envelope.step, reaches it"
-            if data.attrs.get("method") not in FOLLOWERS:
+            if data.attrs["method"] not in FOLLOWERS:
                 raise FailedError(what, cure)
             say(f"warning: {what}; {cure}")

@@ -5,25 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.model import ImageModel
+from alphacut.fuzzy.refused import require
 from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_phases
 from alphacut.stochastic.segmentation import segmented
 
-if TYPE_CHECKING:
-    from alphacut.case.material import ImageCell
-
-ACCURACY = 1e-5
-"""Relative energy that the solver may leave."""
 Level = float | None
 """α-level, or None for the modal values alone."""
 Ranges = Callable[[Level], tuple[Rows, Rows]]
@@ -42,15 +35,11 @@ class ImageStudy:
     Args:
         cell: The section of the case.
         ranges: Phases that each pixel may be of, at a level.
-        alpha: Levels, rising.
-        model: Solution of the fields.
         fuzzy_threshold: Whether the phases of the pixels depend on the level.
     """
 
     cell: ImageCell
     ranges: Ranges
-    alpha: tuple[float, ...]
-    model: ImageModel
     fuzzy_threshold: bool
 
     @property
@@ -58,57 +47,39 @@ class ImageStudy:
         """True if the moduli depend on the level."""
         return any(number.support.width > 0 for pair in self.cell.pairs for number in pair)
 
-    def phases(self, level: Level) -> list[ModuliInterval]:
-        """Moduli of each phase at a level."""
-        return [
-            ModuliInterval.of_young(cut_at(young, level), cut_at(poisson, level))
-            for young, poisson in self.cell.pairs
-        ]
-
     def images(self, threshold: Level, phases: Level) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
-        return moduli_images(*self.ranges(threshold), self.phases(phases))
+        moduli = [
+            ModuliInterval.of_young(cut_at(young, phases), cut_at(poisson, phases))
+            for young, poisson in self.cell.pairs
+        ]
+        return moduli_images(*self.ranges(threshold), moduli)
 
     @property
-    def fractions(self) -> Array:
-        """Area share of each phase at the modal values."""
+    def fractions(self) -> dict[str, float]:
+        """Area share of each phase at the modal values, dark first."""
         phase = self.ranges(None)[0]
-        return np.bincount(phase.ravel(), minlength=len(self.cell.pairs)) / phase.size
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of each phase, dark first."""
+        shares = np.bincount(phase.ravel(), minlength=len(self.cell.pairs)) / phase.size
         if self.cell.labels is not None:
-            return tuple(f"label {label:g}" for label in self.cell.labels)
-        ends = [f"{number.modal:g}" for number in self.cell.threshold or ()]
-        between = (f"grey {a} … {b}" for a, b in pairwise(ends))
-        return f"grey below {ends[0]}", *between, f"grey above {ends[-1]}"
+            names = [f"label {label:g}" for label in self.cell.labels]
+        else:
+            ends = [f"{number.modal:g}" for number in self.cell.threshold or ()]
+            between = (f"grey {a} … {b}" for a, b in pairwise(ends))
+            names = [f"grey below {ends[0]}", *between, f"grey above {ends[-1]}"]
+        return dict(zip(names, map(float, shares), strict=True))
 
 
-def study_of(cell: ImageCell, alpha: tuple[float, ...], average: str) -> ImageStudy:
+def study_of(cell: ImageCell) -> ImageStudy:
     """The study of an image cell, whose segmentation is judged first.
-
-    Args:
-        cell: The section of the case.
-        alpha: Levels, rising.
-        average: What E and ν are of.
 
     Raises:
         RefusedError: Its image cannot be used.
     """
-    try:
-        grey = read_grey(cell.image, square=len(cell.pixel) == 1)
-        ranges, fuzzy = _labelled(grey, cell.labels) if cell.labels else _thresholds(grey, cell)
-        aspect, solver = cell.pixel[-1] / cell.pixel[0], ConjugateGradient(ACCURACY)
-        model = ImageModel(aspect, solver=solver, average=average)
-        return ImageStudy(cell, ranges, alpha, model, fuzzy)
-    except RefusedError:
-        raise
-    except ValueError as error:
-        raise RefusedError("cell.image", cell.image.name, "an image", str(error)) from None
+    grey = read_grey(cell.image, square=len(cell.pixel) == 1)
+    return _labelled(grey, cell, cell.labels) if cell.labels else _thresholds(grey, cell)
 
 
-def _thresholds(grey: Array, cell: ImageCell) -> tuple[Ranges, bool]:
+def _thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     """Phases by thresholds; what noise and light leave open is fuzzy, unless thresholds are."""
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
@@ -125,20 +96,15 @@ def _thresholds(grey: Array, cell: ImageCell) -> tuple[Ranges, bool]:
         pairs = [(low + by, high + by) for (low, high), by in zip(cuts, moved, strict=True)]
         return threshold_ranges(judged.grey, pairs)
 
-    return ranges, fuzzy or judged.open > 0
+    return ImageStudy(cell, ranges, fuzzy or judged.open > 0)
 
 
-def _labelled(grey: Array, labels: tuple[float, ...]) -> tuple[Ranges, bool]:
-    """Phases of an image whose pixels hold labels.
-
-    Raises:
-        RefusedError: A pixel holds another value, or a label is nowhere.
-    """
+def _labelled(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageStudy:
+    """Phases of an image whose pixels hold labels."""
     phase = np.full(grey.shape, -1)
     for number, label in enumerate(labels):
         phase[grey == label] = number
     values = {float(x) for x in np.unique(grey)}
-    if values != set(labels):
-        wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
-        raise RefusedError("cell.labels", wrong, "every value of the image, and no other")
-    return (lambda level: (phase, phase)), False
+    wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
+    require(not wrong, "cell.labels", wrong, "every value of the image, and no other")
+    return ImageStudy(cell, lambda level: (phase, phase), False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,42 +22,33 @@ if TYPE_CHECKING:
     import xarray
 
 
-def stage(section: Section, *, spheres: bool, figures: bool = True) -> Stage:
+def stage(section: Section, spheres: bool, figures: bool = True) -> Stage:
     """The stage of some particles; in a folder it writes radius.toml and figures as well."""
-
-    def compute(work: Work) -> xarray.Dataset:
-        map_of = computed(section, spheres=spheres, work=work)
-        if work.folder is not None:
-            write(map_of, work.folder, figures=figures)
-        data = to_dataset(map_of)
-        return data.assign_attrs(document=as_json(summary(map_of)), radius=fragment(map_of))
-
     source = section.packing or section.circles or section.image
     file = getattr(source, "file", None)
     inputs = [section, spheres, file and file_digest(file)]
+    compute = partial(dataset, section, spheres, figures)
     return Stage("microstructure", inputs, ("stochastic",), compute)
 
 
-def computed(section: Section, *, spheres: bool, work: Work) -> Microstructure:
-    """The fuzzy radius map; the same for any number of workers.
+def dataset(section: Section, spheres: bool, figures: bool, work: Work) -> xarray.Dataset:
+    """The fuzzy radius map with its data; the same for any number of workers.
 
     Raises:
         RefusedError: Measured data have no meaning.
         FailedError: Particles find no place.
     """
     with pool(work.workers) as executor:
-        return study(section.study(spheres=spheres), executor=executor, progress=work.tick)
+        map_of = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
+    if work.folder is not None:
+        write(map_of, work.folder, figures=figures)
+    facts = {"document": as_json(summary(map_of)), "radius": fragment(map_of)}
+    return to_dataset(map_of).assign_attrs(facts)
 
 
 def radius_of(dataset: xarray.Dataset) -> RadiusMap:
     """The section [radius] that the particles give."""
     return RadiusMap.model_validate(tomllib.loads(str(dataset.attrs["radius"]))["radius"])
-
-
-def document(dataset: xarray.Dataset) -> dict[str, object]:
-    """Numbers of the particles and of their map."""
-    numbers: dict[str, object] = json.loads(dataset.attrs["document"])
-    return numbers
 
 
 PICTURES = {

@@ -4,40 +4,36 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
 from alphacut.fuzzy import Crisp, Extended, FuzzyNumber, General, Known, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.campaign.values import Samples
 from alphacut.fuzzy.plans.method import Method as Plan
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds as Cuts
 from alphacut.fuzzy.sets.stepwise import outer_steps
-from alphacut.io.files import Document
+from alphacut.io.files import Document, as_json
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
-from alphacut.stages.cell import GPA, CellChoice, inputs_of, parts
+from alphacut.stages.cell import GPA, CellModel, inputs_of, meaning, model_of, parts
 from alphacut.stages.store import Stage, Work
-from alphacut.stochastic import ThetaLaw
 from alphacut.stochastic.theta.quadrature import between_nodes
 
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
-
 SHOWN = 61
 """Points over θ of a stored stress curve."""
 OF_CURVES = 1e-9
 """Relative tolerance on E with which a curve between its nodes is good to 1e-4 or so."""
-SOURCES = ("space", "theta")
-"""Sources of error, see rve.result.Homogenised."""
 BOUNDS = {
     "E": ("Pa", "effective Young's modulus"),
     "nu": ("1", "effective Poisson's ratio"),
@@ -54,136 +50,63 @@ FIBRES = {
 """Constants of cylinders besides; see rve.fibre_constants."""
 CURVES = {"s11": "curve11", "s12": "curve12"}
 """Variables with the stress over θ of each mean stress."""
+CUT = ("alpha", "bound")
+OUTPUTS = ("E", "nu")
+PLANS: dict[str, Plan] = {
+    "general": General(),
+    "reduced": Reduced(),
+    "extended": Extended(outputs=OUTPUTS),
+    "signed": Signed(outputs=OUTPUTS),
+}
 
 
 @dataclass(frozen=True)
 class CellTask:
-    """Samples of the cell that share all but the inclusion's modulus.
+    """Samples of the cell that share all but the inclusion's modulus, for any process.
 
     Args:
-        choice: Model of the cell.
+        model: Model of the cell.
+        radius: Random radius.
+        cell: Phases.
         crisp: Inputs that are not fuzzy, by name, in SI.
-        law: Law of θ.
     """
 
-    choice: CellChoice
+    model: CellModel
+    radius: RadiusMap
+    cell: RoundCell
     crisp: Mapping[str, float]
-    law: ThetaLaw
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
-        stiffness = self.choice.stiffness
-        every = [parts({**self.crisp, **point}, self.law, stiffness) for point in points]
+        every = [parts({**self.crisp, **point}, self.radius, self.cell) for point in points]
         radius, matrix, _ = every[0]
-        results = self.choice.model().solve(radius, matrix, [inclusion for *_, inclusion in every])
-        return [
-            {
-                **{"E": result.modulus, "nu": result.poisson},
-                **dict(zip(("s11", "s12"), result.curve.mean, strict=True)),
-                **self._fibres(result),
-                "systems": len(result.iterations),
-                "curve11": self._shown(result.curve.theta, result.curve.s11),
-                "curve12": self._shown(result.curve.theta, result.curve.s12),
-                **{f"error:{source}": result.error.get(source, 0.0) for source in SOURCES},
-                **{f"check:{name}": value for name, value in result.checks.items()},
-            }
-            for result in results
-        ]
+        results = self.model.solve(radius, matrix, [inclusion for *_, inclusion in every])
+        return [self._outputs(result) for result in results]
 
-    def _fibres(self, result: Homogenised) -> dict[str, float]:
-        if not self.has_fibres:
-            return {}
-        values = fibre_constants(result).values
-        return {name: values[name] for name in FIBRES}
-
-    @property
-    def has_fibres(self) -> bool:
-        """True for particles that are round fibres of an isotropic material."""
-        return self.choice.square and self.choice.particles == "cylinders"
-
-    def _shown(self, nodes: Array, stress: Array) -> Array:
-        return between_nodes(nodes, stress, self.theta)
-
-    @property
-    def theta(self) -> Array:
-        """The θ at which stress curves are stored, shape (SHOWN,)."""
-        return np.asarray(np.linspace(self.law.lower, self.law.upper, SHOWN))
-
-    @property
-    def identity(self) -> Document:
-        """Origin of a sample besides its fuzzy inputs: model, resolution, program."""
-        content = {
-            "choice": asdict(self.choice),
-            "crisp": dict(self.crisp),
-            "law": repr(self.law),
-            "source": source_digest(("stochastic", "rve")),
-            "versions": versions(),
+    def _outputs(self, result: Homogenised) -> dict[str, float | Array]:
+        curve, theta = result.curve, theta_of(self.radius)
+        fibres = fibre_constants(result).values if self.cell.fibres else {}
+        return {
+            "E": result.modulus,
+            "nu": result.poisson,
+            **dict(zip(("s11", "s12"), curve.mean, strict=True)),
+            **{name: fibres[name] for name in FIBRES if name in fibres},
+            "systems": len(result.iterations),
+            "curve11": between_nodes(curve.theta, curve.s11, theta),
+            "curve12": between_nodes(curve.theta, curve.s12, theta),
+            **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
+            **{f"check:{name}": value for name, value in result.checks.items()},
         }
-        read: Document = json.loads(json.dumps(content))  # tuples become lists
-        return read
+
+
+def theta_of(radius: RadiusMap) -> Array:
+    """The θ at which stress curves are stored, shape (SHOWN,)."""
+    return np.asarray(np.linspace(*radius.theta, SHOWN))
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """Samples to be run.
-
-    Args:
-        task: The function, for any process.
-        inputs: Fuzzy inputs by name, in SI.
-        plan: Search of their boxes.
-        alpha: Levels, rising.
-        known: Signs that mechanics proves of the cell's response.
-    """
-
-    task: CellTask
-    inputs: Mapping[str, FuzzyNumber]
-    plan: Plan
-    alpha: tuple[float, ...]
-    known: Known
-
-    def run(self, work: Work) -> xarray.Dataset:
-        """The α-cuts with all samples; a store beside them goes on after an interruption."""
-        store = None if work.folder is None else work.folder / "samples.db"
-        if store is not None and work.fresh:
-            for old in store.parent.glob("samples.db*"):
-                old.unlink()
-        self.task.choice.model()  # one refusal, not one for each sample
-        result = propagate(
-            self.task,
-            self.inputs,
-            self.plan,
-            alpha=self.alpha,
-            shared=tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs),
-            workers=work.workers,
-            progress=work.tick or False,
-            known=self.known,
-            store=store,
-            identity=self.task.identity if store else None,
-        )
-        return dataset(result, self.task, self._judged(result))
-
-    def _judged(self, result: Cuts) -> dict[str, float]:
-        """Relative error of E by source: the largest of all samples, or that of the modal one."""
-        largest = _largest(result, "error")
-        if largest or self.task.choice.method != "prism":
-            return largest
-        modal = {name: number.modal for name, number in self.inputs.items()}
-        values, choice = {**self.task.crisp, **modal}, self.task.choice
-        radius, matrix, inclusion = parts(values, self.task.law, choice.stiffness)
-        model = replace(choice, estimate=True).model()
-        return dict(model.solve(radius, matrix, [inclusion])[0].error)
-
-
-def campaign(
-    radius: RadiusMap,
-    cell: RoundCell,
-    mesh: Mesh,
-    modulus: ModulusSection,
-    *,
-    petsc: Mapping[str, str] | None = None,
-    curves: bool = False,
-) -> Campaign:
-    """The samples that the sections of a case ask for.
+    """Samples that the sections of a case ask for.
 
     Args:
         radius: Random radius.
@@ -193,189 +116,209 @@ def campaign(
         petsc: PETSc options.
         curves: Whether the curve over θ is needed between its nodes.
     """
-    numbers = inputs_of(radius, cell)
-    fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
-    material = "inclusion_modulus" if cell.stiffness is None else "matrix_modulus"
-    fuzzy = fuzzy or {material: numbers[material]}
-    crisp = {name: number.modal for name, number in numbers.items() if name not in fuzzy}
-    choice = CellChoice.of(cell, mesh, modulus, petsc or {})
-    if choice.method == "prism" and cell.stiffness is None:
-        support = numbers["inclusion_modulus"].support
-        choice = replace(choice, moduli=(support.lower, support.upper))
-    if curves and choice.method in ("auto", "series"):
-        choice = replace(choice, tolerance=min(choice.tolerance or 1.0, OF_CURVES))
-    task = CellTask(choice, crisp, radius.law)
-    known = _known(cell, fuzzy) if modulus.method != "prism" else Known()
-    return Campaign(task, fuzzy, plan_of(modulus.plan), modulus.alpha, known)
 
+    radius: RadiusMap
+    cell: RoundCell
+    mesh: Mesh
+    modulus: ModulusSection
+    petsc: Mapping[str, str] = field(default_factory=dict)
+    curves: bool = False
 
-def plan_of(name: str) -> Plan:
-    """The plan of a name."""
-    outputs = ("E", "nu")
-    plans: dict[str, Plan] = {
-        "general": General(),
-        "reduced": Reduced(),
-        "extended": Extended(outputs=outputs),
-        "signed": Signed(outputs=outputs),
-    }
-    return plans[name]
+    @cached_property
+    def inputs(self) -> dict[str, FuzzyNumber]:
+        """Fuzzy inputs by name, in SI; the material where none is fuzzy."""
+        numbers = inputs_of(self.radius, self.cell)
+        material = "inclusion_modulus" if self.cell.stiffness is None else "matrix_modulus"
+        fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
+        return fuzzy or {material: numbers[material]}
 
+    def model(self, *, estimate: bool = False) -> CellModel:
+        """The model of the cell; it may declare its errors at an extra cost."""
+        support, modulus = None, self.modulus
+        if self.cell.stiffness is None:
+            ends = inputs_of(self.radius, self.cell)["inclusion_modulus"].support
+            support = (ends.lower, ends.upper)
+        if self.curves:
+            tolerance = min(modulus.tolerance or 1.0, OF_CURVES)
+            modulus = modulus.model_copy(update={"tolerance": tolerance})
+        own = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
+        return model_of(self.cell, self.mesh, modulus, **own)
 
-def _known(cell: RoundCell, inputs: Mapping[str, FuzzyNumber]) -> Known:
-    """Signs of the inputs' effects on E, where mechanics proves them.
+    def task(self, model: CellModel) -> CellTask:
+        """The function of the fuzzy inputs."""
+        numbers = inputs_of(self.radius, self.cell)
+        crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
+        return CellTask(model, self.radius, self.cell, crisp)
 
-    Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only stiffen: A
-    and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B); of spheres the bulk modulus and both
-    averages of the shear modulus. The radius rises with a1, a2, a3 and falls with a4, since h1, h2,
-    h3 >= 0 >= h4 (eq. 12).
-    """
-    if not cell.square:
-        return Known()
-    of = {name: number.support for name, number in cell.phases.items()}
-    matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]
-    poisson = {of["matrix_poisson"], of["inclusion_poisson"]}
-    stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
-    one = next(iter(poisson))
-    if len(poisson) > 1 or one.width or one.lower < 0 or not (stiffer or softer):
-        return Known()
-    way = 1 if stiffer else -1
-    signs = {"a1": way, "a2": way, "a3": way, "a4": -way}
-    signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
-    of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in inputs}
-    return Known(signs=of_inputs, source="as mechanics proves of exact cells")
+    @property
+    def identity(self) -> Document:
+        """Origin of a sample besides its fuzzy inputs: sections, program."""
+        modulus = self.modulus.model_dump(exclude={"plan", "alpha"})
+        crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
+        options = [self.mesh.model_dump(), self.cell.particles, dict(self.petsc), self.curves]
+        source = [source_digest(("stochastic", "rve")), versions()]
+        stiffness = repr(self.cell.stiffness)
+        sections = [modulus, options, crisp, repr(self.radius.theta), stiffness]
+        return {"sections": sections, "source": source}
+
+    def cuts(self, inputs: Mapping[str, FuzzyNumber], plan: Plan, **options: Any) -> Cuts:
+        """The α-cuts of all outputs; inputs that are left out are crisp."""
+        shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
+        task, alpha = self.task(self.model()), self.modulus.alpha
+        return propagate(task, inputs, plan, alpha=alpha, shared=shared, **options)
+
+    def run(self, work: Work) -> xarray.Dataset:
+        """The α-cuts with all samples; a store beside them goes on after an interruption."""
+        store = None if work.folder is None else work.folder / "samples.db"
+        if store is not None and work.fresh:
+            for old in store.parent.glob("samples.db*"):
+                old.unlink()
+        result = self.cuts(
+            self.inputs,
+            PLANS[self.modulus.plan],
+            workers=work.workers,
+            progress=work.tick or False,
+            known=self.known,
+            store=store,
+            identity=self.identity if store else None,
+        )
+        return dataset(result, self)
+
+    @property
+    def known(self) -> Known:
+        """Signs of the inputs' effects on E, where mechanics proves them.
+
+        Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only
+        stiffen: A and B of eq. 16 rise, and with them E = 3A/2 − A²/(2B); of spheres the bulk
+        modulus and both averages of the shear modulus. The radius rises with a1, a2, a3 and falls
+        with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12).
+        """
+        if not self.cell.square or self.modulus.method == "prism":
+            return Known()
+        of = {name: number.support for name, number in self.cell.phases.items()}
+        matrix, inclusion, poisson = (
+            of["matrix_modulus"],
+            of["inclusion_modulus"],
+            of["matrix_poisson"],
+        )
+        stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
+        same = poisson == of["inclusion_poisson"] and not poisson.width and poisson.lower >= 0
+        if not same or not (stiffer or softer):
+            return Known()
+        way = 1 if stiffer else -1
+        signs = {"a1": way, "a2": way, "a3": way, "a4": -way}
+        signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
+        of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
+        return Known(signs=of_inputs, source="as mechanics proves of exact cells")
+
+    def errors(self, result: Cuts) -> dict[str, float]:
+        """Relative error of E by source: the largest of all samples, or that of the modal one."""
+        errors = {name: error for name, error in _largest(result, "error").items() if error}
+        if errors or self.modulus.method != "prism":
+            return errors
+        modal = {name: x.modal for name, x in inputs_of(self.radius, self.cell).items()}
+        radius, matrix, inclusion = parts(modal, self.radius, self.cell)
+        return dict(self.model(estimate=True).solve(radius, matrix, [inclusion])[0].error)
 
 
 def stage(campaign: Campaign) -> Stage:
     """The stage of a round cell's samples."""
-    inputs = [campaign.task.identity, campaign.inputs, repr(campaign.plan), campaign.alpha]
+    plan, alpha = campaign.modulus.plan, campaign.modulus.alpha
+    inputs = [campaign.identity, campaign.inputs, plan, alpha]
     return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run)
 
 
-def dataset(result: Cuts, task: CellTask, error: Mapping[str, float]) -> xarray.Dataset:
+def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
     """α-cuts of every quantity (alpha, bound), where reached, and all samples."""
     import xarray
 
+    samples = result.samples
+    assert samples is not None
     variables: dict[str, Any] = {}
-    fibres = FIBRES if task.has_fibres else {}
-    for name, (unit, about) in (BOUNDS | fibres).items():
-        variables |= _cuts(result, name, {"units": unit, "long_name": about})
-    variables["point"] = (
-        ("sample", "parameter"),
-        _samples(result).points,
-        {"long_name": "inputs, in SI"},
-    )
+    for name, (unit, about) in (BOUNDS | (FIBRES if campaign.cell.fibres else {})).items():
+        words, column = {"units": unit, "long_name": about}, result.column(name)
+        places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+        reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
+        variables[name] = (CUT, np.stack(result.bounds(name), axis=1), words)
+        variables[f"{name}_at"] = ((*CUT, "parameter"), places, reached)
+        variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
+    about_points = {"long_name": "inputs, in SI"}
+    variables["point"] = (("sample", "parameter"), samples.points, about_points)
     for name in CURVES.values():
         words = {"units": "Pa", "long_name": f"homogenised stress {name[-2:]} over θ"}
-        variables[name] = (("sample", "theta"), _samples(result).values.output(name), words)
-    checks = _largest(result, "check")
-    for kind, values in (("error", error), ("check", checks)):
-        words = {"long_name": f"largest {kind} of all samples"}
-        variables[kind] = ((f"{kind}_name",), list(values.values()), words)
+        variables[name] = (("sample", "theta"), samples.values.output(name), words)
     coordinates = {
-        "error_name": list(error),
-        "check_name": list(checks),
-        "theta": task.theta,
+        "theta": theta_of(campaign.radius),
         "alpha": result.alpha,
         "bound": ["lower", "upper"],
         "parameter": list(result.inputs),
     }
-    return xarray.Dataset(variables, coordinates, _facts(result, task))
-
-
-def _samples(result: Cuts) -> Samples:
-    """All samples of the cell."""
-    assert result.samples is not None
-    return result.samples
-
-
-def _facts(result: Cuts, task: CellTask) -> dict[str, Any]:
-    return {
-        "method": task.choice.method,
+    facts = {
+        "method": campaign.modulus.method,
         "plan": result.method,
         "samples": result.evaluations,
-        "solves": int(_samples(result).values.output("systems").sum()),
+        "solves": int(samples.values.output("systems").sum()),
         "seconds": result.seconds,
         "nature": str(result.nature_of("E")),
-        "particles": task.choice.particles,
-        "average": task.choice.meaning,
+        "particles": campaign.cell.particles,
+        "average": meaning(campaign.cell, campaign.modulus),
+        "error": as_json(campaign.errors(result)),
+        "checks": as_json(_largest(result, "check")),
     }
-
-
-def _cuts(result: Cuts, name: str, words: Mapping[str, str]) -> dict[str, Any]:
-    """Variables of one quantity: its cuts, the inputs that reach them, and its samples."""
-    column = result.column(name)
-    places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
-    reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
-    return {
-        name: (("alpha", "bound"), np.stack(result.bounds(name), axis=1), words),
-        f"{name}_at": (("alpha", "bound", "parameter"), places, reached),
-        f"{name}_sample": (("sample",), _samples(result).values.output(name), words),
-    }
+    return xarray.Dataset(variables, coordinates, facts)
 
 
 def _largest(result: Cuts, kind: str) -> dict[str, float]:
     """Largest of each error or property of the certificate over all samples."""
-    values = _samples(result).values
-    largest = {
+    assert result.samples is not None
+    values = result.samples.values
+    return {
         name.partition(":")[2]: float(values.output(name).max())
         for name, _ in values.layout
         if name.startswith(f"{kind}:")
     }
-    return {name: value for name, value in largest.items() if value or kind == "check"}
 
 
-def listed(dataset: xarray.Dataset, kind: str) -> dict[str, float]:
-    """Named numbers of a dataset, such as errors by source."""
-    if kind not in dataset:
-        return {}
-    names = map(str, dataset[f"{kind}_name"].values)
-    return dict(zip(names, map(float, dataset[kind].values), strict=True))
-
-
-def document(dataset: xarray.Dataset) -> Document:
+def document(data: xarray.Dataset) -> Document:
     """α-cuts in GPa, their ends, nature, errors and cost."""
-    ends = dataset["E"].transpose("alpha", "bound").values / GPA
-    poisson = dataset["nu"].transpose("alpha", "bound").values
+    ends = data["E"].transpose("alpha", "bound").values / GPA
+    poisson = data["nu"].transpose("alpha", "bound").values
     names = ("samples", "solves", "seconds", "method", "plan", "nature", "particles", "average")
+    fibres = {}
+    for name, (unit, _) in FIBRES.items():
+        if name in data:
+            of = data[name].transpose("alpha", "bound").values / (GPA if unit == "Pa" else 1)
+            key = f"{name}_GPa" if unit == "Pa" else name
+            fibres[key] = {"lower": of[:, 0], "upper": of[:, 1]}
     return {
-        "alpha": dataset["alpha"].values,
+        "alpha": data["alpha"].values,
         "E_GPa": {"lower": ends[:, 0], "upper": ends[:, 1]},
-        "modal_GPa": ends[-1].mean(),
-        "lower_GPa": ends[0, 0],
-        "upper_GPa": ends[0, 1],
-        "nu": poisson[-1].mean(),
         "nu_cuts": {"lower": poisson[:, 0], "upper": poisson[:, 1]},
-        "fibres": fibres(dataset),
-        **{name: dataset.attrs[name] for name in names},
-        "error": listed(dataset, "error"),
-        "checks": listed(dataset, "check"),
+        "fibres": fibres,
+        **{name: data.attrs[name] for name in names},
+        "error": errors_of(data),
+        "checks": json.loads(data.attrs["checks"]),
     }
 
 
-def fibres(dataset: xarray.Dataset) -> Document:
-    """α-cuts of the constants of fibres, moduli in GPa; none of spheres."""
-    cuts = {}
-    for name, (unit, _) in FIBRES.items():
-        if name in dataset:
-            ends = dataset[name].transpose("alpha", "bound").values / (GPA if unit == "Pa" else 1)
-            key = f"{name}_GPa" if unit == "Pa" else name
-            cuts[key] = {"lower": ends[:, 0], "upper": ends[:, 1]}
-    return cuts
+def errors_of(data: xarray.Dataset) -> dict[str, float]:
+    """Declared relative error of E by source."""
+    errors: dict[str, float] = json.loads(data.attrs["error"])
+    return errors
 
 
-def number_of(dataset: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
+def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     """The fuzzy modulus in Pa; between two levels the wider cut holds.
 
     Raises:
         RefusedError: It is not positive, or lacks the levels 0 and 1.
     """
-    alpha, ends = dataset["alpha"].values, dataset["E"].transpose("alpha", "bound").values
-    if not float(ends.min()) > 0:
-        raise RefusedError(key, f"{ends.min() / GPA:.3g} GPa", "a modulus above 0")
+    alpha, ends = data["alpha"].values, data["E"].transpose("alpha", "bound").values
+    require(ends.min() > 0, key, f"{ends.min() / GPA:.3g} GPa", "a modulus above 0")
     if tuple(alpha) == (1.0,):
         return Crisp(float(ends.mean()))
-    if (alpha[0], alpha[-1]) != (0, 1):
-        raise RefusedError(key, f"{alpha.tolist()}", "levels from 0 to 1, or 1 alone")
+    whole = (alpha[0], alpha[-1]) == (0, 1)
+    require(whole, key, alpha.tolist(), "levels from 0 to 1, or 1 alone")
     return outer_steps(alpha, ends[:, 0], ends[:, 1])
 
 
@@ -386,6 +329,6 @@ def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
         RefusedError: The file holds none.
     """
     data = read_dataset(Path(path), key=option)
-    if not {"E", "alpha"} <= {*map(str, data.variables)}:
-        raise RefusedError(option, str(path), "a modulus.nc of this program")
+    holds = {"E", "alpha"} <= {*map(str, data.variables)}
+    require(holds, option, str(path), "a modulus.nc of this program")
     return number_of(data, option)

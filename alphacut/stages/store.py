@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,14 +22,12 @@ class Work:
 
     Args:
         folder: Folder for what is kept on the way; None to keep nothing.
-        key: Fingerprint of the stage.
         fresh: Whether what an earlier run kept is passed over.
         workers: Processes.
         tick: Takes the share done; None to show nothing.
     """
 
     folder: Path | None = None
-    key: str = ""
     fresh: bool = False
     workers: int = 1
     tick: Tick | None = None
@@ -53,14 +52,7 @@ class Stage:
     @property
     def key(self) -> str:
         """Fingerprint of inputs, source and libraries."""
-        return fingerprint({"inputs": self.inputs}, self.packages)
-
-    def once(
-        self, *, workers: int = 1, quiet: bool = False, kept: Path | None = None
-    ) -> xarray.Dataset:
-        """The dataset, computed without a store; what is unfinished stays in the folder `kept`."""
-        with progress(self.name, quiet=quiet) as tick:
-            return self.compute(Work(kept, self.key, workers=workers, tick=tick))
+        return fingerprint(self.inputs, self.packages)
 
 
 @dataclass(frozen=True)
@@ -68,49 +60,70 @@ class Store:
     """Folder of the results of a run.
 
     Args:
-        folder: The folder.
+        folder: The folder; None to keep nothing.
         case_text: The case, which every file carries.
         fresh: Whether everything is computed anew.
         quiet: Whether nothing is shown.
         workers: Processes of a stage.
+        made: Fingerprints of the stages that this run has computed.
         taken: Names of the stages whose files were up to date.
     """
 
-    folder: Path
+    folder: Path | None
     case_text: str
     fresh: bool = False
     quiet: bool = False
     workers: int = 1
+    made: list[str] = field(default_factory=list)
     taken: list[str] = field(default_factory=list)
-
-    def file(self, name: str) -> Path:
-        """A file among the results."""
-        return self.folder / name
 
     def take(self, stage: Stage) -> xarray.Dataset:
         """The dataset of a stage: from its file where that is up to date, else computed."""
-        if not self.current(stage):
+        if not self._current(stage):
+            if self.folder is not None:
+                self.folder.mkdir(parents=True, exist_ok=True)
             with progress(stage.name, quiet=self.quiet) as tick:
-                self.put(stage, stage.compute(self.work(stage, tick)))
-        return read_dataset(self.file(f"{stage.name}.nc"))
+                data = stage.compute(Work(self.folder, self.fresh, self.workers, tick))
+            if self.folder is None:
+                return data
+            self._put(stage, data)
+        return read_dataset(self._file(stage))
 
-    def work(self, stage: Stage, tick: Tick | None = None) -> Work:
-        """Surroundings of the stage's computation."""
-        return Work(self.folder, stage.key, self.fresh, self.workers, tick)
+    def take_all(
+        self, stages: Sequence[Stage], executor: Executor | None
+    ) -> dict[str, xarray.Dataset]:
+        """The datasets of several stages by their names, computed side by side by an executor.
 
-    def put(self, stage: Stage, dataset: xarray.Dataset) -> None:
+        Args:
+            stages: Those that take longest first.
+            executor: Processes; None where this one does everything.
+        """
+        if executor is not None and self.folder is not None and len(stages) > 1:
+            work = Work(self.folder, self.fresh)
+            stale = [stage for stage in stages if not self._current(stage)]
+            under_way = {executor.submit(stage.compute, work): stage for stage in stale}
+            with progress("stages", quiet=self.quiet) as tick:
+                for done, future in enumerate(as_completed(under_way), start=1):
+                    self._put(under_way[future], future.result())
+                    if tick:
+                        tick(done / len(under_way))
+        return {stage.name: self.take(stage) for stage in stages}
+
+    def _file(self, stage: Stage) -> Path:
+        return (self.folder or Path()) / f"{stage.name}.nc"
+
+    def _put(self, stage: Stage, dataset: xarray.Dataset) -> None:
         """Writes a stage's dataset, whole or not at all."""
-        facts = attributes(self.case_text, stage.key)
-        write_dataset(dataset, self.file(f"{stage.name}.nc"), facts)
+        write_dataset(dataset, self._file(stage), attributes(self.case_text, stage.key))
+        self.made.append(stage.key)
 
-    def current(self, stage: Stage) -> bool:
-        """True if the file of a stage may be taken, which is then noted."""
-        path = self.file(f"{stage.name}.nc")
-        if self.fresh or not path.is_file() or fingerprint_of(path) != stage.key:
+    def _current(self, stage: Stage) -> bool:
+        """True if the file of a stage may be taken."""
+        path, made = self._file(stage), stage.key in self.made
+        if self.folder is None or (self.fresh and not made) or not path.is_file():
             return False
-        self.taken.append(stage.name)
+        if fingerprint_of(path) != stage.key:
+            return False
+        if not made:
+            self.taken.append(stage.name)
         return True
-
-    def stale(self, stages: Iterable[Stage]) -> list[Stage]:
-        """Stages whose files may not be taken."""
-        return [stage for stage in stages if not self.current(stage)]

@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -58,11 +59,7 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
     Raises:
         RefusedError: The file is missing, no text, or has no row.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "no text"
-        raise RefusedError("file", path, f"CSV files in UTF-8 ({reason})") from None
+    text = text_of(path)
     lines = [(row, line) for row, line in enumerate(text.splitlines(), 1)]
     lines = [(row, line) for row, line in lines if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
@@ -72,6 +69,19 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
     return [(row, next(csv.reader([line], delimiter=separator))) for row, line in lines]
 
 
+def text_of(path: Path) -> str:
+    """The text of a file in UTF-8.
+
+    Raises:
+        RefusedError: It cannot be read, or is no text.
+    """
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = str(getattr(error, "strerror", None) or "no text").lower()
+        raise RefusedError(str(path), reason, "text files in UTF-8") from None
+
+
 def number(path: Path, row: int, cells: Sequence[str], place: int) -> float:
     """The number in a field, in plain ASCII digits with a point.
 
@@ -79,7 +89,7 @@ def number(path: Path, row: int, cells: Sequence[str], place: int) -> float:
         RefusedError: The field is missing or holds no number.
     """
     text = cells[place].strip() if place < len(cells) else ""
-    if not NUMBER.fullmatch(text):
+    if not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
         raise RefusedError(f"{path.name}, row {row}, column {place + 1}", repr(text[:40]), allowed)
     return float(text)

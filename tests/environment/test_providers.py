@@ -29,7 +29,6 @@ DIRECT = {
     "hypothesis": "python3-hypothesis",
     "jinja2": "python3-jinja2",
     "jsonschema": "python3-jsonschema",
-    "markupsafe": "python3-jinja2",  # which depends on it, by pip too
     "matplotlib": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
@@ -41,7 +40,6 @@ DIRECT = {
     "pydantic": "python3-pydantic",
     "pydantic_core": "python3-pydantic",  # which depends on it
     "pyvista": "python3-pyvista",
-    "rich": "python3-rich",
     "scipy": "python3-scipy",
     "skimage": "python3-skimage",
     "sympy": "python3-sympy",

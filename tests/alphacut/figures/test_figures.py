@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, image, modulus, shares, style
+from alphacut.figures import envelope, modulus, style
 from alphacut.figures.captions import caption
 from tests.alphacut.one_case import run
 
@@ -67,14 +67,6 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     assert ("± 250 mm" in words) == bool(lines)
 
 
-def test_means_of_shares_are_weighted_with_the_width():
-    width = np.array([0.0, 0, 1, 3, 1, 0, 0])
-    share = np.array([np.nan, np.nan, 0.5, 0.1, 0.5, np.nan, np.nan])
-    mean = shares.weighted(share, width, 1)
-    assert mean[3] == pytest.approx((0.5 + 0.3 + 0.5) / 5)
-    assert np.isnan(mean[0])
-
-
 def test_samples_have_the_membership_of_their_least_input():
     places = np.array([[[0.0, 0.0], [1.0, 1.0]], [[0.5, 0.5], [0.5, 0.5]]])  # (alpha, bound, input)
     points = np.array([[0.5, 0.5], [0.5, 1.0], [0.0, 0.5]])
@@ -92,7 +84,6 @@ def test_samples_have_the_membership_of_their_least_input():
         ("fig18-modulus", True, "Fig. 18: Fuzzy effective modulus"),
         ("envelope-all-q3", False, "Envelope of q3"),
         ("fig28-envelope-E-5s-q1", True, "Fig. 28: Envelope of q1, study E-5s"),
-        ("update-q4", False, "Envelope of q4 before and after the measurement"),
     ],
 )
 def test_captions(stem, paper, words):
@@ -108,7 +99,7 @@ def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
         {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]},
     )
     with style.style():
-        picture, cuts = image.image(data).axes
+        picture, cuts = modulus.image(data).axes
     assert picture.images[0].get_array().shape == (4, 4)
     ends = np.concatenate([line.get_xdata() for line in cuts.lines])
     assert (ends.min(), ends.max()) == pytest.approx((20, 30))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.accelerogram import accelerogram
 from alphacut.io.modes_csv import mode_rows
-from alphacut.io.problem import BadInput
 
 RECORD = "time [s],acceleration [g]\n0,0\n0.01,0.1\n0.02,-0.2\n"
 
@@ -43,16 +43,16 @@ def test_a_record_of_peer_is_read(tmp_path):
 def test_a_wrong_row_is_named(tmp_path, old, new, line):
     path = tmp_path / "record.csv"
     path.write_text(RECORD.replace(old, new, 1))
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(RefusedError) as caught:
         accelerogram(path)
-    assert caught.value.problems[0].line == line
+    assert caught.value.key.startswith(f"record.csv, {'header' if line == 1 else f'row {line}'}")
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe", b"time [s],acceleration [g]\n"])
 def test_a_file_that_is_no_record_is_refused(tmp_path, content):
     path = tmp_path / "record.csv"
     path.write_bytes(content)
-    with pytest.raises(BadInput):
+    with pytest.raises(RefusedError):
         accelerogram(path)
 
 
@@ -72,5 +72,5 @@ def test_modes_are_read(tmp_path):
 def test_wrong_modes_are_refused(tmp_path, old, new):
     path = tmp_path / "modes.csv"
     path.write_text(MODES.replace(old, new, 1))
-    with pytest.raises(BadInput):
+    with pytest.raises(RefusedError):
         mode_rows(path)

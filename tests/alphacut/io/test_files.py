@@ -1,8 +1,6 @@
 """Whole files: what stands there is replaced only where it is a file."""
 
 import os
-import subprocess
-import sys
 import threading
 
 import pytest
@@ -55,27 +53,3 @@ def test_a_second_run_into_the_same_folder_is_refused_while_the_first_writes(tmp
         alone("--out", place).__enter__()
     with alone("--out", place):
         assert not list(place.iterdir())
-
-
-OTHERS = """
-import os, sys
-os.close(1)
-sys.stdout = None
-kept = os.open(sys.argv[1], os.O_RDWR)  # a library's, where standard output was
-from alphacut.io.files import open_streams, standard_output
-open_streams()
-with standard_output(True) as stream:
-    print("lost", file=stream, flush=True)
-    os.write(kept, b"whole")
-assert kept == 1
-"""
-
-
-def test_a_file_in_the_place_of_closed_standard_output_is_left_alone(tmp_path):
-    # Python 3.14 keeps one of libffi's there
-    other = tmp_path / "other"
-    other.touch()
-    asked = [sys.executable, "-c", OTHERS, str(other)]
-    ended = subprocess.run(asked, capture_output=True, text=True, check=False)
-    assert (ended.returncode, ended.stderr) == (0, "")
-    assert other.read_text(encoding="utf-8") == "whole"

@@ -81,44 +81,49 @@ def test_random_inputs_have_the_shape_of_their_membership():
 def test_every_question_is_complete():
     assert len({one.key for one in QUESTIONS}) == len(QUESTIONS)
     for one in QUESTIONS:
-        assert one.section.__doc__
+        assert one.__doc__
         assert len(one.head) >= 3
 
 
 FOURTH = '''"""Mean of a motion."""
 
-from alphacut.figures.style import figure
-from alphacut.questions.question import Limited, Question
+import numpy as np
+
+from alphacut.figures import style
+from alphacut.questions.question import Question
 
 
-class Mean(Limited):
+class Mean(Question):
     """Mean of the modal motion."""
 
+    key = "mean"
+    title = "What is the mean?"
+    caption = "Mean of the motion"
+    head = ("mean of", "value", "nature")
 
-def answer(section, motion):
-    """Mean of each limited output at the modal values."""
-    outputs = tuple(limit.output for limit in section.limits)
-    structure = motion.structure
-    flow = structure.flow((), motion.duration, motion.step)
-    import numpy as np
-    values = flow.values(np.zeros((1, 0)))[0].mean(0)
-    means = dict(zip(map(str, flow.outputs), map(float, values)))
-    return {name: means[name] for name in outputs}
+    def answer(self, motion):
+        """Mean of each limited output at the modal values."""
+        flow = motion.structure.flow((), motion.duration, motion.step)
+        values = flow.values(np.zeros((1, 0)))[0].mean(0)
+        means = dict(zip(map(str, flow.outputs), map(float, values)))
+        return {limit.output: means[limit.output] for limit in self.limits}
+
+    @staticmethod
+    def rows(document):
+        return [(name, f"{value:.4g}", "attained") for name, value in document.items()]
+
+    @staticmethod
+    def words(document):
+        return "The mean over time at the modal values."
+
+    @staticmethod
+    def figure(document):
+        drawn, axes = style.figure()
+        axes.bar(list(document), list(document.values()))
+        return drawn
 
 
-def draw(document):
-    """Bars of the means."""
-    drawn, axes = figure()
-    axes.bar(list(document), list(document.values()))
-    return drawn
-
-
-QUESTION = Question(
-    key="mean", section=Mean, title="What is the mean?", caption="Mean of the motion",
-    answer=answer, figure=draw, head=("mean of", "value", "nature"),
-    rows=lambda document: [(x, f"{value:.4g}", "attained") for x, value in document.items()],
-    words=lambda document: "The mean over time at the modal values.",
-)
+QUESTION = Mean
 '''
 
 

@@ -143,5 +143,5 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
         own_files({**summary, "fingerprints": {"modulus": "other"}}, folder)
     for text in ("", "[]", "{}", "[" * 100_000, '{"case": 1}', "null"):
         (folder / "summary.json").write_text(text)
-        with pytest.raises(RefusedError, match=r"no JSON|damaged"):
+        with pytest.raises(RefusedError, match="damaged"):
             read_summary(folder)
