@@ -15,7 +15,6 @@ from alphacut.commands.parser import require_prism
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
 from alphacut.io.netcdf import document_of
-from alphacut.io.units import fixed
 from alphacut.report.results import ISOTROPIC, fibre_label
 from alphacut.report.tables import tables, text_table
 from alphacut.rve.result import Homogenised
@@ -98,10 +97,10 @@ def summary(result: Homogenised, document: Document) -> str:
     errors = document["declared_error"] or {"E_GPa": 0.0, "nu": 0.0, "stress_GPa": {}}
     stress, off = document["stress_GPa"], errors["stress_GPa"]
     rows = [
-        ("E, GPa", fixed(document["E_GPa"], 6), f"{errors['E_GPa']:.1e}"),
+        ("E, GPa", f"{document['E_GPa']:#.8g}", f"{errors['E_GPa']:.1e}"),
         ("ν", f"{document['nu']:.6f}", f"{errors['nu']:.1e}"),
-        ("mean σ11, GPa", fixed(stress["s11"], 9), f"{off.get('s11', 0.0):.1e}"),
-        ("mean σ12, GPa", fixed(stress["s12"], 9), f"{off.get('s12', 0.0):.1e}"),
+        ("mean σ11, GPa", f"{stress['s11']:#.9g}", f"{off.get('s11', 0.0):.1e}"),
+        ("mean σ12, GPa", f"{stress['s12']:#.9g}", f"{off.get('s12', 0.0):.1e}"),
     ]
     for key, number in document["fibres"].items():
         rows.append((fibre_label(key), f"{number['value']:.6g}", f"{number['error']:.1e}"))

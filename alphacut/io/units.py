@@ -95,9 +95,6 @@ def _exponent(largest: float) -> int:
     return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
 
 
-def fixed(value: float, places: int) -> str:
-    """A number with so many decimals, or with six digits where these would leave two or fewer."""
-    return f"{value:.{places}f}" if not 0 < abs(value) < 10.0 ** (2 - places) else f"{value:.6g}"
 
 
 def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:

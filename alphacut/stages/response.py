@@ -92,7 +92,6 @@ def document(variables: xarray.Dataset) -> Document:
             {"probability": p, "GPa": cuts("quantile", probability=p)}
             for p in variables["probability"].values
         ],
-        "p_box": {"stress_GPa": variables["stress"].values / GPA, **cuts("cdf", 1.0)},
     }
     if "exceedance" in variables:
         numbers["exceedance"] = {
