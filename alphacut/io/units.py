@@ -95,8 +95,6 @@ def _exponent(largest: float) -> int:
     return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
 
 
-
-
 def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
     """Both ends of a range with so many digits, or more where those would cross."""
     crisp = high - low <= 1e-9 * abs(high)
