@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -45,6 +45,11 @@ class Nature(StrEnum):
             "estimated": "The true bounds lie within the error, as an independent pass tells.",
             "guaranteed": "No value in the α-cut lies outside these bounds; this is proved.",
         }[self]
+
+    @staticmethod
+    def weakest(natures: Iterable[Nature]) -> Nature:
+        """The weakest of some, one or more."""
+        return min(natures, key=list(Nature).index)
 
 
 def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
@@ -217,10 +222,6 @@ class Bounds:
         """Claim of the cuts, and which inputs are opinions."""
         return JointClaim.of(self.inputs).resting_on(self.nature)
 
-    def said(self) -> tuple[str, ...]:
-        """Notes of the method, and what is claimed, if anything is."""
-        return (*self.notes, *([str(self.claim)] if self.claim.rule else []))
-
     def number(self, output: str = "y") -> Stepwise | Claimed:
         """One output as a fuzzy number: between two levels the wider α-cut holds.
 
@@ -272,7 +273,7 @@ class Bounds:
             outputs=outputs,
             units=tuple(self.units[k] for k in columns if self.units),
             natures=natures,
-            nature=min(natures, key=list(Nature).index),
+            nature=Nature.weakest(natures),
             lower=self.lower[..., columns],
             upper=self.upper[..., columns],
             error=self.error[..., columns],
@@ -285,12 +286,12 @@ class Bounds:
     def __str__(self) -> str:
         """Nature and cost; bounds of the first outputs, a line for each level; notes."""
         count = max(1, _ROWS // len(self.alpha))
-        lines = [
-            line for column in range(len(self.outputs))[:count] for line in self._lines(column)
-        ]
+        shown = range(len(self.outputs))[:count]
+        lines = [line for column in shown for line in self._lines(column)]
         hidden = len(self.outputs) - count
         more = [f"… and {hidden} outputs more: bounds(NAME) has them"] if hidden > 0 else []
-        return "\n".join([self._head, *lines, *more, *self.said()])
+        claim = [str(self.claim)] if self.claim.rule else []
+        return "\n".join([self._head, *lines, *more, *self.notes, *claim])
 
     __repr__ = __str__
 

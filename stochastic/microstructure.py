@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from time import perf_counter
 
 import numpy as np
 
@@ -112,7 +111,6 @@ class Microstructure:
         slopes: Bootstrap band of the fitted slopes.
         band: Half width of the simultaneous bootstrap band of the distribution function, in
             probability.
-        seconds: Wall time by stage: pack, fit, neighbours, total.
     """
 
     study: Study
@@ -123,7 +121,6 @@ class Microstructure:
     pbox: PBox
     slopes: SlopeBand
     band: float
-    seconds: dict[str, float]
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -163,20 +160,14 @@ def study(
         RefusedError: Measured data have no meaning, or cells are too tight.
         FailedError: Particles find no place, or no p-box contains the sample.
     """
-    begin = perf_counter()
     tick = progress or (lambda share: None)
     sections = _sections(case, executor, lambda share: tick(0.7 * share))
-    packed = perf_counter()
     sample = reduced_radii(sections)
     kept, pbox, slopes, band = fitted_map(case, sample)
     tick(0.9)
-    fitted = perf_counter()
     direct = [neighbours(one.particles) for one in sections if one.diagram]
     tick(1.0)
-    end = perf_counter()
-    seconds = {"pack": packed - begin, "fit": fitted - packed}
-    seconds |= {"neighbours": end - fitted, "total": end - begin}
-    return Microstructure(case, sections, direct, sample, kept, pbox, slopes, band, seconds)
+    return Microstructure(case, sections, direct, sample, kept, pbox, slopes, band)
 
 
 def _sections(

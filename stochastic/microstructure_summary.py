@@ -31,7 +31,7 @@ def summary(result: Microstructure) -> dict[str, object]:
         "largest_radius": float(radii.max()),
         "share_capped": result.share_beyond,
     }
-    return {**numbers, **_of_discs(result), **_of_map(result), "seconds": result.seconds}
+    return numbers | _of_discs(result) | _of_map(result)
 
 
 def _of_discs(result: Microstructure) -> dict[str, object]:

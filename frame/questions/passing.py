@@ -89,7 +89,7 @@ def _any(each: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
     least = max(one.necessity[0] for one in every)
     surely_kept = all(one.possibility[1] < 1 for one in every)  # by all motions of the highest cut
     margin = np.min([one.margin / limits[name] for name, one in each.items()], axis=0)
-    nature = min((one.nature for one in every), key=list(Nature).index)
+    nature = Nature.weakest(one.nature for one in every)
     necessary = least, 0.0 if surely_kept else 1.0
     return Passing((possible[0], possible[1]), necessary, margin, every[0].lowest, nature)
 

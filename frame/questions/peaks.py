@@ -63,8 +63,7 @@ class Peaks:
 
     def nature(self, outputs: Iterable[str]) -> Nature:
         """Weakest nature of some outputs' bounds."""
-        each = [self.natures[self.outputs.index(name)] for name in outputs]
-        return min(each, key=list(Nature).index)
+        return Nature.weakest(self.natures[self.outputs.index(name)] for name in outputs)
 
 
 def peaks(envelope: Envelope) -> Peaks:

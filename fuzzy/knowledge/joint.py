@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -66,22 +67,16 @@ def _common(claimed: Mapping[str, Claimed]) -> str:
 
 
 def _require_apart(claimed: Mapping[str, Claimed]) -> None:
-    names = list(claimed)
-    for i, name in enumerate(names):
-        for other in names[:i]:
-            one, two = claimed[name], claimed[other]
-            cure = f"{other} and {name} rest on the same values"
-            apart = one.number is not two.number and one != two
-            require(apart, "independent", True, "False", cure)
+    for (name, one), (other, two) in combinations(claimed.items(), 2):
+        cure = f"{name} and {other} rest on the same values"
+        require(one.number is not two.number and one != two, "independent", True, "False", cure)
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:
     """The number with its cuts at their joint levels."""
     steps = number.number
     level = rule.joined(np.asarray(steps.alpha))
-    last = np.flatnonzero(
-        np.append(np.diff(level) > 0, True) & (level <= 1)
-    )  # of equal levels the last cut
+    last = np.append(np.diff(level) > 0, True) & (level <= 1)  # of equal levels the last cut
     lower, upper = (tuple(np.asarray(ends)[last]) for ends in (steps.lower, steps.upper))
     moved = Stepwise(tuple(level[last]), lower, upper)
     decided = float(rule.joined(np.asarray(number.decided)))

@@ -155,7 +155,7 @@ class _Passes:
             last,  # the judgement took samples, too
             error=np.where(sure & ~crisp, error, 0.0),
             natures=natures,
-            nature=min(natures, key=list(Nature).index),
+            nature=Nature.weakest(natures),
             notes=(*last.notes, note) if unsure and not spent else last.notes,
         )
 

@@ -106,7 +106,7 @@ def proving(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
     return replace(
         bounds,
         natures=natures,
-        nature=min(natures, key=list(Nature).index),
+        nature=Nature.weakest(natures),
         basis=tuple(f"{fact}, {agree}" for fact in known.words),
         inner=Ends(bounds.lower, bounds.upper),
     )

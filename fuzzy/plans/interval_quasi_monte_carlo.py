@@ -69,7 +69,7 @@ class IntervalResponse:
     @property
     def nature(self) -> Nature:
         """The weakest of the points; averages have the error of quasi-Monte Carlo besides."""
-        return min((one.nature for one in self.bounds), key=list(Nature).index)
+        return Nature.weakest(one.nature for one in self.bounds)
 
     def mean(self, output: str = "y") -> tuple[Array, Array]:
         """Bounds of the mean on every level, two arrays (levels,)."""

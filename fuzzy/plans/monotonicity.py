@@ -84,11 +84,15 @@ def _changed(modal: Array, signs: Signs, lower: Array, upper: Array, column: int
 
     They are fixed at their modal values, and at the extreme corners of every pattern of signs.
     """
-    rises = np.unique(signs >= 0, axis=0)
-    corners = np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
-    points = np.repeat(np.concatenate([modal[None], corners]), 2, axis=0)
+    points = np.repeat(np.concatenate([modal[None], _extreme(signs, lower, upper)]), 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
     return np.asarray(np.unique(points, axis=0))
+
+
+def _extreme(signs: Signs, lower: Array, upper: Array) -> Array:
+    """The two extreme corners for every pattern of signs that occurs, shape (corners, inputs)."""
+    rises = np.unique(signs >= 0, axis=0)
+    return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
 
 
 def _prove(
@@ -115,19 +119,13 @@ class _Box:
         """Signs of the slopes at all probes, with the margin, shape (outputs, inputs), else 0."""
         free = np.flatnonzero((stated == 0).any(axis=0))
         first = np.sign(self._slopes(modal, free)[0]).astype(np.int8)
-        corners = self._corners(np.where(stated != 0, stated, first))
+        corners = _extreme(np.where(stated != 0, stated, first), self.lower, self.upper)
         slopes = self._slopes(np.concatenate([modal, corners, self._spread()]), free)
         least, most = slopes.min(axis=0), slopes.max(axis=0)
         room = _MARGIN * (most - least)
         rises, falls = (least > 0) & (least >= room), (most < 0) & (-most >= room)
         idle = (least == 0) & (most == 0)  # no effect at any probe: either end will do
         return np.asarray((rises | idle).astype(np.int8) - falls.astype(np.int8))
-
-    def _corners(self, signs: Signs) -> Array:
-        """The two extreme corners for every pattern of signs that occurs."""
-        rises = np.unique(signs >= 0, axis=0)
-        low = np.where(rises, self.lower, self.upper)
-        return np.concatenate([low, np.where(rises, self.upper, self.lower)])
 
     def _spread(self) -> Array:
         """Even points of the box, without the first, which is a corner."""

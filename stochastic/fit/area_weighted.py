@@ -34,18 +34,11 @@ class AreaWeighted:
     def of(
         cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
     ) -> AreaWeighted:
-        """Sort the values and scale the weights (equal by default) to the sum 1.
-
-        Raises:
-            RefusedError: There are no values, one is not finite, or a weight is negative.
-        """
+        """Sort the values and scale the weights (equal by default) to the sum 1."""
         values = np.asarray(values, float).ravel()
         weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
         each = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
         labels = np.unique(each, return_inverse=True)[1]
-        plain = np.isfinite(values).all() and (weights >= 0).all() and weights.sum() > 0
-        allowed = "one or more, finite, with weights from 0 on"
-        require(plain, "reduced radii", f"{len(values)} values", allowed)
         order = np.argsort(values, kind="stable")
         return cls(values[order], weights[order] / weights.sum(), labels[order])
 

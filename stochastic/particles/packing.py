@@ -10,8 +10,8 @@ from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import FailedError, real, require
-from alphacut.stochastic.particles.neighbour_search import balls, size_classes
-from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
+from alphacut.stochastic.particles.neighbour_search import balls, close_pairs, size_classes
+from alphacut.stochastic.particles.particles import DISCS, Particles, Shape, nearest_image
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
 from alphacut.stochastic.particles.relaxation import relaxed
 
@@ -123,8 +123,9 @@ class _Standing:
             open_ = np.flatnonzero(~hit)
             counts, other = balls(tree, proposal[open_], radii[open_] + standing.max())
             which = np.repeat(open_, counts)
-            apart = proposal[which] - centres[other]
-            hit[which[_overlap(apart, radii[which] + standing[other], self.box)]] = True
+            apart = nearest_image(proposal[which] - centres[other], self.box)
+            near = np.linalg.norm(apart, axis=1) < radii[which] + standing[other]
+            hit[which[near]] = True
         return hit
 
 
@@ -157,18 +158,10 @@ def _first_come(proposal: Array, radii: Array, box: Array) -> Mask:
     state = np.zeros(len(proposal), int)  # 0 open, 1 stays, -1 goes
     if len(proposal) < 2:
         return np.asarray(state == 0)
-    pair = KDTree(proposal, boxsize=box).query_pairs(2 * radii.max(), output_type="ndarray")
-    apart = proposal[pair[:, 0]] - proposal[pair[:, 1]]
-    early, late = np.sort(pair[_overlap(apart, radii[pair].sum(axis=1), box)], axis=1).T
+    early, late = np.sort(close_pairs(Particles(proposal, radii, box), 0.0), axis=0)
     while (state == 0).any():
         waits = np.zeros(len(state), bool)
         waits[late[state[early] == 0]] = True
         state[(state == 0) & ~waits] = 1
         state[late[state[early] == 1]] = -1
     return np.asarray(state == 1)
-
-
-def _overlap(apart: Array, reach: Array, box: Array) -> Mask:
-    """Mask of vectors between centres whose nearest image is shorter than `reach`."""
-    apart = apart - box * np.round(apart / box)
-    return np.asarray((apart**2).sum(axis=1) < reach**2)

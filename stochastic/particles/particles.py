@@ -121,7 +121,12 @@ class Particles:
     def separation(self, first: Rows, second: Rows) -> Array:
         """Vectors from centres `first` to the nearest images of `second`, shape (…, d), in m."""
         apart: Array = self.centres[second] - self.centres[first]
-        return apart - self.size * np.round(apart / self.size) if self.periodic else apart
+        return nearest_image(apart, self.size) if self.periodic else apart
+
+
+def nearest_image(apart: Array, size: Array) -> Array:
+    """Vectors between centres, shape (…, d), brought to the nearest image in a periodic box."""
+    return np.asarray(apart - size * np.round(apart / size))
 
 
 def _refuse(bad: Mask, name: str, values: Array, allowed: str) -> None:

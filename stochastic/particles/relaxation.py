@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 from alphacut.stochastic.particles.neighbour_search import close_pairs
-from alphacut.stochastic.particles.particles import Particles
+from alphacut.stochastic.particles.particles import Particles, nearest_image
 
 HEADROOM = 0.3  # growth of the share of the box while they repel, of what is left to the densest
 STEPS = 4000  # of the relaxation before it is given up
@@ -45,7 +45,7 @@ def _push(own: Particles, growth: float) -> Particles:
     skin, overlap = 0.6 * float(own.radii.mean()), 0.0
     pairs, anchor = None, centres
     for _ in range(STEPS):
-        moved = float(np.linalg.norm(_wrapped(centres - anchor, box), axis=1).max())
+        moved = float(np.linalg.norm(nearest_image(centres - anchor, box), axis=1).max())
         if pairs is None or 2 * moved > skin:
             pairs, anchor = close_pairs(Particles(centres, radii, box), skin), centres
         force, overlap = _repulsion(centres, radii, pairs, box)
@@ -74,7 +74,7 @@ def _repulsion(
 ) -> tuple[Array, float]:
     """Forces, shape (n, d), and the greatest overlap, in m."""
     first, second = pairs
-    apart = _wrapped(centres[second] - centres[first], box)
+    apart = nearest_image(centres[second] - centres[first], box)
     distance = np.maximum(np.linalg.norm(apart, axis=1), 1e-300)
     overlap = np.maximum(radii[first] + radii[second] - distance, 0)
     push = (overlap / distance)[:, None] * apart
@@ -101,12 +101,7 @@ def _shake(own: Particles, generator: np.random.Generator) -> Array:
             stays = np.zeros(len(radii), bool)
             for mine, other in ((first, second), (second, first)):
                 for place in (centres, moved):
-                    apart = _wrapped(place[other] - moved[mine], box)
+                    apart = nearest_image(place[other] - moved[mine], box)
                     stays[mine[np.linalg.norm(apart, axis=1) < limit]] = True
             centres = np.where(stays[:, None], centres, moved)
     return centres
-
-
-def _wrapped(apart: Array, box: Array) -> Array:
-    """Vectors to the nearest image."""
-    return np.asarray(apart - box * np.round(apart / box))

@@ -116,6 +116,12 @@ def test_intervals_hold_the_cuts_of_all_values_inside(law, claim, seed):
         assert own.cut(alpha).upper <= wide.cut(alpha).upper + 1e-9
 
 
+def test_intervals_hold_the_widest_scatter_that_they_allow():
+    pairs, widest = [(-1.5, -0.5), (0.5, 1.5)], [-1.5, 1.5]
+    cut, own = (from_data(x, "mean", law="normal").cut(0.1) for x in (pairs, widest))
+    assert cut.lower < own.lower < own.upper < cut.upper
+
+
 def test_censored_values_are_intervals_without_an_end():
     number = from_data([1.0, 2.0, (3.0, np.inf), (2.5, np.inf)], "next value", bounds=(0, None))
     assert number.decided == 1

@@ -120,6 +120,7 @@ def test_eight_inputs_that_are_stated_to_be_monotone_are_proved_by_their_corners
     assert result.evaluations == 4 * 256 + 1
     assert result.nature is Nature.GUARANTEED
     assert "a product of positive factors" in result.basis[0]
+    assert (result.attained.upper == result.upper).all()
     alone = propagate(product, inputs, known=known)
     assert (alone.nature, alone.evaluations) == (Nature.GUARANTEED, 4 * 256 + 1)
 
@@ -150,6 +151,19 @@ def test_only_outputs_whose_signs_are_stated_or_verified_are_guaranteed():
     seen = propagate(curved, INPUTS, Signed())
     assert seen.nature is Nature.ATTAINED
     np.testing.assert_allclose(seen.bounds("up"), stated.bounds("up"))
+
+
+@pytest.mark.parametrize(
+    ("function", "seen"),
+    [
+        (lambda x: x**2 / 2 + 0.06 * x, True),
+        (lambda x: x**2 / 2 + 0.04 * x, False),  # least slope below a twentieth of their spread
+        (lambda x: x - 0.2 * np.tanh(20 * (x - 0.75)), False),  # falls near one probe alone
+    ],
+)
+def test_a_sign_is_seen_at_every_probe_and_with_a_margin(function, seen):
+    result = propagate(function, {"x": Interval(0, 1)}, Signed(), alpha=[0.0])
+    assert bool(result.notes) is not seen
 
 
 @pytest.mark.parametrize(
