@@ -39,7 +39,6 @@ METHODS: dict[str, list[Method]] = {
     "extended": [Extended()],
     "signed": [Signed()],
     "optimisation": [*SEARCHES],
-    "differential evolution": [Optimisation("differential_evolution", starts=k) for k in (1, 3)],
     "automatic": [Automatic(passes=k) for k in (1, 4)],
 }
 

@@ -4,28 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal, get_args
-
-import numpy as np
 
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.values import SpentError
 from alphacut.fuzzy.plans.design import of_samples
-from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
+from alphacut.fuzzy.plans.level_search import cuts
 from alphacut.fuzzy.refused import chosen, real
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
-
-Optimiser = Literal["multistart", "differential_evolution"]
 
 
 @dataclass(frozen=True)
 class Optimisation:
     """Search of each bound, from the narrowest cut up; every sample counts for all bounds.
 
+    Corners and spread points are looked at first, then descents by gradients begin at the best.
+
     Args:
-        optimiser: "multistart" looks at corners and spread points first and descends from the best
-            by gradients; "differential_evolution" is SciPy's, for rough functions.
         starts: Descents per bound.
         look: Spread points of the first look per level and input.
         seed: Where random searches start from.
@@ -33,10 +28,9 @@ class Optimisation:
             samples happen to bound them.
 
     Raises:
-        RefusedError: There is no such optimiser, or a number is not positive.
+        RefusedError: A number is not positive.
     """
 
-    optimiser: Optimiser = "multistart"
     starts: int = 3
     look: int = 8
     seed: int = 0
@@ -45,7 +39,6 @@ class Optimisation:
     name = "optimisation"
 
     def __post_init__(self) -> None:
-        chosen("optimiser", self.optimiser, get_args(Optimiser))
         for key in ("starts", "look"):
             real(key, getattr(self, key), positive=True, whole=True)
         real("seed", self.seed, whole=True)
@@ -61,30 +54,12 @@ class Optimisation:
             for cut in cuts(campaign, domain):
                 cut.look(self.look * len(cut.moving), self.seed)
                 for output, sign in product(outputs, (1.0, -1.0)):
-                    self._descend(cut, output, sign)
+                    for start in cut.best(output, sign, self.starts):
+                        cut.descend(start, output, sign)
                 campaign.report(1 - cut.level / len(domain.alpha))
         except SpentError:
             return True
         return False
-
-    def _descend(self, cut: LevelSearch, output: str, sign: float) -> None:
-        """Search one bound of one output."""
-        if self.optimiser == "multistart":
-            for start in cut.best(output, sign, self.starts):
-                cut.descend(start, output, sign)
-            return
-        from scipy.optimize import differential_evolution
-
-        differential_evolution(
-            lambda unit: np.nan_to_num(cut.worth(unit.T, output, sign), posinf=1e100),
-            [(0.0, 1.0)] * len(cut.moving),
-            x0=cut.best(output, sign, 1)[0],
-            maxiter=20 * self.starts,
-            rng=self.seed,
-            polish=False,
-            vectorized=True,
-            updating="deferred",
-        )
 
 
 def searched(campaign: Campaign, domain: Domain, outputs: tuple[str, ...]) -> tuple[str, ...]:

@@ -71,7 +71,6 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: run(lambda x: x, X, Extended(("e",))), "monotone input"),
         (lambda: run(lambda x: x, X, Signed(outputs=("z",))), "output"),
         (lambda: Automatic(tolerance=2), "tolerance"),
-        (lambda: Optimisation("newton"), "optimiser"),
         (lambda: Optimisation(starts=0), "starts"),
         (lambda: IntervalQuasiMonteCarlo(0), "points"),
         (lambda: IntervalQuasiMonteCarlo(2).run(abs, {}, X, alpha=[0]), "random inputs"),

@@ -56,7 +56,6 @@ COARSE = {
     "reduced": Reduced(),
     "extended": Extended(),
     "signed": Signed(),
-    "evolution": Optimisation("differential_evolution", starts=1),
 }
 
 

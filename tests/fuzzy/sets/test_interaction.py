@@ -18,7 +18,7 @@ from alphacut.fuzzy import (
 )
 
 SQUARE = {"a": Interval(0.0, 1.0), "b": Interval(0.0, 1.0)}
-SEARCHES = [Automatic(), Optimisation(), Optimisation("differential_evolution")]
+SEARCHES = [Automatic(), Optimisation()]
 
 
 @pytest.mark.parametrize("method", SEARCHES)
