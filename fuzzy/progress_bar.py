@@ -35,12 +35,12 @@ def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
     """
     plain = progress is None or isinstance(progress, bool) or callable(progress)
     require(plain, "progress", progress, "a function of the share done, False for none")
-    if callable(progress) or progress is False:
-        yield progress or None
+    if callable(progress) or progress is False or not sys.stderr.isatty():
+        yield progress if callable(progress) else None
         return
-    bar = _Bar(_on_terminal if sys.stderr.isatty() else None)
+    bar = _Bar()
     try:
-        yield bar if bar.show else None
+        yield bar
     finally:
         bar.close()
 
@@ -48,20 +48,20 @@ def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
 class _Bar:
     """A bar that appears if it is still wanted after a second, and leaves nothing behind."""
 
-    def __init__(self, show: Callable[[str], None] | None) -> None:
-        self.show, self.begun, self.moved, self.seen = show, monotonic(), 0.0, False
+    def __init__(self) -> None:
+        self.begun, self.moved = monotonic(), 0.0
 
     def __call__(self, share: float) -> None:
         now = monotonic()
-        if self.show and now - self.begun >= _WAIT and now - self.moved >= _EVERY:
-            self.moved, self.seen = now, True
-            full = round(_WIDTH * share)
+        if now - self.begun >= _WAIT and now - self.moved >= _EVERY:
+            self.moved, full = now, round(_WIDTH * share)
             bar = "█" * full + "░" * (_WIDTH - full)
-            self.show(f"{bar} {share:4.0%} {now - self.begun:.0f} s")
+            _on_terminal(f"{bar} {share:4.0%} {now - self.begun:.0f} s")
 
     def close(self) -> None:
-        if self.show and self.seen:
-            self.show("")
+        """Remove the bar."""
+        if self.moved:
+            _on_terminal("")
 
 
 def _on_terminal(text: str) -> None:
