@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 DURATION = 5.0  # s
 TITLES = (
-    "initial guess, the modal graph",
-    "optimum of the Taylor model, new graphs",
-    "at a later node the best stored graph is the guess",
-    "bounds left by the sweep, and the best of all graphs",
+    "initial guess, the modal trajectory",
+    "optimum of the Taylor model, new trajectories",
+    "at a later node the best stored one is the guess",
+    "bounds left by the sweep, and the best of all",
     "the discrete fuzzy mapping",
 )
 LINES: dict[str, Look] = {
