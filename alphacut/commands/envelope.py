@@ -15,10 +15,7 @@ ABOUT = "envelopes of the structure's vibration on every α-cut"
 KEYS = {
     "--fuzzy": ("envelope.fuzzy", "inputs that are fuzzy, as E,m"),
     "--duration": ("envelope.duration", "length of the simulation, as '5 s'"),
-    "--method": (
-        "envelope.method",
-        "auto, proof, search, (improved-)graph-follower, quasi-monte-carlo",
-    ),
+    "--method": ("envelope.method", "as the key, for example proof, search or graph-follower"),
 }
 
 
