@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.figures import envelope, follower, frame, identified, modulus, radius
+from alphacut.figures import envelope, follower, frame, modulus, radius
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
@@ -35,7 +35,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
     yield from _material(results)
     yield from _structure(results)
     if results.learned is not None and "refuted" not in results.learned:
-        yield "update-inputs", partial(identified.inputs, results.learned)
+        yield "update-inputs", partial(envelope.identified, results.learned)
     for question in QUESTIONS:
         if question.key in results.answers:
             yield question.key, partial(question.figure, results.answers[question.key])
@@ -47,8 +47,6 @@ def _material(results: Results) -> Iterator[Drawing]:
     """Map of radii, which the stage microstructure draws itself; modulus, image, stress."""
     map_of = results.content.radius
     if map_of is not None and results.microstructure is None:
-        if results.is_paper:
-            yield "fig11-radii", partial(radius.radii, map_of)
         yield "fig13-p-box", partial(radius.p_box, map_of)
     if map_of is not None:
         yield "fig14-cone", partial(radius.cone, map_of)

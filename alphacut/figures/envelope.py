@@ -1,4 +1,4 @@
-"""Envelopes over time (Figs. 28 to 35), and the fuzzy mapping behind them (Fig. 20)."""
+"""Envelopes (Figs. 28 to 35), the fuzzy mapping behind them (Fig. 20), inputs identified."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from alphacut.figures import style as look
 from alphacut.figures.captions import INPUTS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
+from alphacut.io.files import Document
 from alphacut.io.units import engineering
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.results import Results
@@ -97,4 +98,32 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     time_axes(axes, flow.time, output)
     level = f"α = {float(dataset['alpha']):g}"
     look.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
+    return drawn
+
+
+def identified(document: Document) -> Figure:
+    """Each input's interval at every level over that of its prior, over the middle of that.
+
+    Args:
+        document: As of `stages.identify.learned`.
+    """
+    names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
+    drawn, axes = look.figure(height=0.9 + 0.32 * len(names))
+    places = np.arange(len(names), dtype=float)[::-1]
+    prior = np.array([document["prior"][name] for name in names], float)
+    unit = prior.mean(axis=1)[:, None]
+    ends = (
+        np.array([[one["lower"], one["upper"]] for one in document["inputs"].values()])
+        / unit[..., None]
+    )
+    wide: look.Look = {"height": 0.7, "color": look.GREY, "alpha": 0.45, "label": "before"}
+    axes.barh(places, np.ptp(prior / unit, axis=1), left=(prior / unit)[:, 0], lw=0, **wide)
+    for row, level in enumerate(alpha):
+        words = f"after, α = {level:g}" if row in (0, len(alpha) - 1) else None
+        bar: look.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": words}
+        low, high = ends[:, 0, row], ends[:, 1, row]
+        axes.barh(places, high - low, left=low, lw=0, color=look.BLUE, **bar)
+    axes.set_yticks(places, names)
+    axes.set_xlabel("value over the middle of what it was before")
+    axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn

@@ -1,4 +1,4 @@
-"""Random radius: its law (Fig. 11), the p-box (Fig. 13), the cone over θ (Fig. 14)."""
+"""Random radius: the p-box (Fig. 13), the cone over θ (Fig. 14)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.material import RadiusMap
-from alphacut.figures.style import BLUE, GREY, INK, PURPLE, figure, title
+from alphacut.figures.style import GREY, INK, PURPLE, figure
 from alphacut.stochastic import HermiteMap
 from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-SIGMA = np.log(10) / 6  # eq. 11: the radius varies by a factor of ten over θ in [-3, 3]
 
 
 def maps(section: RadiusMap, alpha: float) -> list[HermiteMap]:
@@ -28,19 +26,6 @@ def maps(section: RadiusMap, alpha: float) -> list[HermiteMap]:
 def modal_map(section: RadiusMap) -> HermiteMap:
     """The radius map at the modal values."""
     return HermiteMap(*(one.modal for one in section.numbers.values()), section.law)
-
-
-def radii(section: RadiusMap) -> Figure:
-    """Fig. 11: distribution of the paper's log-normal particle radii, σ_r = (ln 10)/6, median 1."""
-    drawn, axes = figure()
-    law = section.law
-    theta = np.linspace(law.lower, law.upper, 400)
-    axes.plot(np.exp(SIGMA * theta), law.cdf(theta), color=BLUE, lw=1.8)  # eq. 11
-    axes.set_xlabel("radius r over its median")
-    axes.set_ylabel("cumulative distribution")
-    axes.set_ylim(0, 1.02)
-    title(axes, f"log-normal radii, σ$_r$ = (ln 10)/6 = {SIGMA:.4f}, truncated")
-    return drawn
 
 
 def distribution(radius: HermiteMap, at: Array) -> Array:

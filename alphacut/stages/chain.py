@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import require
+from alphacut.io.files import as_json
 from alphacut.io.netcdf import document_of
+from alphacut.questions.question import Motion, Question
 from alphacut.stages import (
     cell,
     envelope,
@@ -19,13 +22,13 @@ from alphacut.stages import (
     image,
     microstructure,
     modulus,
-    question,
     response,
     shares,
 )
+from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import Campaign
 from alphacut.stages.results import Results
-from alphacut.stages.store import Store
+from alphacut.stages.store import Stage, Store, Work
 
 if TYPE_CHECKING:
     import xarray
@@ -131,10 +134,23 @@ class Chain:
             results.learned, structure = identify.learned(section, structure, task.section.alpha)
         self.motion(results, structure)
         for key, section in content.questions.items():
-            answer = self.store.take(question.stage(section, structure, task))
-            results.answers[key] = document_of(answer)
+            inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section]
+            compute = partial(answered, section, structure, task)
+            stage = Stage(key, inputs, ("fuzzy", "frame", "alphacut"), compute)
+            results.answers[key] = document_of(self.store.take(stage))
 
     def _shares(self, results: Results) -> None:
         samples = self.campaign if results.modulus is not None else None
         richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
         results.shares = self.store.take(shares.stage(samples, results.structure, richest))
+
+
+def answered(
+    section: Question, structure: Structure, task: EnvelopeTask, work: Work
+) -> xarray.Dataset:
+    """The answer to a question about the motion of [envelope], as JSON among the attributes."""
+    import xarray
+
+    times = (task.section.alpha, task.duration, task.section.step)
+    motion = Motion(structure, task.fuzzy, *times, work.tick)
+    return xarray.Dataset(attrs={"document": as_json(section.answer(motion))})
