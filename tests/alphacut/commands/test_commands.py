@@ -180,7 +180,8 @@ def test_a_signal_ends_a_run_and_the_same_run_goes_on(tmp_path, number):
     case = written(tmp_path, CELL + "[mesh]\nlayers = 3\n")
     words = [*RUN, "run", str(case), "--out", str(tmp_path / "out"), "--no-figures"]
     started = subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env={**os.environ})
-    time.sleep(3)
+    while started.poll() is None and not (tmp_path / "out").exists():
+        time.sleep(0.05)
     started.send_signal(number)
     _, err = started.communicate(timeout=60)
     assert started.returncode in (0, 128 + number)
