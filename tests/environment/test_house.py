@@ -9,8 +9,8 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 33_443,
-    "files of the packages": 264,
+    "lines of the packages": 33_395,
+    "files of the packages": 262,
     "places that raise": 380,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
