@@ -53,9 +53,7 @@ def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRu
     return ThetaRule(nodes, weights / weights.sum())
 
 
-def gauss_rule(
-    distribution: ThetaLaw, *, points: int, between: tuple[float, float] | None = None
-) -> ThetaRule:
+def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     """Gauss rule of f_Θ itself: exact for polynomials in θ up to degree 2·points − 1.
 
     The recurrence of the orthogonal polynomials comes from the discretised Stieltjes procedure on a
@@ -65,13 +63,12 @@ def gauss_rule(
     Args:
         distribution: Law of θ.
         points: Nodes, at least 1.
-        between: Ends of a part of the support; the whole of it if left out.
 
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
     """
     real("points", points, whole=True, least=1)
-    fine = _fine_rule(distribution, 16 + 2 * points, between)
+    fine = _fine_rule(distribution, 16 + 2 * points)
     held = fine.weights > _NEGLIGIBLE
     at, weights = fine.nodes[held], fine.weights[held]
     diagonal, off = np.zeros(points), np.zeros(points)
@@ -86,11 +83,10 @@ def gauss_rule(
     return ThetaRule(nodes, vectors[0] ** 2)
 
 
-def _fine_rule(law: ThetaLaw, points: int, between: tuple[float, float] | None) -> ThetaRule:
-    """Legendre rule in panels of at most 1 that integrates the density between two ends."""
-    lower, upper = between or (law.lower, law.upper)
-    panels = min(math.ceil(upper - lower), _MOST_PANELS)
-    edges = np.asarray(np.linspace(lower, upper, panels + 1), float)
+def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
+    """Legendre rule in panels of at most 1 that integrates the density."""
+    panels = min(math.ceil(law.upper - law.lower), _MOST_PANELS)
+    edges = np.asarray(np.linspace(law.lower, law.upper, panels + 1), float)
     rule = np.polynomial.legendre.leggauss(points)
     return _weighted(law, panel_edges(law, edges, rule), rule)
 
