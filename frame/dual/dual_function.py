@@ -46,8 +46,8 @@ class Data(NamedTuple):
         cubic: Cubic parts, packed, shape (Z, monomials).
         size: Their sizes over the box, shape (Z,).
         rest: Remainders with `EXPECTED` of `size`, shape (Z,).
-        group_wave: Response of the group, shape (sources, T), or (0, 1).
-        group_linear: Linear parts of its shares, shape (sources, L).
+        group_wave: Middle and half range of the group's responses, shape (2 sources, T), or (0, 1).
+        group_linear: Linear parts of its shares and of their doubt, shape (2 sources, L).
         group_quadratic: Quadratic parts.
     """
 

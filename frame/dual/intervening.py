@@ -8,7 +8,8 @@ start. They bend little over the box, however many inputs it has.
 Modes that are not enclosed one by one stay together. All modes' shares sum to r·v_s, so that of
 the group is known, C; and by Cauchy and Schwarz the motion of the group is within C e ± √(A B)
 Δe, where e ± Δe holds all responses in the group's range of ω and g/ω, A and B are what the
-single modes leave of r M⁻¹ r and v·M v.
+single modes leave of r M⁻¹ r and v·M v. For √(A B) stands (A t + B/t)/2, t a number, which is no
+less and an expansion: at inputs where A is large B is often small.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ import numpy as np
 from alphacut.frame.dual.eigenpairs import Mode, Modes
 from alphacut.frame.dual.expansion import Expansion, product, stacked
 from alphacut.frame.dual.homogeneous import Series
-from alphacut.frame.dual.structure import Classical, UncoveredError
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.frame.dual.structure import Classical, UncoveredError, spread
+from alphacut.fuzzy.arrays import Rows
 
 DEGREE = 6
 """Degree to which shares are expanded, before those above the third are left to the rest."""
@@ -52,13 +53,13 @@ class Group:
 
     Args:
         share: C, V = (sources, m).
-        doubt: Bound of √(A B), shape (sources, m).
+        doubt: Bound of √(A B), V = (sources, m).
         omega_range: As of `Oscillator`, of all of them.
         quotient_range: The same.
     """
 
     share: Expansion
-    doubt: Array
+    doubt: Expansion
     omega_range: tuple[float, float]
     quotient_range: tuple[float, float]
 
@@ -82,8 +83,7 @@ def oscillators(
         a, mode = mode.shape.through(rows).cut(DEGREE), mode.cut(DEGREE)
         shares.append(_shares(excited, mode, a))
         read.append((a * a).over(mode.norm).expansion(d))
-        b = _driven(excited, mode)
-        driven.append(product(b * b, mode.norm.expansion(d)[0] ** -1.0, "s,->s"))
+        driven.append(_driven(excited, mode))
         seen = product(shares[-1], structure.factor, "so,o->so")
         single.append(_oscillator(structure, modes, k, mode, seen))
     left = sorted(set(range(n)) - set(modes.single))
@@ -93,13 +93,17 @@ def oscillators(
     share = _minus(product(excited, constant, "sj,oj->so"), shares)
     of_rows = product(product(constant, inverse(modes.mass), "oi,ij->oj"), constant, "oj,oj->o")
     of_start = product(product(excited, modes.mass, "si,ij->sj"), excited, "sj,sj->s")
-    A, B = (
-        np.maximum(_highest(_minus(x, y)), 0.0) for x, y in ((of_rows, read), (of_start, driven))
-    )
     omega, quotient = _group_range(structure, modes, np.array(left))
-    doubt = np.sqrt(np.outer(B, A)) * structure.factor.size()
-    seen = product(share, structure.factor, "so,o->so")
-    return single, Group(seen, doubt, omega, quotient)
+    each = [_doubt(_minus(of_rows, read), _minus(of_start, driven)[s]) for s in range(len(sources))]
+    share, doubt = (product(x, structure.factor, "so,o->so") for x in (share, stacked(each)))
+    return single, Group(share, doubt, omega, quotient)
+
+
+def _doubt(rows: Expansion, start: Expansion) -> Expansion:
+    """Bound of √(A B) for A, V = (m,), and B, V = ()."""
+    A, B = (np.maximum(x.parts[0] + x.spread(), 1e-300) for x in (rows, start))
+    t = np.sqrt(B / A)
+    return rows * (t / 2) + spread(start, 0.5 / t)
 
 
 def _shares(excited: Expansion, mode: Mode, a: Series) -> Expansion:
@@ -116,12 +120,13 @@ def _shares(excited: Expansion, mode: Mode, a: Series) -> Expansion:
 
 
 def _driven(excited: Expansion, mode: Mode) -> Expansion:
-    """v·M x of all sources, V = (sources,)."""
-    fixed = mode.moved.through(excited.parts[0]).expansion(excited.inner)
-    varying = excited + excited.parts[0] * -1.0
+    """(v·M x)²/(x·M x) of all sources, V = (sources,)."""
+    d, varying = excited.inner, excited + excited.parts[0] * -1.0
+    fixed = mode.moved.through(excited.parts[0])
     if not varying.size().any():
-        return fixed
-    return fixed + product(varying, mode.moved.expansion(excited.inner), "sj,j->s")
+        return (fixed * fixed).over(mode.norm).expansion(d)
+    both = fixed.expansion(d) + product(varying, mode.moved.expansion(d), "sj,j->s")
+    return product(both * both, mode.norm.expansion(d)[0] ** -1.0, "s,->s")
 
 
 def _oscillator(
@@ -165,10 +170,6 @@ def _group_range(
 
 def _range(x: Expansion) -> tuple[float, float]:
     return float(x.parts[0] - x.spread()), float(x.parts[0] + x.spread())
-
-
-def _highest(x: Expansion) -> Array:
-    return np.asarray(x.parts[0] + x.spread())
 
 
 def _minus(total: Expansion, shares: list[Expansion]) -> Expansion:

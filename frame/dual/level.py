@@ -204,7 +204,7 @@ class Level:
             for k, mode in enumerate(self.single):
                 total = total + mode.share.size()[:, o] @ made.stray[order][k]
             if self.group is not None:
-                total = total + self.group.doubt[:, o] @ made.group_stray[order]
+                total = total + self.group.doubt.size()[:, o] @ made.group_stray[order]
             columns.append(total)
         return np.stack(columns, -1)
 
@@ -304,13 +304,14 @@ def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
         constant[1] += mode.share.size()[:, o] @ made.error[order][k]
     if level.group is None:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
-    share, middle = level.group.share[:, o], made.middle[order]
-    rows = [_scaled(share[s], 1.0) for s in range(len(level.sources))]
+    share, doubt = level.group.share[:, o], level.group.doubt[:, o]
+    wave = np.concatenate([made.middle[order], side * made.half[order]])
+    rows = [_scaled(one[s], 1.0) for one in (share, doubt) for s in range(len(level.sources))]
     linear, quadratic, cubic, rest = _stacked(rows)
-    rest = rest + np.abs(cubic).sum(1)
-    constant[0] += side * share.parts[0] @ middle
-    constant[1] += rest @ np.abs(middle) + level.group.doubt[:, o] @ made.half[order]
-    return [middle, linear, quadratic], constant
+    constant[0] += side * share.parts[0] @ made.middle[order]
+    constant[1] += doubt.parts[0] @ made.half[order]
+    constant[1] += (rest + np.abs(cubic).sum(1)) @ np.abs(wave)
+    return [wave, linear, quadratic], constant
 
 
 def _stacked(rows: Sequence[tuple[Array, ...]]) -> list[Array]:
