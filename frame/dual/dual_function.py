@@ -233,7 +233,7 @@ def minimise(
     aim: float,
     weight: Array,
     u: Array,
-) -> tuple[float, int]:
+) -> float:
     """The least D(μ) that a deflected subgradient method meets in `steps`, and its μ in `mu`.
 
     Args:
@@ -250,10 +250,9 @@ def minimise(
     """
     gradient, direction, best = np.empty(len(mu)), np.zeros(len(mu)), mu.copy()
     here = np.empty(len(u))
-    least, drop, idle, used = np.inf, np.inf, 0, 0
+    least, drop, idle = np.inf, np.inf, 0
     weight[:] = 0.0
     for _ in range(steps):
-        used += 1
         value = dual(mu, slab, node, side, data, gradient, here)
         for z in range(len(mu)):
             weight[z] = 0.8 * weight[z] + abs(gradient[z] * mu[z])
@@ -275,7 +274,7 @@ def minimise(
         elif not deflected(mu, gradient, direction, value - least + drop):
             break
     mu[:] = best
-    return least + cancelled(mu, data), used
+    return least + cancelled(mu, data)
 
 
 @loops

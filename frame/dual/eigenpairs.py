@@ -111,6 +111,7 @@ def modes(structure: Classical) -> Modes:
     if not (heavy < 1 and stiff < 1):
         raise UncoveredError("the structure may lose its stiffness", "take narrower inputs")
     used = np.union1d(mass.present(), stiffness.present())
+    used = used if len(used) else np.arange(1)
     of_mass, of_stiffness = (x.on(used) for x in (mass, stiffness))
     enclosed = {k: _sharpest(k, of_mass, of_stiffness, used) for k in range(len(middle))}
     single = {k: mode for k, mode in enclosed.items() if mode is not None}

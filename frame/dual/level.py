@@ -73,28 +73,35 @@ def tables(
     """Tables of all modes and of the group."""
     points = _points(single, float(time[-1]))
     grids = [_grid(mode.omega_range, mode.quotient_range, points) for mode in single]
-    of_mode: dict[int, list[list[Array]]] = {order: [[], [], []] for order in orders}
-    for grid in grids:
-        oscillators = Oscillators(grid, ground if "load" in sources else None, time)
-        for order in orders:
-            waves = [oscillators.waves(source, order) for source in sources]
-            of_mode[order][0].append(np.stack([w.value.reshape(len(time), -1) for w in waves]))
-            largest = [np.abs(w.value).max((1, 2)) for w in waves]
-            error = [w.error + ROUND_OFF * x for w, x in zip(waves, largest, strict=True)]
-            of_mode[order][1].append(np.stack(error))
-            of_mode[order][2].append(np.stack([w.stray for w in waves]))
-    made = [{o: np.stack(of_mode[o][i]) for o in orders} for i in range(3)]
+    excited = (ground if "load" in sources else None, time, sources, orders)
+    modes = [_responses(grid, *excited) for grid in grids]
+    made = [{o: np.stack([mode[o][i] for mode in modes]) for o in orders} for i in range(3)]
     middle, half, group_stray = dict[int, Array](), dict[int, Array](), dict[int, Array]()
     if group is not None:
         grid = _grid(group.omega_range, group.quotient_range, OF_GROUP)
-        oscillators = Oscillators(grid, ground if "load" in sources else None, time)
-        for order in orders:
-            waves = [oscillators.waves(source, order) for source in sources]
-            ends = [np.stack([f(w.value, axis=(1, 2)) for w in waves]) for f in (np.min, np.max)]
-            middle[order] = (ends[0] + ends[1]) / 2
-            half[order] = (ends[1] - ends[0]) / 2 + np.stack([w.error for w in waves])
-            group_stray[order] = np.stack([w.stray for w in waves])
+        for order, (value, error, stray) in _responses(grid, *excited).items():
+            low, high = value.min(-1), value.max(-1)
+            middle[order], half[order] = (low + high) / 2, (high - low) / 2 + error
+            group_stray[order] = stray
     return Tables(made[0], made[1], made[2], grids, middle, half, group_stray, time)
+
+
+def _responses(
+    grid: Grid,
+    ground: Accelerogram | None,
+    time: Array,
+    sources: tuple[str, ...],
+    orders: Sequence[int],
+) -> dict[int, tuple[Array, Array, Array]]:
+    """Responses over a grid (sources, T, Q W), their error and stray (sources, T), by order."""
+    oscillators = Oscillators(grid, ground, time)
+    made = {}
+    for order in orders:
+        waves = [oscillators.waves(source, order) for source in sources]
+        value = np.stack([wave.value.reshape(len(time), -1) for wave in waves])
+        error = np.stack([wave.error for wave in waves]) + ROUND_OFF * np.abs(value).max(-1)
+        made[order] = value, error, np.stack([wave.stray for wave in waves])
+    return made
 
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
@@ -218,7 +225,7 @@ class Problem:
         enough: Gap at which a bound is left.
         constant: What the motion has besides the model, and what a bound has besides, (2, T).
         data: Models and tables of the output.
-        out: Bounds, the model's values, evaluations and slabs, shape (4, T).
+        out: Bounds and the model's values, shape (2, T).
         at: Inputs of the model's values, shape (T, d).
     """
 
@@ -235,8 +242,7 @@ class Problem:
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
         data = Data(*_tables(level, o), *_models(level, o), *group)
-        out = np.full((4, total), np.inf)
-        out[1] = -HUGE
+        out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
         return cls(side, enough, constant, data, out, np.zeros((total, data.linear.shape[1])))
 
     @property
@@ -251,14 +257,13 @@ class Problem:
 
     def run(self, nodes: Rows, slabs: int, steps: int, loose: float, floor: float) -> None:
         """Improve the bounds at nodes, with an effort."""
-        out, at = np.empty((4, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
+        out, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
         effort = Effort(slabs, steps, self.enough, self.top, loose, floor)
         bounds(nodes, self.side, effort, self.constant, self.data, out, at)
         better = out[1] > self.out[1, nodes]
         self.at[nodes[better]] = at[better]
         self.out[1, nodes] = np.maximum(self.out[1, nodes], out[1])
         self.out[0, nodes] = np.minimum(self.out[0, nodes], out[0])
-        self.out[2:, nodes] = out[2:]
 
 
 def _ends(every: Sequence[Sequence[Expansion]]) -> tuple[Array, Array]:

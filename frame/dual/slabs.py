@@ -175,7 +175,7 @@ def bounds(
         effort: Effort for each node.
         constant: What the motion has besides the model, and what a bound has besides, (2, T).
         data: Models and tables of the output.
-        out: Written: bounds, the model's values, evaluations of D and slabs, shape (4, J).
+        out: Written: bounds and the model's values, shape (2, J).
         at: Written: inputs of the model's values, shape (J, L).
     """
     modes, most, Z = len(data.share), effort.slabs, len(data.linear)
@@ -209,7 +209,7 @@ def refine(
     slabs.mu[0], slabs.value[0] = mu, np.inf
     reached = ascend(u, node, side, data)
     aim = sufficient(reached, 0.0, effort, constant)
-    reached, used = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)
+    reached = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)
     mu[:] = slabs.mu[0]
     floor = effort.floor * (constant[1] + dot(np.abs(mu), data.rest))
     count = 1
@@ -219,11 +219,10 @@ def refine(
         if slabs.value[first] <= aim or not divided(slabs, first, count):
             break
         for own in (first, count):
-            reached, more = examine(own, node, side, data, effort.steps, aim, slabs, reached, u)
-            used += more
+            reached = examine(own, node, side, data, effort.steps, aim, slabs, reached, u)
         count += 1
     out[0] = slabs.value[:count].max() + constant[0] + constant[1]
-    out[1], out[2], out[3] = reached + constant[0], used, count
+    out[1] = reached + constant[0]
 
 
 @compiled
@@ -244,17 +243,17 @@ def examine(
     slabs: Slabs,
     reached: float,
     u: Array,
-) -> tuple[float, int]:
-    """Bound of one slab; the model's best value, with its inputs in `u`, and evaluations of D."""
+) -> float:
+    """Bound of one slab; the model's best value, with its inputs in `u`."""
     here, mu, weight = np.empty(len(u)), slabs.mu[own], slabs.weight[own]
-    value, used = minimise(mu, slabs.ends[own], node, side, data, steps, aim, reached, weight, here)
+    value = minimise(mu, slabs.ends[own], node, side, data, steps, aim, reached, weight, here)
     slabs.value[own] = min(value, slabs.value[own])
     if slabs.value[own] > aim or own == 0:
         other = ascend(here, node, side, data)
         if other > reached:
             reached = other
             u[:] = here
-    return reached, used
+    return reached
 
 
 @compiled

@@ -14,6 +14,7 @@ from alphacut.frame.dual.homogeneous import Series, packed, tensor
 from alphacut.frame.dual.intervening import inverse, oscillators
 from alphacut.frame.dual.level import Level, Problem
 from alphacut.frame.dual.proof import over_box
+from alphacut.frame.dual.structure import classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -176,12 +177,16 @@ def test_half_of_a_remainder_of_eigenpairs_would_not_do():
 
 
 def test_half_of_the_range_of_eigenvalues_would_not_do():
-    found = modes(frame(1, 0.1)[-1])
-    assert found.low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
-    assert found.high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
+    own, _, _, _, structure = frame(1, 0.1)
+    p = {name: Expansion.constant(x, 1) for name, x in own.parameters.items()}
+    loose = {name: p[name].loosened(0.1 * own.parameters[name]) for name in ("k1", "m1")}
+    for one in (structure, classical(own, p | loose)):
+        found = modes(one)
+        assert found.low[0] == pytest.approx(3e7 / 2e4 * 0.9 / 1.1)
+        assert found.high[0] == pytest.approx(3e7 / 2e4 * 1.1 / 0.9)
 
 
-def masses_on_springs():
+def masses_on_springs(loose=0.0):
     """Three of them beside one another, two of the same frequency, and their sum."""
     arrays = [np.diag(row) for row in np.eye(3)]
     own = MatrixStructure(
@@ -192,7 +197,8 @@ def masses_on_springs():
         v0=np.ones(3),
     )
     centre = np.array([1.0, 1.0, 3.0])
-    return over_box(own, tuple("abc"), centre, 1e-3 * centre, np.arange(3))
+    p = Expansion.inputs(centre, 1e-3 * centre).loosened(loose * centre)
+    return classical(own, {name: p[i] for i, name in enumerate("abc")})
 
 
 def test_modes_that_may_cross_are_left_in_the_group():
@@ -205,13 +211,9 @@ def test_modes_that_may_cross_are_left_in_the_group():
 
 
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
-    structure, time, parts = masses_on_springs(), np.arange(0, 44.01, 0.25), 4
-    loose = replace(
-        structure,
-        stiffness=structure.stiffness.loosened(np.diag([0.03, 0.03, 0.09])),
-        start=structure.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]])),
-    )
-    level = Level.of(loose, None, time, ("velocity",))
+    springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
+    both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
+    level = Level.of(replace(springs, start=both), None, time, ("velocity",))
     outer, _ = level.bounds(np.full(1, 1e-6), 40, 100, 1)
     omega = np.sqrt(np.array([1.0, 1, 3])[:, None] * np.linspace(0.969, 1.031, 201))
     fine = np.arange(len(time) * parts - parts + 1) * 0.25 / parts
