@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.figures import style
 from alphacut.figures.style import GREY, INK, ORANGE, colours
-from alphacut.frame import envelope
+from alphacut.frame import Auto, envelope
 from alphacut.frame.questions.passing import ANY, Passing, passing
 from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import Output
@@ -66,8 +66,8 @@ class Decision(Question):
             duration=motion.duration,
             step=motion.step,
             alpha=motion.alpha,
+            method=Auto(PRECISION, peaks=True),
             relative=True,
-            tolerance=PRECISION,
             progress=motion.progress or False,
         )
         answers = passing(peaks(bounds), limits)

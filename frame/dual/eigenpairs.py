@@ -30,7 +30,8 @@ import numpy as np
 
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, symmetric
 from alphacut.frame.dual.homogeneous import Series, packed, product, tensor
-from alphacut.frame.dual.structure import Classical, UncoveredError
+from alphacut.frame.dual.structure import Classical
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 MOST_MONOMIALS = 33_000
@@ -101,7 +102,7 @@ def modes(structure: Classical) -> Modes:
     """All modes, each single or left in the group.
 
     Raises:
-        UncoveredError: The box is so wide that the structure may lose its mass or stiffness.
+        UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
     below = np.linalg.inv(np.linalg.cholesky(structure.mass.parts[0]))
     middle, turned = np.linalg.eigh(below @ structure.stiffness.parts[0] @ below.T)
@@ -109,7 +110,7 @@ def modes(structure: Classical) -> Modes:
     mass, stiffness = (_seen(x, basis) for x in (structure.mass, structure.stiffness))
     heavy, stiff = _form(mass, np.ones(len(middle))), _form(stiffness, middle**-0.5)
     if not (heavy < 1 and stiff < 1):
-        raise UncoveredError("the structure may lose its stiffness", "take narrower inputs")
+        raise UnprovedError("the structure may lose its stiffness", "take narrower inputs")
     used = np.union1d(mass.present(), stiffness.present())
     used = used if len(used) else np.arange(1)
     of_mass, of_stiffness = (x.on(used) for x in (mass, stiffness))

@@ -19,9 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.dual.eigenpairs import Mode, Modes
-from alphacut.frame.dual.expansion import Expansion, product, stacked
+from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, product, stacked
 from alphacut.frame.dual.homogeneous import Series
-from alphacut.frame.dual.structure import Classical, UncoveredError, spread
+from alphacut.frame.dual.structure import Classical, spread
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Rows
 
 DEGREE = 6
@@ -90,11 +91,13 @@ def oscillators(
     if not left:
         return single, None
     constant = Expansion.constant(rows, d)
-    share = _minus(product(excited, constant, "sj,oj->so"), shares)
+    share = product(excited, constant, "sj,oj->so") - sum(shares)
     of_rows = product(product(constant, inverse(modes.mass), "oi,ij->oj"), constant, "oj,oj->o")
     of_start = product(product(excited, modes.mass, "si,ij->sj"), excited, "sj,sj->s")
     omega, quotient = _group_range(structure, modes, np.array(left))
-    each = [_doubt(_minus(of_rows, read), _minus(of_start, driven)[s]) for s in range(len(sources))]
+    A = (of_rows - sum(read)).loosened(ROUND_OFF * of_rows.size())
+    B = (of_start - sum(driven)).loosened(ROUND_OFF * of_start.size())
+    each = [_doubt(A, B[s]) for s in range(len(sources))]
     share, doubt = (product(x, structure.factor, "so,o->so") for x in (share, stacked(each)))
     return single, Group(share, doubt, omega, quotient)
 
@@ -103,7 +106,8 @@ def _doubt(rows: Expansion, start: Expansion) -> Expansion:
     """Bound of √(A B) for A, V = (m,), and B, V = ()."""
     A, B = (np.maximum(x.parts[0] + x.spread(), 1e-300) for x in (rows, start))
     t = np.sqrt(B / A)
-    return rows * (t / 2) + spread(start, 0.5 / t)
+    each: Expansion = rows * (t / 2)
+    return each + spread(start, 0.5 / t)
 
 
 def _shares(excited: Expansion, mode: Mode, a: Series) -> Expansion:
@@ -163,19 +167,13 @@ def _group_range(
     most = max(damping(a, 0, zeta[0], low) + b * np.sqrt(high) / 2, 0.0)
     least = max(damping(below[0], 0, zeta[1], high) + below[1] * np.sqrt(low) / 2, 0.0)
     if most >= 1:
-        raise UncoveredError("a mode may not oscillate", "take less damping")
+        raise UnprovedError("a mode may not oscillate", "take less damping")
     steep = np.sqrt(1 - most**2)
     return (float(np.sqrt(low) * steep), float(np.sqrt(high))), (least, float(most / steep))
 
 
 def _range(x: Expansion) -> tuple[float, float]:
     return float(x.parts[0] - x.spread()), float(x.parts[0] + x.spread())
-
-
-def _minus(total: Expansion, shares: list[Expansion]) -> Expansion:
-    for share in shares:
-        total = total - share
-    return total
 
 
 def inverse(mass: Expansion) -> Expansion:
@@ -188,5 +186,5 @@ def inverse(mass: Expansion) -> Expansion:
     size = step.size()
     tail = np.linalg.matrix_power(size, 4) @ np.linalg.inv(one - size)
     if np.abs(np.linalg.eigvals(size)).max() >= 1:
-        raise UncoveredError("masses vary too much", "take narrower inputs")
+        raise UnprovedError("masses vary too much", "take narrower inputs")
     return out.loosened(tail)

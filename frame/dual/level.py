@@ -14,9 +14,10 @@ from alphacut.frame.dual.expansion import ROUND_OFF, Expansion
 from alphacut.frame.dual.homogeneous import monomials, packed
 from alphacut.frame.dual.intervening import Group, Oscillator, oscillators
 from alphacut.frame.dual.slabs import Effort, bounds
-from alphacut.frame.dual.structure import Classical, UncoveredError
+from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 FINE = 0.07
@@ -154,11 +155,11 @@ class Level:
         """The level of a structure over its box.
 
         Raises:
-            UncoveredError: None of its modes can be enclosed.
+            UnprovedError: None of its modes can be enclosed.
         """
         single, group = oscillators(structure, modes(structure), sources)
         if not single:
-            raise UncoveredError("no mode keeps clear of the others", "take narrower inputs")
+            raise UnprovedError("no mode keeps clear of the others", "take narrower inputs")
         orders = sorted({int(order) for order in structure.order})
         made = tables(single, group, ground, time, sources, orders)
         return cls(structure, single, group, made, sources)

@@ -29,10 +29,10 @@ from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dual.attained import attained
 from alphacut.frame.dual.expansion import Expansion
 from alphacut.frame.dual.level import Level
-from alphacut.frame.dual.structure import Classical, UncoveredError, classical
+from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.methods.proof import exact
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
@@ -73,10 +73,10 @@ class DualProof:
         """Guaranteed envelope of all outputs on all levels.
 
         Raises:
-            UncoveredError: The structure has no classical modes that can be enclosed, or the motion
+            UnprovedError: The structure has no classical modes that can be enclosed, or the motion
                 is not the exact one.
         """
-        linear, begun, cuts = _exact(flow), time.perf_counter(), flow.boxes
+        linear, begun, cuts = exact(flow), time.perf_counter(), flow.boxes
         peak = np.abs(linear.values(cuts.modal[None])[0]).max(0)
         peak = np.where(peak > 0, peak, max(float(peak.max()), 1e-300))
         levels: list[_Bounded] = []
@@ -162,21 +162,6 @@ class _Bounded:
     at: Array
     stray: Array
     single: int
-
-
-def _exact(flow: UnitFlow) -> LinearFlow:
-    """The exact motion of a linear structure.
-
-    Raises:
-        UncoveredError: It is none.
-    """
-    linear = flow.flow
-    if not isinstance(linear, LinearFlow) or not isinstance(linear.integrator, Exact):
-        raise UncoveredError(
-            "the motion is not the exact one of a linear structure",
-            "take a linear structure and the integrator exact",
-        )
-    return linear
 
 
 def over_box(

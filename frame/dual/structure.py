@@ -22,10 +22,6 @@ from alphacut.fuzzy.arrays import Array
 Inputs = Mapping[str, Expansion]
 
 
-class UncoveredError(UnprovedError):
-    """A structure that the dual bound does not cover."""
-
-
 @dataclass(frozen=True, eq=False)
 class Classical:
     """A structure over a box of d inputs, n unknowns, m outputs.
@@ -59,10 +55,10 @@ def classical(system: LinearSystem, p: Inputs) -> Classical:
     """The structure with all its parameters as expansions, each V = ().
 
     Raises:
-        UncoveredError: Its modes are not known to be classical.
+        UnprovedError: Its modes are not known to be classical.
     """
     del p
-    raise UncoveredError(
+    raise UnprovedError(
         f"a {type(system).__name__} is not covered", "take a StoreyFrame or a MatrixStructure"
     )
 
@@ -100,7 +96,7 @@ def _(system: StoreyFrame, p: Inputs) -> Classical:
 @classical.register
 def _(system: MatrixStructure, p: Inputs) -> Classical:
     if system.damping:
-        raise UncoveredError(
+        raise UnprovedError(
             "a damping matrix couples the modes", "give damping ratios in its place"
         )
     n = system.size
@@ -108,7 +104,7 @@ def _(system: MatrixStructure, p: Inputs) -> Classical:
     rows = [np.append(row, np.zeros(2 * n - len(row))) for row in system.observed.values()]
     of_speed = np.array([bool(row[n:].any()) for row in rows])
     if any(fast and row[:n].any() for fast, row in zip(of_speed, rows, strict=True)):
-        raise UncoveredError("an output mixes displacements and velocities", "observe them apart")
+        raise UnprovedError("an output mixes displacements and velocities", "observe them apart")
     start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (system.q0, system.v0)]
     ratios = [nothing + p[x] if isinstance(x, str) else nothing + x for x in system.ratios]
     factors = stacked([nothing, nothing])
@@ -152,11 +148,11 @@ def _softening(system: StoreyFrame, p: Inputs) -> Expansion:
 
 def _refuse_dashpots(system: StoreyFrame, p: Inputs) -> None:
     if any(p[name].size() > 0 for name in system.group("d")):
-        raise UncoveredError(
+        raise UnprovedError(
             "dashpots couple the modes", "give a damping ratio or Rayleigh's factors"
         )
     if system.gravity and p["rayleigh_stiffness"].size() > 0:
-        raise UncoveredError(
+        raise UnprovedError(
             "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",
         )
@@ -177,7 +173,7 @@ def _total(terms: Terms, p: Inputs, n: int) -> Expansion:
                 factor(p) if callable(factor) else p[factor] if isinstance(factor, str) else factor
             )
         except (TypeError, AttributeError) as failure:
-            raise UncoveredError(
+            raise UnprovedError(
                 f"a factor is not arithmetic ({failure})", "write it with + − * and powers"
             ) from None
         out = out + (spread(value, array) if isinstance(value, Expansion) else value * array)

@@ -1,8 +1,8 @@
 """Auto: a proof; where there is none, the search; where there is none either, the follower.
 
-Up to six fuzzy inputs the branch and bound is tried, up to four if no tolerance is named. The dual
-bound follows, which takes any number of inputs and states its gap. A gap above a named tolerance
-leads to the search.
+Up to six fuzzy inputs the branch and bound is tried, up to four if no tolerance is named or only
+the peaks are to keep it. The dual bound follows, which takes any number of inputs and states its
+gap. A gap above a named tolerance leads to the search, but not of the peaks.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from alphacut.fuzzy.refused import RefusedError
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
 FEW = 4
-"""Inputs up to which the branch and bound is worth its time where no tolerance is named."""
+"""Inputs up to which the branch and bound is worth its time where peaks count most. With five it
+takes thirty times as long as the dual bound (`benchmarks.frame.many_inputs --few`)."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Auto:
             displacement; 1e-4 unless given.
         seed: Of the search and the follower.
         workers: Threads of the proof; all cores unless given.
+        peaks: Whether the error is that of the peaks, and a proof with a wider gap is kept.
 
     Raises:
         RefusedError: The tolerance is not positive.
@@ -48,6 +50,7 @@ class Auto:
     tolerance: float | None = None
     seed: int = 0
     workers: int | None = None
+    peaks: bool = False
 
     def __post_init__(self) -> None:
         if self.tolerance is not None and not self.tolerance > 0:
@@ -59,13 +62,14 @@ class Auto:
         if not isinstance(flow.flow, LinearFlow):
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
         reasons: list[str] = []
+        named = None if self.peaks else self.tolerance
         for proof in self._proofs(len(flow.boxes.names)):
             try:
                 proved = proof.run(flow, progress)
             except (UnprovedError, ModalError) as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            if self.tolerance is None or (proved.error <= self._allowed(flow)).all():
+            if named is None or (proved.error <= self._allowed(flow)).all():
                 return _noted(proved, "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
         why = f"unproved: {'; '.join(reasons)}"
@@ -79,7 +83,7 @@ class Auto:
     def _proofs(self, inputs: int) -> tuple[Proof | DualProof, ...]:
         """Proofs to try, in order, for a number of fuzzy inputs."""
         dual = DualProof(workers=self.workers)
-        if inputs > (MOST_PARAMETERS if self.tolerance else FEW):
+        if inputs > (MOST_PARAMETERS if self.tolerance and not self.peaks else FEW):
             return (dual,)
         return Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers), dual
 

@@ -91,7 +91,11 @@ class Proof:
             ModalError: The structure has no smooth oscillating modes over the box.
         """
         begun, tolerance = time.perf_counter(), flow.tolerance(self.tolerance or self.gap)
-        linear = _linear(flow)
+        linear, count = exact(flow), len(flow.boxes.names)
+        if count > MOST_PARAMETERS:
+            raise UnprovedError(
+                f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {count}"
+            )
         gaps = (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
         modelled = self._modelled(linear, flow, gaps)
         parts: list[tuple[Boxes, Certificate]] = []
@@ -185,23 +189,19 @@ class Proof:
         )
 
 
-def _linear(flow: UnitFlow) -> LinearFlow:
+def exact(flow: UnitFlow) -> LinearFlow:
     """The exact motion of a linear structure.
 
     Raises:
-        UnprovedError: It is none, or has too many inputs.
+        UnprovedError: It is none.
     """
-    linear, count = flow.flow, len(flow.boxes.names)
+    linear = flow.flow
     if not isinstance(linear, LinearFlow):
         raise UnprovedError("the system is not linear")
     if not isinstance(linear.integrator, Exact):
         raise UnprovedError(
             f"the motion is that of the scheme '{linear.integrator.name}', and a proof is of the"
             " exact one"
-        )
-    if count > MOST_PARAMETERS:
-        raise UnprovedError(
-            f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {count}"
         )
     return linear
 

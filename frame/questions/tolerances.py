@@ -94,7 +94,8 @@ def tolerances(
         raise RefusedError("most and precision", (most, precision), "above 0; above 0 and below 1")
     require_limits(limits, model.outputs)
     motion = {"duration": duration, "step": step}
-    bounds = partial(envelope, model, **motion, alpha=[0.0], method=Auto(error), relative=True)
+    way = Auto(error, peaks=True)
+    bounds = partial(envelope, model, **motion, alpha=[0.0], method=way, relative=True)
     tried: dict[float, _Step] = {}
 
     def step_at(scale: float) -> _Step:
