@@ -126,7 +126,7 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
     Raises:
         ValueError: An input is no number, or as `Boxes`.
     """
-    require_numbers("alpha", alpha, "[0, 1]")
+    require_numbers("alpha", alpha)
     levels, numbers = np.asarray(alpha, float), fuzzy_inputs(inputs)
     cuts = np.array(
         [[number.cut(a) for number in numbers.values()] for a in levels], float

@@ -10,12 +10,11 @@ from typing import NoReturn
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
-from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, frequencies
-from alphacut.fuzzy.refused import FailedError, RefusedError, require
+from alphacut.fuzzy.refused import FailedError, RefusedError, real
 
 MOST_NODES = 10_000_000
 """Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
@@ -28,10 +27,8 @@ def nodes(duration: float, step: float) -> Array:
         ValueError: One is no number, the step is not positive, or the duration is not a positive
             multiple of it, or of too many steps.
     """
-    require_number("step", step, "s")
-    require_number("duration", duration, "s")
-    require(np.isfinite(step) and step > 0, "step", f"{step:g} s", "a positive time")
-    count = round(duration / step) if np.isfinite(duration) else 0
+    real("step", step, positive=True)
+    count = round(real("duration", duration) / step)
     if not 1 <= count <= MOST_NODES or abs(count * step - duration) > 1e-9 * duration:
         allowed = f"1 to {MOST_NODES:,} whole steps of {step:g} s"
         raise RefusedError("duration", f"{duration:g} s", allowed)

@@ -22,7 +22,7 @@ from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import real
 
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
@@ -53,8 +53,8 @@ class Auto:
     peaks: bool = False
 
     def __post_init__(self) -> None:
-        if self.tolerance is not None and not self.tolerance > 0:
-            raise RefusedError("tolerance", self.tolerance, "a positive number")
+        if self.tolerance is not None:
+            real("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of all outputs on all levels, whose first note says why its method was taken."""

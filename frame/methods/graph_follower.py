@@ -21,7 +21,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
 from alphacut.frame.methods.independent import SAFETY, beyond, parted
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Nature
 
 
@@ -71,8 +71,7 @@ class GraphFollower:
 
     def __post_init__(self) -> None:
         require(self.order in (1, 2), "order", self.order, "1 and 2, the degrees of a Taylor model")
-        if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
-            raise RefusedError("tolerance", self.tolerance, "a positive number")
+        real("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Envelope:
         """Envelope of all outputs on all levels.

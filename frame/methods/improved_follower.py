@@ -23,7 +23,7 @@ from alphacut.frame.methods.graph_storage import Places, Storage
 from alphacut.frame.methods.independent import SAFETY, beyond, parted
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, share
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
 MOST = 64e6
@@ -61,11 +61,9 @@ class ImprovedFollower:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not (self.tolerance > 0 and np.isfinite(self.tolerance)):
-            raise RefusedError("tolerance", self.tolerance, "a positive number")
-        if min(self.budget, self.spread) < 1:
-            values = self.budget, self.spread
-            raise RefusedError("budget, spread", values, "whole numbers from 1 on")
+        real("tolerance", self.tolerance, positive=True)
+        real("budget", self.budget, whole=True, least=1)
+        real("spread", self.spread, whole=True, least=1)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of two passes from different points, corrected by what their models promise.

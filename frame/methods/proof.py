@@ -36,7 +36,7 @@ from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, share
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
 PORTION = 0.2
@@ -79,9 +79,8 @@ class Proof:
 
     def __post_init__(self) -> None:
         for key in ("gap", "tolerance", "boxes", "parts", "budget"):
-            value = getattr(self, key)
-            if value is not None and not value > 0:
-                raise RefusedError(key, value, "a positive number")
+            if getattr(self, key) is not None:
+                real(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Guaranteed envelope of all outputs on all levels.

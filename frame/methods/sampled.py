@@ -12,7 +12,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
 MOST = 16e6
@@ -32,7 +32,7 @@ class Sampled:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        require(self.samples >= 1, "samples", self.samples, "whole numbers from 1 on")
+        real("samples", self.samples, whole=True, least=1)
 
     def points(self, lower: Array, upper: Array) -> Array:
         """Points of a box [lower, upper], shape (samples, d)."""

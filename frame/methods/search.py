@@ -37,7 +37,7 @@ from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.progress_bar import Progress, share
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
 SMALL = 0.05
@@ -84,9 +84,8 @@ class Search:
 
     def __post_init__(self) -> None:
         for key in ("tolerance", "passes"):
-            value = getattr(self, key)
-            if value is not None and not value > 0:
-                raise RefusedError(key, value, "a positive number")
+            if getattr(self, key) is not None:
+                real(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of all outputs on all levels, estimated or, of rough polynomials, attained.

@@ -110,9 +110,8 @@ def probabilities(
     points = np.concatenate(tried)
     looked_at = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
-    between, off = stray(flow, few), np.zeros((len(flow.time), len(flow.outputs)))
-    if not flow.exact:
-        off = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
+    between = stray(flow, few)
+    off = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
     columns, sizes = [list(model.outputs).index(x) for x in limits], np.array([*limits.values()])
     shares = []  # peaks over their limits: at least, at most, at most within steps
     for count, point in enumerate(points, start=1):

@@ -22,7 +22,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
 
@@ -90,8 +90,8 @@ def tolerances(
         RefusedError: A limit or a number is out of range, or supports at scale `most` reach values
             without a meaning.
     """
-    if not (most > 0 and 0 < precision < 1):
-        raise RefusedError("most and precision", (most, precision), "above 0; above 0 and below 1")
+    real("most", most, positive=True)
+    real("precision", precision, positive=True, most=1)
     require_limits(limits, model.outputs)
     motion = {"duration": duration, "step": step}
     way = Auto(error, peaks=True)

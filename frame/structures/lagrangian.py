@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from alphacut.frame.calculus.jet import cos
-from alphacut.frame.calculus.numbers import require_number
 from alphacut.frame.structures.quantities import Output, Parameter
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, real, require
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -54,13 +53,12 @@ class LagrangianSystem:
     force: Function | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.coordinates, int) or self.coordinates < 1:
-            raise RefusedError("coordinates", self.coordinates, "whole numbers from 1 on")
+        real("coordinates", self.coordinates, whole=True, least=1)
         for name in ("parameters", "observed"):
             if not isinstance(getattr(self, name), Mapping) or not getattr(self, name):
                 raise RefusedError(name, getattr(self, name), "values by name, one at least")
         for name, value in self.parameters.items():
-            require_number(f"parameter {name}", value, "SI units")
+            real(f"parameter {name}", value)
         eq = self.symbols
         if eq.mass.free_symbols & set(eq.v):
             raise RefusedError("lagrangian", eq.mass.tolist(), "functions quadratic in v")
@@ -189,8 +187,8 @@ def pendulum(
         RefusedError: Mass, length or gravity is not positive, or the damping is negative.
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
-        require(value > 0, name, value, "positive numbers")
-    require(damping >= 0, "damping", damping, "0 or greater")
+        real(name, value, positive=True)
+    real("damping", damping, least=0)
 
     def lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
         return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])

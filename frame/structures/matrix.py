@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, variables
-from alphacut.frame.calculus.numbers import require_number, require_numbers
+from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, real, require
 
 KINDS = ("mass", "damping", "stiffness")
 Factor = Callable[[Mapping[str, Any]], Any]
@@ -63,7 +63,7 @@ class MatrixStructure:
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
-            require_number(f"parameter {name}", value, "SI units")
+            real(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
             require(bool(getattr(self, kind)), kind, None, "one entry at least")
         for kind in KINDS:
@@ -118,7 +118,7 @@ class MatrixStructure:
         for name, value, lengths in vectors:
             if value is None:
                 continue
-            require_numbers(name, value, "SI units")
+            require_numbers(name, value)
             if np.ndim(value) != 1 or len(value) not in lengths:
                 raise RefusedError(name, f"of shape {np.shape(value)}", f"{lengths} numbers")
 
@@ -169,7 +169,7 @@ def _symmetric(kind: str, value: Any) -> Array:
     array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
     if array.ndim != 2 or array.shape[0] != array.shape[1]:
         raise RefusedError(f"array of {kind}", f"of shape {array.shape}", "square arrays")
-    require_numbers(kind, array, "SI units")
+    require_numbers(kind, array)
     off = np.abs(array - array.T)
     i, j = np.unravel_index(off.argmax(), off.shape)
     if off[i, j] > 1e-9 * np.abs(array).max():

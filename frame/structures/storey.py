@@ -15,12 +15,12 @@ from typing import Literal
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
-from alphacut.frame.calculus.numbers import require_number, require_numbers
+from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.quantities import NOT_NEGATIVE, Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, real, require
 
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
@@ -119,7 +119,7 @@ class StoreyFrame:
             if values is None:
                 continue
             single = name in ("modulus", "gravity") or np.ndim(values) == 0
-            (require_number if single else require_numbers)(name, values, "SI units")
+            (real if single else require_numbers)(name, values)
             for value in np.atleast_1d(values):
                 if not Parameter(name, range=rule).admits(value, value):
                     raise RefusedError(name, f"{value:g}", rule or "finite numbers")

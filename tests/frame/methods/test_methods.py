@@ -203,7 +203,7 @@ def test_where_neighbouring_motions_part_bounds_are_attained_and_no_more():
         ({"method": frame.Proof(tolerance=1e-3), "integrator": "midpoint"}, "midpoint"),
         ({"method": "vertex"}, "method is vertex; allowed: auto, proof"),
         ({"method": "proof", "order": 2}, "option of proof is order; allowed: gap, tolerance"),
-        ({"method": "auto", "tolerance": 0.0}, "tolerance is 0.0; allowed: a positive number"),
+        ({"method": "auto", "tolerance": 0.0}, "tolerance is 0.0; allowed: finite numbers greater than 0"),
         ({"method": frame.Auto(), "seed": 1}, "none beside a method that is no name"),
         ({"integrator": "euler"}, "integrator is euler; allowed: midpoint, rk4, exact"),
         ({"integrator": "rk4", "step": 1.0}, "at most 0.1"),
