@@ -96,9 +96,10 @@ import matplotlib.pyplot as plt
 figure, axes = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
 for level, alpha in enumerate(motion.alpha):
     band = motion.lower[level, :, 0], motion.upper[level, :, 0]
-    axes.fill_between(motion.time, *band, color="#0072b2", alpha=0.25, lw=0, label=f"α = {alpha:g}")
+    shade = plt.get_cmap("YlGnBu")(0.25 + 0.65 * alpha)
+    axes.fill_between(motion.time, *band, color=shade, lw=0, label=f"α = {alpha:g}")
 axes.set(xlabel="time (s)", ylabel="displacement of the first floor (m)")
-axes.legend(ncols=5, loc="upper center", frameon=False)
+axes.legend(loc="upper left", bbox_to_anchor=(1, 1), frameon=False)
 plt.show()
 
 # %% [markdown]
