@@ -37,8 +37,8 @@ def _lines(title: str) -> Tick:
         now = time.monotonic()
         if now - last < EVERY or not max(before, 0.005) < done < 1:
             return
-        left = (1 - done) * (now - last) / (done - before)
+        left = f", about {(1 - done) * (now - last) / (done - before):.0f} s left"
         last, before = now, done
-        say(f"{title}: {done:.0%} done after {now - begun:.0f} s, about {left:.0f} s left")
+        say(f"{title}: {done:.0%} done after {now - begun:.0f} s" + left * (done > 0.05))
 
     return tick
