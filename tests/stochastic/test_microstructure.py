@@ -126,7 +126,7 @@ def test_rows_without_meaning_are_refused(tmp_path, text, key, allowed):
 def test_files_that_are_no_tables_are_refused(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"\x89PNG\xff")
     for name in ("none.csv", "binary.csv"):
-        with pytest.raises(RefusedError, match="CSV files"):
+        with pytest.raises(RefusedError, match="text files in UTF-8"):
             CircleFile(tmp_path / name, (1, 1)).read()
 
 
