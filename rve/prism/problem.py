@@ -76,6 +76,7 @@ class PrismProblem:
         pairs, rows = self.numbering.pairs, self.numbering.rows
         self._local = map_of(pairs[self.form.node], comm)
         self.matrix = zero_matrix(pairs[grid.cells], self._local, rows, self.numbering.size)
+        self._scatter, self._whole = PETSc.Scatter.toAll(self.matrix.createVecRight())
 
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
@@ -111,9 +112,8 @@ class PrismProblem:
 
     def field(self, vector: PETSc.Vec) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
-        scatter, whole = PETSc.Scatter.toAll(vector)
-        scatter.scatter(vector, whole)
-        return self.numbering.to_nodes(np.array(whole.array_r), self.form.node)
+        self._scatter.scatter(vector, self._whole)
+        return self.numbering.to_nodes(np.array(self._whole.array_r), self.form.node)
 
     def slice_strains(self, fields: Sequence[tuple[Array, Array | None]]) -> SliceStrains:
         """Mean strains of fields, each a macroscopic strain (3,) and a fluctuation (nodes, 2).
