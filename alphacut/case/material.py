@@ -37,6 +37,7 @@ from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
+Theta = Annotated[float, Quantity(least=-10, most=10)]
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
@@ -46,13 +47,9 @@ SHAPES = (
 class RadiusMap(Section):
     """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
 
-    theta: Annotated[
-        tuple[
-            Annotated[float, Quantity(least=-10, most=10)],
-            Annotated[float, Quantity(least=-10, most=10)],
-        ],
-        after(rising),
-    ] = Field(default=(-3.0, 3.0), description="support of θ")
+    theta: Annotated[tuple[Theta, Theta], after(rising)] = Field(
+        default=(-3.0, 3.0), description="support of θ"
+    )
     a1: Radius = Field(description="radius at the lower end of θ")
     a3: Radius = Field(description="radius at the upper end of θ")
     a2: Any_ = Field(description="slope dr/dξ at the lower end")

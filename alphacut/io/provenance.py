@@ -19,16 +19,8 @@ from pydantic import BaseModel
 
 # 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
 FORMAT = 2
-PACKAGES = {
-    "dolfinx": "fenics-dolfinx",
-    "basix": "fenics-basix",
-    "petsc4py": "petsc4py",
-    "mpi4py": "mpi4py",
-    "gmsh": "gmsh",
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "xarray": "xarray",
-}
+PACKAGES = ("fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh")
+PACKAGES += ("numpy", "scipy", "xarray")
 NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own
 
 
@@ -55,8 +47,7 @@ def version_of(distribution: str) -> str:
 def versions() -> dict[str, str]:
     """Versions of alphacut, Python and of the packages that are installed."""
     own = {"alphacut": own_version(), "python": platform.python_version()}
-    others = {name: version_of(distribution) for name, distribution in PACKAGES.items()}
-    return own | {name: known for name, known in others.items() if known}
+    return own | {name: known for name in PACKAGES if (known := version_of(name))}
 
 
 @cache
