@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from alphacut.frame import StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
@@ -77,6 +77,20 @@ class Structure:
             if name not in self.outputs:
                 cure = suggestion(name, self.outputs)
                 raise RefusedError(key, name, ", ".join(self.outputs), cure)
+
+    def observing(self, key: str, outputs: tuple[str, ...]) -> StoreyFrame | LagrangianSystem:
+        """The model; of a storey frame with these outputs alone.
+
+        Raises:
+            RefusedError: It has no such output.
+        """
+        if self.frame is None:
+            self.require_outputs(key, outputs)
+            return self.model
+        try:
+            return replace(self.frame, outputs=outputs)
+        except RefusedError as error:
+            raise RefusedError(key, error.value, error.allowed) from None
 
     def flow(
         self, names: Sequence[str], duration: float, step: float, integrator: str | None = None

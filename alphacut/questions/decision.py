@@ -61,7 +61,7 @@ class Decision(Question):
         """Degrees and margins of every limit, from the envelope of the limited outputs."""
         limits = self.in_si(motion.structure)
         bounds = envelope(
-            motion.observed(tuple(limits)),
+            motion.structure.observing("decision.limits", tuple(limits)),
             motion.inputs,
             duration=motion.duration,
             step=motion.step,

@@ -36,10 +36,8 @@ class Limit:
         """Limit in the SI unit of its output.
 
         Raises:
-            RefusedError: The structure has no such output, or no height of the storey.
+            RefusedError: The structure has no height of the storey.
         """
-        if structure.frame is None:
-            structure.require_outputs(key, [self.output])
         number = structure.numbers.get(self.output.replace("drift", "l"))
         if self.share and number is None:
             raise RefusedError(

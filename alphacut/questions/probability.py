@@ -112,7 +112,7 @@ class ProbabilitySection(Question):
         fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
         crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
         answers = probabilities(
-            motion.observed(tuple(limits)),
+            motion.structure.observing("probability.limits", tuple(limits)),
             fuzzy or dict([next(iter(crisp.items()))]),
             {name: shaped_like(number) for name, number in random.items()},
             limits,

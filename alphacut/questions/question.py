@@ -6,15 +6,13 @@ Each question is one file beside this one, and one line of `alphacut.questions.t
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
-from alphacut.frame import StoreyFrame
-from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import require
@@ -50,11 +48,6 @@ class Motion:
         """Fuzzy inputs by parameter."""
         return self.structure.inputs(self.fuzzy)
 
-    def observed(self, outputs: tuple[str, ...]) -> StoreyFrame | LagrangianSystem:
-        """The model, of a storey frame with these outputs alone."""
-        frame = self.structure.frame
-        return self.structure.model if frame is None else replace(frame, outputs=outputs)
-
 
 Row = tuple[str, ...]
 
@@ -80,6 +73,7 @@ class Question(Section, ABC):
         """
         key = f"{self.key}.limits"
         values = {limit.output: limit.si(structure, key) for limit in self.limits}
+        structure.observing(key, tuple(values))
         every = ", ".join(limit.text for limit in self.limits)
         require(len(values) == len(self.limits), key, every, "one limit for each output")
         return values

@@ -49,7 +49,7 @@ class Tolerances(Question):
         """Scales at which no limit and one is exceeded, and the supports at the first."""
         limits = self.in_si(motion.structure)
         scale = tolerances(
-            motion.observed(tuple(limits)),
+            motion.structure.observing("tolerances.limits", tuple(limits)),
             motion.inputs,
             limits,
             duration=motion.duration,

@@ -171,6 +171,8 @@ def test_questions_have_sections(tmp_path):
         (problem,) = problems(tmp_path, text.replace("q1 <= 9 mm", wrong))
         assert problem.key == "decision.limits[0]"
         assert words in str(problem)
+    (problem,) = problems(tmp_path, text.replace("q1 <=", "q9 <="))
+    assert problem.key == "decision.limits"
 
 
 def test_a_key_that_nobody_knows_gets_the_ordinary_message(tmp_path):
