@@ -1,4 +1,4 @@
-"""Command ``alphacut envelope``, also ``python -m frame envelope``: fuzzy dynamics."""
+"""Command ``alphacut envelope``: fuzzy dynamics."""
 
 from __future__ import annotations
 
