@@ -11,7 +11,7 @@ from pydantic import PlainValidator
 from alphacut.case.structure import Structure
 from alphacut.case.types import Some
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.units import engineering
 
@@ -53,12 +53,13 @@ def _limit(value: object) -> Limit:
     name, bound, text = (part.strip() for part in str(value).partition("<="))
     allowed = "an output, <= and a quantity, as 'drift1 <= 40 mm' or 'drift1 <= 0.5 %'"
     share = name.startswith("drift") and text.endswith("%")
+    number, reason = 0.0, ""
     try:
         number = quantity.number(text, "" if share else Output(name).unit)
     except (ValueError, KeyError) as error:
-        raise RefusedError("", value, allowed, str(error) * bool(bound)) from None
-    if not bound or not re.fullmatch(r"\w+", name) or not number > 0:
-        raise RefusedError("", value, allowed)
+        reason = str(error)
+    whole = bool(bound) and re.fullmatch(r"\w+", name) is not None and number > 0
+    require(whole, "", value, allowed, reason * bool(bound))
     return Limit(name, number, share, str(value))
 
 
