@@ -224,10 +224,10 @@ def _exchanged(way: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
     for shift in SHIFTS:
         count = max(len(grid) - shift, 0)
         for here, there in ((shift, 0), (0, shift)):
-            to, of = (grid[k : k + count].ravel() for k in (here, there))
-            to, of = to[fresh[of]], of[fresh[of]]
-            better.append(optima.offer(way, optima.point[of], to))
-    return np.unique(np.concatenate(better))
+            of = grid[there : there + count].ravel()
+            to = grid[here : here + count].ravel()[fresh[of]]
+            better.append(optima.offer(way, optima.point[of[fresh[of]]], to))
+    return np.asarray(np.unique(np.concatenate(better)))
 
 
 def _missed(gains: list[Array], outputs: int, quiet: float) -> Array:
