@@ -83,7 +83,7 @@ def converged(newton: Tape, arguments: Array, momentum: Array) -> bool:
         flat = evaluate(newton, arguments)
         if not np.isfinite(flat).all():
             return False
-        change = np.linalg.inv(flat[n:].reshape(n, n)) @ (flat[:n] - momentum)
+        change = np.linalg.solve(flat[n:].reshape(n, n), flat[:n] - momentum)
         arguments[:n] -= change
         if np.abs(change).max() <= 1e-12 * (1 + np.abs(arguments[:n]).max()):
             return True
@@ -96,9 +96,7 @@ def variational(
 ) -> bool:
     """One midpoint step in place: π[k] and π[k+1] as functions of q[k+1], q[k] and p, inverted."""
     d, n = len(x1), len(x) // 2
-    arguments = np.empty(2 * n + len(p) + 1)
-    arguments[:n] = arguments[n : 2 * n] = x[:n]
-    arguments[2 * n : -1], arguments[-1] = p, h
+    arguments = np.concatenate((x[:n], x[:n], p, np.array([h])))
     if not converged(newton, arguments, x[n:].copy()):
         return False
     flat = evaluate(step, arguments)
@@ -118,16 +116,16 @@ def differentiated(flat: Array, x1: Array, x2: Array) -> None:
     d, m = x1.shape
     n, a = m // 2, m + d
     slope = flat[m : m + m * a].reshape(m, a)
-    inverse = np.linalg.inv(slope[:n, :n].copy())
+    J = np.ascontiguousarray(slope[:n, :n])
     inner1, inner2 = np.zeros((d, a)), np.zeros((d, d, a))
     inner1[:, n:m], inner2[:, :, n:m] = x1[:, :n], x2[:, :, :n]
     inner1[:, m:] = np.eye(d)
     held = inner1 @ slope.T  # what is known, with q[k+1] held
-    inner1[:, :n] = (x1[:, n:] - held[:, :n]) @ inverse.T
+    inner1[:, :n] = np.linalg.solve(J, (x1[:, n:] - held[:, :n]).T).T
     first, second = chained(flat, m, inner1, inner2)
     right = (x2[:, :, n:] - second[:, :, :n]).reshape(d * d, n)
-    bent = right @ inverse.T
-    pushed = bent @ slope[n:, :n].copy().T
+    bent = np.ascontiguousarray(np.linalg.solve(J, right.T).T)
+    pushed = bent @ np.ascontiguousarray(slope[n:, :n]).T
     x1[:, :n], x1[:, n:] = inner1[:, :n], first[:, n:]
     x2[:, :, :n] = bent.reshape(d, d, n)
     x2[:, :, n:] = second[:, :, n:] + pushed.reshape(d, d, n)
@@ -162,7 +160,7 @@ def march(
     """
     d, m = out1.shape[2:]
     inner1, inner2 = np.zeros((d, 2 * n + d)), np.zeros((d, d, 2 * n + d))
-    inner1[:, 2 * n :], seen = np.eye(d), np.empty(2 * n + inputs.shape[1])
+    inner1[:, 2 * n :] = np.eye(d)
     for s in range(len(inputs)):
         flat = evaluate(initial, inputs[s])
         x, x1, x2 = flat[: 2 * n].copy(), np.zeros((d, 2 * n)), np.zeros((d, d, 2 * n))
@@ -172,8 +170,7 @@ def march(
             for h in steps[: len(steps) if t else 0]:
                 if not variational(newton, step, inputs[s], h, x, x1, x2):
                     return False
-            seen[: 2 * n], seen[2 * n :] = x, inputs[s]
-            flat = evaluate(observe, seen)
+            flat = evaluate(observe, np.concatenate((x, inputs[s])))
             out[s, t] = flat[:m]
             if d:
                 inner1[:, : 2 * n], inner2[:, :, : 2 * n] = x1, x2
