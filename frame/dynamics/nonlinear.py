@@ -38,6 +38,7 @@ class LagrangianFlow(Flow):
         duration: Length of the simulation, in s.
         step: Step, in s.
         scheme: One of `SCHEMES`.
+        observe: Names of some outputs; all when empty.
 
     Raises:
         ValueError: A name is unknown, or the duration is no multiple of the step.
@@ -48,10 +49,12 @@ class LagrangianFlow(Flow):
     duration: float
     step: float
     scheme: str = "midpoint"
+    observe: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for kind, names, known in (
             ("uncertain parameter", self.names, self.system.parameters),
+            ("output", self.observe, self.system.outputs),
             ("integrator", (self.scheme,), SCHEMES),
         ):
             for name in names:
@@ -61,7 +64,7 @@ class LagrangianFlow(Flow):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
-        return self.system.outputs
+        return self.observe or self.system.outputs
 
     @property
     def method(self) -> str:
@@ -135,17 +138,39 @@ class LagrangianFlow(Flow):
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         from alphacut.frame.dynamics.lagrangian_march import march  # Numba takes time to import
 
-        d = len(self.names) if derivatives else 0
-        tapes = (self._newton, *(self._deep if d else self._plain))
-        rest = [x for name, x in self.system.parameters.items() if name not in self.names]
-        inputs = np.hstack([points, np.tile(rest, (len(points), 1))]).copy("C")
+        d, size = len(self.names) if derivatives else 0, 2 * self.system.coordinates
+        step, observation, initial = self._deep if d else self._plain
+        inputs = self._inputs(points)
+        state, first, second = self._start(initial, inputs, d)
         lengths = np.array(TRIPLE_JUMP if self.scheme == "composition4" else (1.0,)) * self.step
         nodes = (len(points), len(self.time))
         out = [np.empty((*nodes, *(d,) * order, len(self.outputs))) for order in range(3)]
-        if not march(self.system.coordinates, *tapes, inputs, lengths, *out):
+        done = march(
+            *(self._newton, step, observation, inputs, lengths),
+            *(state.reshape(-1, size), first, second, *out),
+        )
+        if not done:
             what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
         return Jet(out[0], np.moveaxis(out[1], 2, 0), np.moveaxis(out[2], (2, 3), (0, 1)))
+
+    def _inputs(self, points: Array) -> Array:
+        """Inputs and other parameters, shape (S, K)."""
+        rest = [x for name, x in self.system.parameters.items() if name not in self.names]
+        return np.ascontiguousarray(np.hstack([points, np.tile(rest, (len(points), 1))]), float)
+
+    def _start(self, initial: Tape, inputs: Array, d: int) -> tuple[Array, Array, Array]:
+        """Initial states (S, 2n) with derivatives by d inputs, (S, d, 2n) and (S, d, d, 2n)."""
+        from alphacut.frame.dynamics.lagrangian_march import evaluated
+
+        m = 2 * self.system.coordinates
+        flat = np.empty((len(inputs), m + m * d + m * d * d))
+        evaluated(initial, inputs, flat)
+        first = flat[:, m : m + m * d].reshape(len(inputs), m, d)
+        second = flat[:, m + m * d :].reshape(len(inputs), m, d, d)
+        parts = (flat[:, :m], np.moveaxis(first, 1, 2), np.moveaxis(second, 1, 3))
+        state, slope, bent = map(np.ascontiguousarray, parts)
+        return state, slope, bent
 
 
 def flow_of(
