@@ -26,9 +26,8 @@ def voigt(fraction: Array, matrix: Array, inclusion: Array) -> Array:
 
 def reuss(fraction: Array, matrix: Array, inclusion: Array) -> Array:
     """Stiffness at uniform stress, as `voigt`."""
-    return np.asarray(
-        np.linalg.inv(voigt(fraction, np.linalg.inv(matrix), np.linalg.inv(inclusion)))
-    )
+    soft = (np.asarray(np.linalg.inv(one), float) for one in (matrix, inclusion))
+    return np.asarray(np.linalg.inv(voigt(fraction, *soft)), float)
 
 
 def bulk_modulus(stiffness: Array) -> Array:

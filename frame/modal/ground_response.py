@@ -151,9 +151,9 @@ def _moments(
     series = (rule.tau[:, None] / (length * h)) ** powers / factorial
     pushed = rule.weight @ (np.exp(middle * rule.tau)[:, None] * series)
     windows = -(-steps // length)
-    out = np.zeros((windows * length, order), complex)
-    out[:steps] = pushed
-    out = out.reshape(windows, length, order)
+    padded = np.zeros((windows * length, order), complex)
+    padded[:steps] = pushed
+    out = padded.reshape(windows, length, order)
     advance = np.exp(middle * h) / factorial / length ** powers.astype(float)
     product = np.zeros((order, order), complex)  # truncated, with `advance`
     for i in range(order):

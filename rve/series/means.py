@@ -83,21 +83,22 @@ def settled_means(
     """
     require_continuous(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
-    make_rule = _kept_rule if isinstance(radius_map.distribution, Hashable) else gauss_rule
+    law = radius_map.distribution
+    make_rule: Callable[..., ThetaRule] = _kept_rule if isinstance(law, Hashable) else gauss_rule
     known: dict[int, _Averages] = {}
     settled: dict[int, Mean] = {}
     while True:
         counts = [count, _finer(count), _finer(_finer(count))]
         for n in counts:
             if n not in known:
-                rule = make_rule(radius_map.distribution, points=n)
+                rule = make_rule(law, points=n)
                 known[n] = _Averages(rule, cells(radius_map(rule.nodes)))
         own, finer, finest = (known[n] for n in counts)
         left = _SAFETY * error_by_more_terms(own.moduli, finer.moduli, finest.moduli) + _NOISE
-        for k, error in enumerate(left):
-            if k not in settled and (points or error.max() <= accuracy):
+        for k in range(len(left)):
+            if k not in settled and (points or left[k].max() <= accuracy):
                 # each inclusion by itself, whatever its companions need
-                settled[k] = _mean(own, finest, error, k)
+                settled[k] = _mean(own, finest, left[k], k)
         if len(settled) == len(left):
             return [settled[k] for k in range(len(left))]
         if counts[-1] >= _MOST_POINTS:

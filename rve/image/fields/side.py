@@ -67,7 +67,7 @@ def solve_side(
     trace, deviator = (np.asarray(np.kron(one, parts)) for one in whole)
     begin = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
     fields, iterations = _fields(element, trace, deviator, solver, begin)
-    fields = np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1)
+    fields = np.asarray(np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1), float)
     weights = list(zip(element.parts, (trace, deviator), strict=True))
     result = energies(element, fields, element.mean_modes(UNIT_LOADS), weights)
     return SideSolution(fields, result, iterations)
