@@ -19,7 +19,7 @@ from pydantic import BaseModel
 
 # 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
 FORMAT = 2
-PACKAGES = ("fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh")
+PACKAGES: tuple[str, ...] = ("fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh")
 PACKAGES += ("numpy", "scipy", "xarray")
 NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own
 
