@@ -70,9 +70,9 @@ class Boxes:
             own = {"lower": self.lower.copy(), "upper": self.upper.copy()}
             own[ends][:, axis] = clipped(own[ends][:, axis], self.centre[axis])
             kept = own["lower"][:, axis] <= own["upper"][:, axis]
-            own = {name: x[kept] for name, x in own.items()}
-            modal = np.clip(self.modal, own["lower"][0], own["upper"][0])
-            parts.append(replace(self, alpha=self.alpha[kept], modal=modal, numbers={}, **own))
+            lower, upper = (own[name][kept] for name in ("lower", "upper"))
+            modal, held = np.clip(self.modal, lower[0], upper[0]), self.alpha[kept]
+            parts.append(Boxes(self.names, held, lower, upper, modal))
         return parts
 
     def distinct(self) -> tuple[Boxes, Array]:

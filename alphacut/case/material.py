@@ -67,7 +67,8 @@ class RadiusMap(Section):
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """The map at crisp values of its parameters."""
-        return HermiteMap(*(values[name] for name in self.numbers), self.law)
+        a1, a2, a3, a4 = (values[name] for name in self.numbers)
+        return HermiteMap(a1, a2, a3, a4, self.law)
 
     @model_validator(mode="after")
     def _inside(self) -> Self:

@@ -113,6 +113,8 @@ class Microstructure(Section):
             spheres: Whether packed particles are spheres.
         """
         source = self.circles or self.image
-        of = self.packing.source(spheres) if self.packing else source and Measured(source.source)
+        of: Simulated | Measured | None = Measured(source.source) if source else None
+        if self.packing:
+            of = self.packing.source(spheres)
         assert of is not None
         return Study(of, self.limits, seed=self.seed, sampling=not spheres)

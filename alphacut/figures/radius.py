@@ -20,12 +20,12 @@ def maps(section: RadiusMap, alpha: float) -> list[HermiteMap]:
     """The radius maps at the corners of an α-cut."""
     numbers = section.numbers
     corners = itertools.product(*(sorted(set(one.cut(alpha))) for one in numbers.values()))
-    return [HermiteMap(*corner, section.law) for corner in corners]
+    return [section.at(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
 def modal_map(section: RadiusMap) -> HermiteMap:
     """The radius map at the modal values."""
-    return HermiteMap(*(one.modal for one in section.numbers.values()), section.law)
+    return section.at({name: one.modal for name, one in section.numbers.items()})
 
 
 def distribution(radius: HermiteMap, at: Array) -> Array:

@@ -214,8 +214,8 @@ def _tables(rate: Array, C: Array, d: int) -> Array:
     rate = rate[..., None, :, None]
     out = np.zeros((*C.shape[1:3], 3, *C.shape[3:], len(C)), complex)  # (B, P, 3, n, m, q)
     out[:, :, 0] = np.moveaxis(C, 0, -1)
-    for i in range(d):
-        out[:, :, 1, ..., 1 + i] = C[0] * rate[1 + i]
+    for k in range(1, 1 + d):
+        out[:, :, 1, ..., k] = C[0] * rate[k]
     for a, (i, j) in enumerate(zip(*np.triu_indices(d), strict=True), 1 + d):
         x, y = rate[1 + i], rate[1 + j]
         out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]

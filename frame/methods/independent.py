@@ -20,13 +20,14 @@ trajectories part."""
 def beyond(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
     """How far a sample of each level leaves the bounds (A, T, m, 2), shape (A, m), and its size."""
     missed, count = np.zeros((len(bounds), len(flow.outputs))), 0
-    for level, bound in enumerate(bounds):
+    for level in range(len(bounds)):
         lower, upper = flow.boxes.unit(level)
         points = (lower + upper) / 2 + (upper - lower) / 2 * sample(len(lower), level)
         count += len(points)
         for chunk in np.array_split(points, -(-len(points) // 32)):
             values = flow.values(chunk)
-            off = np.maximum(values.max(0) - bound[..., 1], -values.min(0) - bound[..., 0])
+            above, below = bounds[level, ..., 1], bounds[level, ..., 0]
+            off = np.maximum(values.max(0) - above, -values.min(0) - below)
             missed[level] = np.maximum(missed[level], off.max(0))
     return missed, count
 
