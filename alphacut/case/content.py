@@ -122,8 +122,8 @@ class Content(Section):
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
         names = [study.name for study in self.study]
-        for key, name in enumerate(names):
-            require(name not in names[:key], f"study[{key}].name", name, "a name of its own")
+        for place, name in enumerate(names):
+            require(name not in names[:place], f"study[{place}].name", name, "a name of its own")
         for section in self.questions.values():
             section.check(structure)
         if self.identify is not None:

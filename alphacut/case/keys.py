@@ -24,7 +24,8 @@ def every_key() -> dict[str, FieldInfo]:
 @cache
 def sections() -> dict[str, Models]:
     """The models of every section by its name; that of an image and of a round cell have one."""
-    return {"": [CONTENT]} | {name: models for name, _, models in _walk("", CONTENT) if models}
+    every: dict[str, Models] = {"": [CONTENT]}
+    return every | {name: models for name, _, models in _walk("", CONTENT) if models}
 
 
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, Models]]:

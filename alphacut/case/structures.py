@@ -154,13 +154,13 @@ class Frame(Section):
 
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
         """Every number by the name of its parameter; some are none of this frame's."""
-        numbers = {
+        numbers: dict[str, FuzzyNumber] = {
             "E": modulus or STAND_IN,
             "rayleigh_mass": self.rayleigh_mass,
             "rayleigh_stiffness": self.rayleigh_stiffness,
         }
         for symbol, key in {"I": "second_moment", "zeta": "damping_ratio"}.items():
-            values = getattr(self, key) or ()
+            values: tuple[FuzzyNumber, ...] = getattr(self, key) or ()
             numbers |= {symbol: values[0]} if len(values) == 1 else {}
         for key, symbol in SYMBOLS.items():
             each = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)

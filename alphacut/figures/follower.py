@@ -49,8 +49,8 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     places = np.argwhere(new >= 0)
     start = places[0, 0]
     first = new[start][new[start] >= 0]
-    late = [at for at in places.tolist() if at[0] > 0.5 * len(time) and guess[*at] > 0]
-    later = tuple(late[0] if late else places[-1])
+    late = places[(places[:, 0] > 0.5 * len(time)) & (guess[*places.T] > 0)]
+    node, side = late[0] if len(late) else places[-1]
 
     def base(panel: Axes, shown: Iterable[int], node: int | None, last: int) -> None:
         """Stored graphs in grey, the newest `last` in orange, and the node under treatment."""
@@ -65,8 +65,8 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     base(panels[0], [0], start, 0)
     panels[0].plot(time, graphs[0], color=BLUE, lw=1.3)
     base(panels[1], [0, *first], start, len(first))
-    base(panels[2], range(new[later] + 1), later[0], 1)
-    panels[2].plot(time, graphs[guess[later]], color=BLUE, lw=1.3)
+    base(panels[2], range(new[node, side] + 1), node, 1)
+    panels[2].plot(time, graphs[guess[node, side]], color=BLUE, lw=1.3)
     base(panels[3], range(len(graphs)), None, 0)
     nodes = np.arange(len(time))[:, None]
     seen = np.stack([graphs[guess, nodes], graphs[np.where(new < 0, guess, new), nodes]])

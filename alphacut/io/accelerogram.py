@@ -64,7 +64,8 @@ def _peer(path: Path) -> Accelerogram:
     try:
         count, step, text = match.groups() if match else ("", "", "")
         values = np.array(text.split(), float)
-        require(match and len(values) == int(count), path.name, f"{len(values)} numbers", allowed)
+        whole = match is not None and len(values) == int(count)
+        require(whole, path.name, f"{len(values)} numbers", allowed)
         return Accelerogram(float(step), values * float(factor("g", "m/s^2")))
     except ValueError as error:
         raise RefusedError(path.name, "no record", allowed, str(error)) from None

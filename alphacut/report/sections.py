@@ -13,6 +13,8 @@ from alphacut.io.files import Document
 from alphacut.questions.table import QUESTIONS
 from alphacut.report.results import (
     ANSWERS,
+    Row,
+    Table,
     answers,
     drivers,
     figures,
@@ -82,7 +84,7 @@ class Page:
             yield ("plot",)
         yield from _texts(self._words(name, part))
         if table in self.tables:
-            shown = ("table", *self.tables[table])
+            shown: Piece = ("table", *self.tables[table])
             answer = name in ("response", "update", "shares", *(one.key for one in QUESTIONS))
             yield shown if answer else ("folded", "As a table", [shown])
         if name == "modulus":
@@ -143,9 +145,9 @@ def _texts(texts: Iterator[str] | list[str]) -> Iterator[Piece]:
     return (("text", text) for text in texts)
 
 
-def _errors(part: Document) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _errors(part: Document) -> Table:
     """Errors of E by source, largest violations of properties, and references."""
-    rows = [(f"error: {in_words(x)}", f"{y:.2g} of E") for x, y in part["error"].items()]
+    rows: list[Row] = [(f"error: {in_words(x)}", f"{y:.2g} of E") for x, y in part["error"].items()]
     rows += [(f"check: {in_words(x)}", f"{y:.2g}") for x, y in part["checks"].items()]
     known = {
         "hashin_shtrikman_E_GPa": "Hashin–Shtrikman bounds, isotropic composites",

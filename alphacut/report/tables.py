@@ -89,7 +89,7 @@ def ends_of(of: Document, level: int, nature: Nature) -> Row:
 def radius_map(part: Document) -> Table:
     """Parameters of the radius map."""
     each = {name: part[name] for name in ("a1", "a2", "a3", "a4")}
-    rows = [
+    rows: list[Row] = [
         (x, " … ".join(map(_number, y if isinstance(y, list) else [y]))) for x, y in each.items()
     ]
     return ("parameter of the radius map", "least … modal … greatest"), rows
@@ -102,7 +102,7 @@ def _number(value: float) -> str:
 def modulus(part: Document) -> Table:
     """α-cuts of E and ν, with the error of E."""
     error, nature = sum(part["error"].values()), nature_of(part["nature"])
-    rows = [
+    rows: list[Row] = [
         (
             f"{alpha:g}",
             *ends_of(part["E_GPa"], level, nature),
@@ -118,7 +118,7 @@ def modulus(part: Document) -> Table:
 def image(part: Document) -> Table:
     """Proved α-cuts of E of an image."""
     cuts, nature = part["cuts"], nature_of(part["nature"])
-    rows = [
+    rows: list[Row] = [
         (f"{alpha:g}", *ends_of(cuts["E_GPa"], level, nature), str(nature))
         for level, alpha in enumerate(cuts["alpha"])
     ]
@@ -132,7 +132,7 @@ def response(part: Document) -> Table:
     if "exceedance" in part:
         over = part["exceedance"]
         each[f"probability above {over['limit_GPa']:g} GPa"] = over
-    rows = [
+    rows: list[Row] = [
         (name, between(ends["lower"][0], ends["upper"][0], Nature.ESTIMATED))
         for name, ends in each.items()
     ]
@@ -159,7 +159,7 @@ def _wide(ends: Sequence[float], unit: str) -> str:
 
 def peaks(studies: Document) -> Table:
     """Peaks of all studies, an output and a level each, in SI."""
-    rows = []
+    rows: list[Row] = []
     for name, study in studies.items():
         nature = nature_of(study["nature"])
         for output, peak in study["peak"].items():
@@ -175,7 +175,7 @@ def peaks(studies: Document) -> Table:
 def shares(part: Document) -> Table:
     """Shares of the inputs in the width of each result, on the lowest level."""
     inputs = dict.fromkeys(name for of in part.values() for name in of)
-    rows = [
+    rows: list[Row] = [
         (name, *(f"{of[name]:.3f}" if name in of else "" for of in part.values()))
         for name in inputs
     ]

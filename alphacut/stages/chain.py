@@ -130,8 +130,8 @@ class Chain:
         assert content.envelope is not None
         (task,) = envelope.tasks(content.envelope, ())
         if content.identify is not None:
-            section = content.identify
-            results.learned, structure = identify.learned(section, structure, task.section.alpha)
+            measured, alpha = content.identify, task.section.alpha
+            results.learned, structure = identify.learned(measured, structure, alpha)
         self.motion(results, structure)
         for key, section in content.questions.items():
             inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section]

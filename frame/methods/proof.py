@@ -100,9 +100,14 @@ class Proof:
         parts: list[tuple[Boxes, Certificate]] = []
         for done, (boxes, model, error, gap) in enumerate(modelled):
             tick = share(progress, done / len(modelled), (done + 1) / len(modelled))
-            how = {"workers": self.workers or os.cpu_count() or 1, "budget": self.boxes}
             proof = certify(
-                model, gap=gap, model_error=error, scale=flow.scale, **how, progress=tick
+                model,
+                gap=gap,
+                model_error=error,
+                scale=flow.scale,
+                workers=self.workers or os.cpu_count() or 1,
+                budget=self.boxes,
+                progress=tick,
             )
             parts.append((boxes, proof))
         inner, outer, at = _united(flow, parts)

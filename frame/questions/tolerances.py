@@ -93,14 +93,21 @@ def tolerances(
     real("most", most, positive=True)
     real("precision", precision, positive=True, most=1)
     require_limits(limits, model.outputs)
-    motion = {"duration": duration, "step": step}
-    way = Auto(error, peaks=True)
-    bounds = partial(envelope, model, **motion, alpha=[0.0], method=way, relative=True)
+    bounds = partial(
+        envelope,
+        model,
+        duration=duration,
+        step=step,
+        alpha=[0.0],
+        method=Auto(error, peaks=True),
+        relative=True,
+        progress=False,
+    )
     tried: dict[float, _Step] = {}
 
     def step_at(scale: float) -> _Step:
         numbers = scaled(inputs, scale)
-        tried[scale] = _judged(peaks(bounds(numbers, progress=False)), limits)
+        tried[scale] = _judged(peaks(bounds(numbers)), limits)
         if progress:
             progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
@@ -113,7 +120,7 @@ def tolerances(
     if clear is not None and passed < np.inf:
         clear = _halved(lambda scale: not step_at(scale).passed, clear, passed, near)
         passed = min(scale for scale, one in tried.items() if one.passed)
-    supports = {name: tuple(number.support) for name, number in scaled(inputs, low).items()}
+    supports = {name: number.support for name, number in scaled(inputs, low).items()}
     best = tried[low]
     return Tolerances(low if best.kept else None, clear, passed, supports, best.nature, len(tried))
 
