@@ -9,7 +9,6 @@ from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate
-from alphacut.fuzzy.random_response import RandomResponse
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
@@ -27,7 +26,7 @@ from alphacut.fuzzy.width_contributions import width_shares
 __all__ = [
     "Automatic", "Bounds", "Crisp", "Ellipsoidal", "Extended", "FailedError", "FuzzyNumber",
     "General", "Interval", "IntervalQuasiMonteCarlo", "Known", "Linear", "Nature",
-    "Optimisation", "PiecewiseLinear", "RandomInput", "RandomResponse", "Reduced", "RefusedError",
+    "Optimisation", "PiecewiseLinear", "RandomInput", "Reduced", "RefusedError",
     "Signed", "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels",
     "propagate", "width_shares",
 ]  # fmt: skip

@@ -12,7 +12,6 @@ from alphacut.case.material import (
     Mesh,
     ModulusSection,
     RadiusMap,
-    Response,
     RoundCell,
 )
 from alphacut.case.motion import Envelope, Identify, Study
@@ -40,7 +39,6 @@ class Content(Section):
     cell: Cell | None = None
     mesh: Mesh = Mesh()
     modulus: ModulusSection = ModulusSection()
-    response: Response | None = None
     frame: Frame | None = None
     pendulum: Pendulum | None = None
     study: tuple[Study, ...] = ()

@@ -25,8 +25,6 @@ from alphacut.case.types import (
     Radius,
     Ratio,
     Section,
-    Share,
-    Stress,
     after,
     rising,
 )
@@ -270,15 +268,3 @@ class ModulusSection(Section):
         default="isotropic",
         description="E of a plane: isotropic, of the average over all directions; axes, of eq. 16",
     )
-
-
-class Response(Section):
-    """Random stress of the cell: its p-box, quantiles, and the probability of a limit."""
-
-    quantity: Literal["s11", "s12"] = Field(
-        default="s11", description="stress 11 under ε11 = ε22 = 0.01, or 12 under ε12 = 0.01"
-    )
-    quantiles: Annotated[tuple[Share, ...], after(rising)] = Field(
-        default=(0.05, 0.5, 0.95), description="probabilities of the quantiles"
-    )
-    limit: Stress | None = Field(default=None, description="stress that may be exceeded")

@@ -219,7 +219,6 @@ Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]
 Length = Annotated[float, Quantity("m", above=0)]
-Stress = Annotated[float, Quantity("Pa", above=0)]
 Share = Annotated[float, Quantity(above=0, below=1)]
 Level = Annotated[float, Quantity(least=0, most=1)]
 Levels = Annotated[tuple[Level, ...], after(rising)]

@@ -58,8 +58,6 @@ def _material(results: Results) -> Iterator[Drawing]:
             yield "fig19-membership", partial(modulus.membership, data)
     if results.image is not None:
         yield "image", partial(modulus.image, results.image)
-    if results.response is not None:
-        yield "response", partial(modulus.response, results.response)
 
 
 def _structure(results: Results) -> Iterator[Drawing]:

@@ -1,4 +1,4 @@
-"""Fuzzy modulus and stress: Figs. 16 to 19, p-boxes, and the proved modulus of an image."""
+"""Fuzzy modulus and stress: Figs. 16 to 19, and the proved modulus of an image."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from alphacut.stages.cell import GPA
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 AVERAGE = {
@@ -105,51 +104,6 @@ def membership(dataset: xarray.Dataset) -> Figure:
     axes.annotate("core", ((left[-1] + right[-1]) / 2, 1.0), **beside)
     look.membership_axes(axes, "fuzzy parameter, here E (GPa)")
     return drawn
-
-
-MARKS = (look.BLUE, look.ORANGE, look.PURPLE, look.INK)
-NAMES = {"s11": "σ$_{11}$(ε$^{(1)}$)", "s12": "σ$_{12}$(ε$^{(2)}$)"}
-
-
-def response(dataset: xarray.Dataset) -> Figure:
-    """p-boxes above, membership functions of the quantiles below."""
-    import matplotlib.pyplot as plt
-
-    drawn, (above, below) = plt.subplots(2, 1, figsize=(look.WIDTH, 1.7 * look.HEIGHT))
-    name = NAMES[str(dataset.attrs["quantity"])]
-    p_boxes(above, dataset)
-    above.set_xlabel(f"homogenised {name} (GPa)")
-    quantiles(below, dataset)
-    look.membership_axes(below, f"quantile of {name} (GPa)")
-    small: look.Look = {"title": "probability", "fontsize": 8, "title_fontsize": 8}
-    below.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), **small)
-    return drawn
-
-
-def p_boxes(axes: Axes, dataset: xarray.Dataset) -> None:
-    """The distribution function between its bounds, each level inside the one below."""
-    alpha, stress = dataset["alpha"].values, dataset["stress"].values / GPA
-    cdf = dataset["cdf"].transpose("alpha", "bound", "stress").values
-    for (lower, upper), shade in zip(cdf[:-1], look.colours(alpha), strict=False):
-        axes.fill_between(stress, lower, upper, color=shade, lw=0)
-    axes.plot(stress, cdf[-1].T, color=look.INK, lw=1)
-    if "exceedance" in dataset:
-        limit = dataset["exceedance"].attrs["limit"] / GPA
-        axes.axvline(limit, color=look.ORANGE, lw=1.2, ls="--")
-        look.title(axes, f"limit {limit:g} GPa (dashed)")
-    axes.set_ylabel("distribution function")
-    axes.set_ylim(0, 1)
-    look.alpha_legend(axes, alpha)
-
-
-def quantiles(axes: Axes, dataset: xarray.Dataset) -> None:
-    """One membership function for each probability."""
-    alpha = dataset["alpha"].values
-    for number, probability in enumerate(dataset["probability"].values):
-        ends = dataset["quantile"].sel(probability=probability).transpose("bound", "alpha")
-        line: look.Look = {"color": MARKS[number % len(MARKS)], "lw": 1.3, "marker": "o", "ms": 3}
-        line["label"] = f"{probability:g}"
-        axes.plot(look.outline(*ends.values / GPA), look.outline(alpha, alpha), **line)
 
 
 def image(dataset: xarray.Dataset) -> Figure:

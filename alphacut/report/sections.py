@@ -41,7 +41,6 @@ PARTS = {
     "microstructure": ("Microstructure", "radius_map", ("pbox", "p-box")),
     "modulus": ("How stiff is the material?", "modulus", ("modulus",)),
     "image": ("How stiff is the image?", "image", ("image",)),
-    "response": ("How much does the stress scatter?", "response", ("response",)),
     "update": ("What do the measured modes teach?", "update", ("update-inputs",)),
     "envelopes": ("How does the structure move?", "peaks", ()),
     **{one.key: (one.title, one.key, (one.key,)) for one in QUESTIONS},
@@ -85,7 +84,7 @@ class Page:
         yield from _texts(self._words(name, part))
         if table in self.tables:
             shown: Piece = ("table", *self.tables[table])
-            answer = name in ("response", "update", "shares", *(one.key for one in QUESTIONS))
+            answer = name in ("update", "shares", *(one.key for one in QUESTIONS))
             yield shown if answer else ("folded", "As a table", [shown])
         if name == "modulus":
             yield "folded", "Errors, checks and references", [("table", *_errors(part))]
@@ -102,8 +101,6 @@ class Page:
             yield "The bounds are those of the image as it was segmented, in plane strain."
             shares = (f"{x} {share:.1%}" for x, share in part["fractions"].items())
             yield f"Of the area: {', '.join(shares)}. {width_text(part)}."
-        elif name == "response":
-            yield f"Stress {part['quantity']}, random with θ at every fuzzy sample."
         elif name == "update" and "refuted" in part:
             yield str(part["refuted"])
         elif name == "envelopes":

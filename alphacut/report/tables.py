@@ -12,7 +12,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.netcdf import read_dataset
-from alphacut.io.units import between, ends, engineering
+from alphacut.io.units import ends, engineering
 from alphacut.questions.table import QUESTIONS
 from alphacut.report.results import (
     Row,
@@ -125,20 +125,6 @@ def image(part: Document) -> Table:
     return ("α", "E from [GPa]", "E to [GPa]", "nature"), rows
 
 
-def response(part: Document) -> Table:
-    """Mean, quantiles and exceedance of the stress of the cell, at the lowest level."""
-    each = {"mean [GPa]": part["mean_GPa"]}
-    each |= {f"quantile {one['probability']:g} [GPa]": one["GPa"] for one in part["quantiles"]}
-    if "exceedance" in part:
-        over = part["exceedance"]
-        each[f"probability above {over['limit_GPa']:g} GPa"] = over
-    rows: list[Row] = [
-        (name, between(ends["lower"][0], ends["upper"][0], Nature.ESTIMATED))
-        for name, ends in each.items()
-    ]
-    return ("quantity", f"at α = {part['alpha'][0]:g}"), rows
-
-
 def update(part: Document) -> Table:
     """Inputs before and after measured modes; then the modes that were predicted."""
     rows: list[Row] = []
@@ -186,7 +172,6 @@ MAKERS = {
     "radius_map": ("microstructure", radius_map),
     "modulus": ("modulus", modulus),
     "image": ("image", image),
-    "response": ("response", response),
     "update": ("update", update),
     "peaks": ("envelopes", peaks),
     "shares": ("shares", shares),

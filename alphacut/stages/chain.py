@@ -22,7 +22,6 @@ from alphacut.stages import (
     image,
     microstructure,
     modulus,
-    response,
     shares,
 )
 from alphacut.stages.envelope import EnvelopeTask
@@ -77,9 +76,8 @@ class Chain:
     @property
     def campaign(self) -> Campaign:
         """Samples of a round cell."""
-        content, curves = self.content, self.content.response is not None
-        sections = (*content.round_cell, content.mesh, content.modulus)
-        return Campaign(*sections, self.petsc, curves)
+        content = self.content
+        return Campaign(*content.round_cell, content.mesh, content.modulus, self.petsc)
 
     def material(self, results: Results) -> None:
         """The modulus of the cell, round or an image."""
@@ -92,8 +90,6 @@ class Chain:
         results.modulus = data = self.store.take(modulus.stage(samples))
         cell.require_tolerance(modulus.errors_of(data), section.tolerance)
         results.references = cell.references(*self.content.round_cell)
-        if self.content.response is not None and "modulus" in self.content.stages:
-            results.response = self.store.take(response.stage(self.content.response, samples, data))
 
     def _number(self, results: Results) -> FuzzyNumber | None:
         """The modulus for the structure, in Pa; None for its own."""

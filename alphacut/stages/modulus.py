@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 SHOWN = 61
 """Points over θ of a stored stress curve."""
-OF_CURVES = 1e-9
-"""Relative tolerance on E with which a curve between its nodes is good to 1e-4 or so."""
 BOUNDS = {
     "E": ("Pa", "effective Young's modulus"),
     "nu": ("1", "effective Poisson's ratio"),
@@ -48,8 +46,6 @@ FIBRES = {
     "G_L": ("Pa", "shear modulus along the fibres"),
 }
 """Constants of cylinders besides; see rve.fibre_constants."""
-CURVES = {"s11": "curve11", "s12": "curve12"}
-"""Variables with the stress over θ of each mean stress."""
 CUT = ("alpha", "bound")
 OUTPUTS = ("E", "nu")
 PLANS: dict[str, Plan] = {
@@ -84,7 +80,7 @@ class CellTask:
         return [self._outputs(result) for result in results]
 
     def _outputs(self, result: Homogenised) -> dict[str, float | Array]:
-        curve, theta = result.curve, theta_of(self.radius)
+        curve = result.curve
         fibres = fibre_constants(result).values if self.cell.fibres else {}
         return {
             "E": result.modulus,
@@ -92,8 +88,7 @@ class CellTask:
             **dict(zip(("s11", "s12"), curve.mean, strict=True)),
             **{name: fibres[name] for name in FIBRES if name in fibres},
             "systems": len(result.iterations),
-            "curve11": between_nodes(curve.theta, curve.s11, theta),
-            "curve12": between_nodes(curve.theta, curve.s12, theta),
+            "curve11": between_nodes(curve.theta, curve.s11, theta_of(self.radius)),
             **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
             **{f"check:{name}": value for name, value in result.checks.items()},
         }
@@ -114,7 +109,6 @@ class Campaign:
         mesh: Resolution of elements.
         modulus: Method, plan, levels.
         petsc: PETSc options.
-        curves: Whether the curve over θ is needed between its nodes.
     """
 
     radius: RadiusMap
@@ -122,7 +116,6 @@ class Campaign:
     mesh: Mesh
     modulus: ModulusSection
     petsc: Mapping[str, str] = field(default_factory=dict)
-    curves: bool = False
 
     @cached_property
     def inputs(self) -> dict[str, FuzzyNumber]:
@@ -134,15 +127,12 @@ class Campaign:
 
     def model(self, *, estimate: bool = False) -> CellModel:
         """The model of the cell; it may declare its errors at an extra cost."""
-        support, modulus = None, self.modulus
+        support = None
         if self.cell.stiffness is None:
             ends = inputs_of(self.radius, self.cell)["inclusion_modulus"].support
             support = (ends.lower, ends.upper)
-        if self.curves:
-            tolerance = min(modulus.tolerance or 1.0, OF_CURVES)
-            modulus = modulus.model_copy(update={"tolerance": tolerance})
         own = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
-        return model_of(self.cell, self.mesh, modulus, **own)
+        return model_of(self.cell, self.mesh, self.modulus, **own)
 
     def task(self, model: CellModel) -> CellTask:
         """The function of the fuzzy inputs."""
@@ -155,7 +145,7 @@ class Campaign:
         """Origin of a sample besides its fuzzy inputs: sections, program."""
         modulus = self.modulus.model_dump(exclude={"plan", "alpha"})
         crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
-        options = [self.mesh.model_dump(), self.cell.particles, dict(self.petsc), self.curves]
+        options = [self.mesh.model_dump(), self.cell.particles, dict(self.petsc)]
         source = [source_digest(("stochastic", "rve")), versions()]
         stiffness = repr(self.cell.stiffness)
         sections = [modulus, options, crisp, repr(self.radius.theta), stiffness]
@@ -244,9 +234,8 @@ def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
         variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
     about_points = {"long_name": "inputs, in SI"}
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
-    for name in CURVES.values():
-        words = {"units": "Pa", "long_name": f"homogenised stress {name[-2:]} over θ"}
-        variables[name] = (("sample", "theta"), samples.values.output(name), words)
+    words = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
+    variables["curve11"] = (("sample", "theta"), samples.values.output("curve11"), words)
     coordinates = {
         "theta": theta_of(campaign.radius),
         "alpha": result.alpha,

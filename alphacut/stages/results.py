@@ -14,7 +14,7 @@ from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of
 from alphacut.io.units import STANDARD_GRAVITY
-from alphacut.stages import envelope, modulus, response, shares
+from alphacut.stages import envelope, modulus, shares
 from alphacut.stages.envelope import EnvelopeTask
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ class Results:
         microstructure: Particles and their map.
         modulus: Fuzzy modulus of a round cell.
         image: Proved modulus of an image.
-        response: Random stress of the cell.
         references: Analytical bounds and estimate of E.
         structure: The structure with its modulus, and with what was learned.
         tasks: The studies.
@@ -44,7 +43,6 @@ class Results:
     microstructure: xarray.Dataset | None = None
     modulus: xarray.Dataset | None = None
     image: xarray.Dataset | None = None
-    response: xarray.Dataset | None = None
     references: Document = field(default_factory=dict)
     structure: Structure | None = None
     tasks: tuple[EnvelopeTask, ...] = ()
@@ -61,7 +59,7 @@ class Results:
     @property
     def datasets(self) -> dict[str, xarray.Dataset]:
         """Every dataset by the name of its file without ending."""
-        names = ("microstructure", "modulus", "image", "response", "shares")
+        names = ("microstructure", "modulus", "image", "shares")
         every = {name: getattr(self, name) for name in names}
         every |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
         return {name: data for name, data in every.items() if data is not None}
@@ -72,7 +70,6 @@ class Results:
             "microstructure": document_of,
             "modulus": modulus.document,
             "image": document_of,
-            "response": response.document,
         }
         numbers = {
             name: make(data)

@@ -72,7 +72,7 @@ def of_cell(campaign: Campaign) -> Shares:
     They are by the series where it has a formula.
     """
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
-    quick = replace(campaign, modulus=modulus, curves=False)
+    quick = replace(campaign, modulus=modulus)
     return width_shares(
         lambda inputs: quick.cuts(inputs, Reduced(), progress=False).select(*OUTPUTS),
         campaign.inputs,
