@@ -9,7 +9,6 @@ from alphacut.case.structure import Structure
 from alphacut.frame.identify import (
     Identified,
     MeasuredMode,
-    Measurement,
     Prediction,
     RefutedError,
     measured_mode,
@@ -39,11 +38,11 @@ def learned(
     rows = {row.mode: row for row in mode_rows(section.measured)}
     some, held = f"some of modes {[*rows]}, not all", section.held_out
     require(set(held) < set(rows), "identify.held_out", ", ".join(map(str, held)), some)
-    used = tuple(_measured(section, row) for mode, row in rows.items() if mode not in held)
+    used = [_measured(section, row) for mode, row in rows.items() if mode not in held]
     prior = structure.inputs(section.learn, "identify.learn")
     assert structure.frame is not None
     try:
-        after = identified(structure.frame, prior, Measurement(used, False), alpha=alpha)
+        after = identified(structure.frame, prior, used, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
     predicted = [_predicted(rows[x.mode], x) for x in after.predictions() if x.mode in held]

@@ -19,7 +19,7 @@ import numpy as np
 
 from alphacut.case.load import load
 from alphacut.frame import StoreyFrame
-from alphacut.frame.identify import Measurement, RefutedError, identify, measured_mode
+from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.stages.identify import learned
@@ -45,9 +45,9 @@ def tall_frame() -> StoreyFrame:
     return StoreyFrame([*WEIGHT / GRAVITY], [1.0] * 18, 1.0, 1.0, columns=[*STIFFNESS / 12])
 
 
-def tall_modes(modes: Sequence[int]) -> Measurement:
+def tall_modes(modes: Sequence[int]) -> list[MeasuredMode]:
     """Some of its measured modes."""
-    found = [
+    return [
         measured_mode(
             mode,
             [FREQUENCIES[mode - 1]],
@@ -57,7 +57,6 @@ def tall_modes(modes: Sequence[int]) -> Measurement:
         )
         for mode in modes
     ]
-    return Measurement(tuple(found))
 
 
 def tall_rows() -> list[dict[str, object]]:
@@ -101,8 +100,7 @@ def laboratory_rows() -> list[dict[str, object]]:
     content = load(ROOT / "cases" / "laboratory-frame.toml").content
     assert content.frame is not None
     assert content.identify is not None
-    result = learned(content.identify, content.frame.structure(), (0.05, 0.25, 0.5, 0.75, 1.0))
-    found = result.document()
+    found, _ = learned(content.identify, content.frame.structure(), (0.05, 0.25, 0.5, 0.75, 1.0))
     return [
         {
             "frame": "laboratory, 4 storeys",

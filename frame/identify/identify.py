@@ -3,8 +3,7 @@
 At each level the cuts of all priors and of all measured quantities leave a set of parameters. Where
 the claims among them hold together with P >= 1 − α, the set holds the true parameters with that
 probability, if the opinions and the model are right. A box encloses the set, proved by linear
-relaxations (`enclosure`). Samples of the set (`Identified.samples`) show how much narrower it may
-be, and predictions (`Identified.predictions`) what its frames vibrate like.
+relaxations (`enclosure`). Predictions (`Identified.predictions`) say what its frames vibrate like.
 """
 
 from __future__ import annotations
@@ -15,17 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
-from alphacut.frame.identify.enclosure import enclosure
-from alphacut.frame.identify.measured import Measurement
+from alphacut.frame.identify.measured import MeasuredMode
 from alphacut.frame.identify.possibility import Agreement, widest
-from alphacut.frame.identify.samples import walk
+from alphacut.frame.identify.relaxation import enclosure
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
-from alphacut.fuzzy.sets.numbers import Cut
 from alphacut.fuzzy.sets.stepwise import outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
@@ -41,17 +38,13 @@ class Prediction:
 
     Args:
         mode: Its number by rising frequency, from 1.
-        alpha: Levels, shape (A,), rising.
         lower: Least frequency at each level, proved, shape (A,), in Hz.
         upper: Greatest frequency.
-        sampled: Frequencies of samples of the lowest level's set, shape (S,), in Hz.
     """
 
     mode: int
-    alpha: Array
     lower: Array
     upper: Array
-    sampled: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,20 +52,19 @@ class Identified:
     """Parameters that agree with measured modes.
 
     Args:
-        agreement: Priors, measurement and their joint possibility.
+        agreement: Priors, measured modes and their joint possibility.
         alpha: Levels, shape (A,), rising.
         lower: Lower ends of boxes proved to hold the sets, shape (A, d), in SI units. Above
             `height` they repeat the last one that is not proved empty.
         upper: Upper ends.
-        best: Parameters that agree best by least squares, shape (d,).
-        height: Possibility of `best`, and the least level whose set is proved empty (1 if none is).
+        height: Possibility of the parameters that agree best by least squares, and the least level
+            whose set is proved empty (1 if none is).
     """
 
     agreement: Agreement
     alpha: Array
     lower: Array
     upper: Array
-    best: Array
     height: tuple[float, float]
 
     @property
@@ -109,54 +101,23 @@ class Identified:
     @property
     def narrowed(self) -> dict[str, float]:
         """Width of each parameter's lowest cut over that of its prior."""
-        level, priors = float(self.alpha[0]), self.agreement.prior
-        widths = [_prior_cut(priors[name], level, self.agreement).width for name in self.names]
-        shares = (self.upper[0] - self.lower[0]) / np.array(widths)
-        return dict(zip(self.names, map(float, shares), strict=True))
+        of, level = self.agreement, float(self.alpha[0])
+        widths = np.array([of.cut(of.prior[name], level).width for name in self.names])
+        return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
 
-    def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
-        """Points of the set at level `alpha[row]`, shape (number, d), about uniform in logarithms.
-
-        Raises:
-            FailedError: The best parameters do not agree to this level.
-        """
-        if self.height[0] < self.alpha[row]:
-            what = f"the best parameters agree to {self.height[0]:.3g}"
-            raise FailedError(what, f"take a level up to that, not {self.alpha[row]:g}")
-        nominal, level = self.agreement.chain.nominal, float(self.alpha[row])
-        logs = walk(
-            lambda x: self.agreement.possibility(nominal * np.exp(x)) >= level,
-            np.log(self.best / nominal),
-            (np.log(self.lower[row] / nominal), np.log(self.upper[row] / nominal)),
-            number,
-            np.random.default_rng(seed),
-        )
-        return np.asarray(nominal * np.exp(logs))
-
-    def predictions(self, number: int = 200, *, seed: int = 0) -> tuple[Prediction, ...]:
-        """Natural frequencies of all modes, measured or not, at each level.
-
-        Args:
-            number: Samples at the lowest level whose frequencies stand beside the proved range.
-            seed: Seed of the samples.
-        """
+    def predictions(self) -> tuple[Prediction, ...]:
+        """Natural frequencies of all modes, measured or not, at each level."""
         chain = self.agreement.chain
         logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
         ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
         hertz = np.sqrt(np.maximum(np.array(ranges), 0.0)) / (2 * np.pi)  # (A, 2, n)
-        drawn: Array = np.full((0, len(chain.mass)), np.nan)
-        if self.height[0] >= self.alpha[0]:
-            drawn = np.sqrt(chain.modes(self.samples(number, seed=seed))[0]) / (2 * np.pi)
-        return tuple(
-            Prediction(k + 1, self.alpha, hertz[:, 0, k], hertz[:, 1, k], drawn[:, k])
-            for k in range(len(chain.mass))
-        )
+        return tuple(Prediction(k + 1, *each) for k, each in enumerate(hertz.transpose(2, 1, 0)))
 
 
 def identify(
     frame: StoreyFrame,
     prior: Mapping[str, FuzzyNumber | float],
-    measured: Measurement,
+    measured: Sequence[MeasuredMode],
     *,
     alpha: Sequence[float] = ALPHA,
 ) -> Identified:
@@ -166,7 +127,7 @@ def identify(
         frame: The frame; damping, motion and outputs do not matter.
         prior: Fuzzy numbers of the parameters, of "E", "I", "c1" … (columns of a storey), "l1" …,
             "m1" …, in SI units.
-        measured: The measured modes.
+        measured: The measured modes, by rising number.
         alpha: Levels, rising within (0, 1].
 
     Raises:
@@ -176,7 +137,7 @@ def identify(
     """
     numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
     _refuse(frame, measured, numbers, alpha)
-    agreement = Agreement(Chain.of(frame, tuple(numbers)), numbers, measured)
+    agreement = Agreement(Chain.of(frame, tuple(numbers)), numbers, tuple(measured))
     levels = np.asarray(alpha, float)
     boxes, empty = _boxes(agreement, levels)
     if not boxes:
@@ -186,17 +147,16 @@ def identify(
             "widen the priors, or check masses and numbers of modes",
         )
     boxes += [boxes[-1]] * (len(levels) - len(boxes))
-    best = agreement.best(*boxes[-1])
-    point = agreement.chain.nominal * np.exp(best)
-    height = float(agreement.possibility(point[None])[0])
+    best = agreement.chain.nominal * np.exp(agreement.best(*boxes[-1]))
+    height = float(agreement.possibility(best[None])[0]), empty
     lower, upper = (np.stack(side) for side in zip(*boxes, strict=True))
     ends = _outward(lower, agreement, -1), _outward(upper, agreement, +1)
-    return Identified(agreement, levels, *ends, point, (height, empty))
+    return Identified(agreement, levels, *ends, height)
 
 
 def _refuse(
     frame: StoreyFrame,
-    measured: Measurement,
+    measured: Sequence[MeasuredMode],
     prior: Mapping[str, FuzzyNumber],
     alpha: Sequence[float],
 ) -> None:
@@ -204,32 +164,32 @@ def _refuse(
     levels, floors = np.asarray(alpha, float), frame.floors
     rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
     least = min(widest(number).lower for number in prior.values())
-    most = max(max(mode.mode, mode.reference, *mode.shape, 1) for mode in measured.modes)
+    numbers = [mode.mode for mode in measured]
+    most = max(
+        (floor for mode in measured for floor in (mode.mode, mode.reference, *mode.shape)),
+        default=0,
+    )
+    ordered = bool(numbers) and sorted(set(numbers)) == numbers
     for key, value, meaningful, allowed in (
         ("alpha", list(alpha), rising and levels[0] > 0 and levels[-1] <= 1, "rising in (0, 1]"),
+        ("modes", numbers, ordered, "one or more, rising"),
         ("modes", most, most <= floors, f"modes and floors from 1 to {floors}"),
         ("parameters", least, least > 0, "positive priors"),
     ):
         require(meaningful, f"identify.{key}", value, allowed)
 
 
-def _prior_cut(number: FuzzyNumber, alpha: float, agreement: Agreement) -> Cut:
-    """Cut of a prior at the joint level α."""
-    return number.cut(agreement.own_level(alpha) if isinstance(number, Claimed) else alpha)
-
-
 def _boxes(agreement: Agreement, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
     """Ends of log parameters by level until none agree, and that level."""
     boxes: list[tuple[Array, Array]] = []
     for level in map(float, levels):
-        cuts = [_prior_cut(x, level, agreement) for x in agreement.prior.values()]
+        cuts = [agreement.cut(x, level) for x in agreement.prior.values()]
         lower, upper = np.log(np.array(cuts).T / agreement.chain.nominal)
         if boxes:
             lower, upper = np.maximum(lower, boxes[-1][0]), np.minimum(upper, boxes[-1][1])
-        modes = [*agreement.measured.cuts(level, agreement.own_level(level))]
         box = None
         if (lower <= upper).all():
-            box = enclosure(agreement.chain, lower, upper, modes)
+            box = enclosure(agreement.chain, lower, upper, agreement.modes(level))
         if box is None:
             return boxes, level
         boxes.append(box)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import chdtri
 
-from alphacut.fuzzy import Crisp, FuzzyNumber, from_data
+from alphacut.fuzzy import FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import from_scatter
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.sets.numbers import Cut
 
 NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
 ROUGH = 0.2  # deviation of the reference over its amplitude above which ratios have no law
@@ -59,6 +60,33 @@ class MeasuredMode:
             f"f{self.mode}": self.frequency,
             **{f"shape{self.mode}_{floor}": number for floor, number in self.shape.items()},
         }
+
+    def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
+        """Ranges of the mode from a cut of each of its quantities."""
+        low, high = cut(self.frequency)
+        shape = {floor: cut(number) for floor, number in self.shape.items()}
+        if self.reference:
+            shape[self.reference] = Cut(1.0, 1.0)
+        square = (2 * np.pi) ** 2
+        return ModeCut(self.mode, square * max(low, 0.0) ** 2, square * high**2, shape)
+
+
+@dataclass(frozen=True)
+class ModeCut:
+    """Ranges of a mode at a level.
+
+    Args:
+        mode: Its number by rising frequency, from 1.
+        low: Least squared angular frequency, in 1/s².
+        high: Greatest.
+        shape: Interval of the amplitude by floor, the reference included; empty where no shape was
+            measured.
+    """
+
+    mode: int
+    low: float
+    high: float
+    shape: Mapping[int, tuple[float, float]]
 
 
 def measured_mode(
@@ -143,59 +171,3 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
         value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
         raise RefusedError(f"{what}: {key} times the mean", value, allowed, "leave it out")
     return from_scatter(float(values.mean()), deviation, count)
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """All measured modes.
-
-    Args:
-        modes: The modes, by rising number.
-        independent: Whether the sources of all claimed quantities are independent; of unknown
-            dependence if not.
-
-    Raises:
-        RefusedError: There is no mode, or one twice.
-    """
-
-    modes: tuple[MeasuredMode, ...]
-    independent: bool = False
-
-    def __post_init__(self) -> None:
-        numbers = [mode.mode for mode in self.modes]
-        if not numbers or sorted(set(numbers)) != numbers:
-            raise RefusedError("modes", numbers, "one or more, rising")
-
-    @property
-    def quantities(self) -> dict[str, FuzzyNumber]:
-        """All measured quantities by name."""
-        return {name: x for mode in self.modes for name, x in mode.quantities.items()}
-
-    def cuts(self, alpha: float, beta: float) -> Iterator[tuple[MeasuredMode, ModeCut]]:
-        """Cuts of each mode: opinions at α, claimed quantities at β, which makes them joint."""
-        for mode in self.modes:
-            taken = {
-                name: x.cut(beta if isinstance(x, Claimed) else alpha)
-                for name, x in mode.quantities.items()
-            }
-            shape = {floor: taken[f"shape{mode.mode}_{floor}"] for floor in mode.shape}
-            if mode.reference:
-                shape[mode.reference] = Crisp(1.0).cut(0.0)
-            low, high = taken[f"f{mode.mode}"]
-            square = (2 * np.pi) ** 2
-            yield mode, ModeCut(square * max(low, 0.0) ** 2, square * high**2, shape)
-
-
-@dataclass(frozen=True)
-class ModeCut:
-    """Ranges of a mode at a level.
-
-    Args:
-        low: Least squared angular frequency, in 1/s².
-        high: Greatest.
-        shape: Interval of the amplitude by floor, the reference included.
-    """
-
-    low: float
-    high: float
-    shape: Mapping[int, tuple[float, float]]

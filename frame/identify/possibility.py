@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from alphacut.frame.identify.chain import Chain
-from alphacut.frame.identify.measured import Measurement
+from alphacut.frame.identify.measured import MeasuredMode, ModeCut
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.sets.claimed import Claimed, Joint
@@ -27,39 +27,42 @@ class Agreement:
     Args:
         chain: The frame.
         prior: Fuzzy number of each parameter of the chain.
-        measured: Measured modes.
+        measured: Measured modes, by rising number.
     """
 
     chain: Chain
     prior: Mapping[str, FuzzyNumber]
-    measured: Measurement
+    measured: tuple[MeasuredMode, ...]
 
     @cached_property
     def numbers(self) -> dict[str, FuzzyNumber]:
         """Parameters first, then the measured quantities."""
-        return {**self.prior, **self.measured.quantities}
+        measured = {name: x for mode in self.measured for name, x in mode.quantities.items()}
+        return {**self.prior, **measured}
 
     @cached_property
     def joint(self) -> Joint | None:
         """Rule by which the claims hold together; None where there is none."""
         names = tuple(name for name, x in self.numbers.items() if isinstance(x, Claimed))
-        means = "parameter of the measured frame"
-        return Joint(names, self.measured.independent, means, named=True) if names else None
+        return Joint(names, False, "parameter of the measured frame", named=True) if names else None
 
     def own_level(self, alpha: float) -> float:
         """Level of each claim at which all hold together at `alpha`."""
-        if self.joint is None:
-            return alpha
-        m = len(self.joint.names)
-        if not self.joint.independent or alpha == 1:
-            return alpha / (1 if self.joint.independent else m)
-        return -float(np.expm1(np.log1p(-alpha) / m))
+        return alpha / len(self.joint.names) if self.joint else alpha
+
+    def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
+        """Cut at the joint level α, of a claim at its own one."""
+        return number.cut(self.own_level(alpha) if isinstance(number, Claimed) else alpha)
+
+    def modes(self, alpha: float) -> list[ModeCut]:
+        """Ranges of the measured modes at the joint level α."""
+        return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
 
     def values(self, points: Array) -> Array:
         """Parameters and measured quantities of points (S, d), shape (S, q)."""
         eigenvalues, vectors = self.chain.modes(points)
         columns = [*points.T]
-        for mode in self.measured.modes:
+        for mode in self.measured:
             k = mode.mode - 1
             columns.append(np.sqrt(eigenvalues[:, k]) / (2 * np.pi))
             one = vectors[:, mode.reference - 1, k]

@@ -4,6 +4,10 @@ A mode with a measured shape r obeys T_z = k_z (r_z − r_(z−1)) and T_z − T
 product is replaced by its four bounding planes (McCormick, Mathematical Programming 10, 1976), each
 exponential of a log parameter by tangents and a secant. A frequency alone gives two rows by the
 Rayleigh quotient of a fixed shape and its distance from the eigenvalue (Kato and Temple).
+
+Any multipliers y give a lower bound of the least cᵀx over A x <= b, l <= x <= u: that of yᵀb +
+(c − Aᵀy)ᵀx over the box alone. The solver's own multipliers make it sharp, and its tolerances do
+not matter (Neumaier and Shcherbina, Mathematical Programming 99, 2004).
 """
 
 from __future__ import annotations
@@ -12,17 +16,71 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.optimize import linprog
+from scipy.sparse import csr_array, hstack
 
 from alphacut.frame.identify.chain import Chain, chain_modes, eigenvalue_ranges
-from alphacut.frame.identify.linear_bounds import LinearProgram
-from alphacut.frame.identify.measured import MeasuredMode, ModeCut
+from alphacut.frame.identify.measured import ModeCut
 from alphacut.frame.structures.storey import chain as chain_matrix
 from alphacut.fuzzy.arrays import Array
 
 Linear = dict[int, float]
 """Coefficients by variable; that of CONSTANT stands alone."""
 CONSTANT = -1
+PASSES = 6
+"""Most passes over all ends."""
+SETTLED = 0.03
+"""Share of the widths that a further pass must take off to be worth another one."""
+ROUND_OFF = 1e-13
+"""Share of the sums' sizes by which bounds are widened for rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearProgram:
+    """A x <= b with l <= x <= u.
+
+    Args:
+        rows: A, shape (r, v), sparse.
+        right: b, shape (r,).
+        lower: l, shape (v,), finite.
+        upper: u, shape (v,), finite.
+    """
+
+    rows: csr_array
+    right: Array
+    lower: Array
+    upper: Array
+
+    def least(self, objective: Array) -> float:
+        """Proved lower bound of cᵀx over the set; infinite where the set is proved empty."""
+        ends = np.column_stack([self.lower, self.upper])
+        result = linprog(objective, A_ub=self.rows, b_ub=self.right, bounds=ends, method="highs")
+        if result.status == 2 and self.empty():
+            return np.inf
+        multipliers = np.zeros(len(self.right))  # which leave the bound over the box
+        if result.status == 0:
+            multipliers = np.minimum(result.ineqlin.marginals, 0.0)
+        return self._proved(objective, multipliers)
+
+    def empty(self) -> bool:
+        """True if it is proved that no point fulfils all rows."""
+        size = self.rows.shape[0]
+        relaxed = LinearProgram(
+            csr_array(hstack([self.rows, csr_array(-np.ones((size, 1)))])),
+            self.right,
+            np.append(self.lower, 0.0),
+            np.append(self.upper, 1e3),
+        )
+        cost = np.append(np.zeros(len(self.lower)), 1.0)
+        return relaxed.least(cost) > 0
+
+    def _proved(self, objective: Array, multipliers: Array) -> float:
+        rest = objective - self.rows.T @ multipliers
+        ends = np.where(rest > 0, rest * self.lower, rest * self.upper)
+        reach = np.maximum(np.abs(self.lower), np.abs(self.upper))
+        size = np.abs(multipliers) @ np.abs(self.right) + np.abs(objective) @ reach
+        size += (abs(self.rows).T @ np.abs(multipliers)) @ reach
+        return float(multipliers @ self.right + ends.sum() - ROUND_OFF * size)
 
 
 @dataclass(eq=False)
@@ -56,11 +114,6 @@ class Rows:
         row = len(self.right)
         self.right.append(limit - expression.get(CONSTANT, 0.0))
         self.entries += [(row, at, a) for at, a in expression.items() if at != CONSTANT]
-
-    def equal(self, one: Linear, other: Linear) -> None:
-        """Require two expressions to be equal."""
-        self.at_most(total(one, other, -1.0))
-        self.at_most(total(other, one, -1.0))
 
     def product(self, x: Linear, y: Linear) -> Linear:
         """Variable that stands for a product, between its four planes."""
@@ -131,11 +184,48 @@ class Relaxation:
         return self.program.least(objective), -self.program.least(-objective)
 
 
+def enclosure(
+    chain: Chain, lower: Array, upper: Array, modes: list[ModeCut]
+) -> tuple[Array, Array] | None:
+    """Smallest box that is proved to hold every parameter that agrees with the measured modes.
+
+    Args:
+        chain: The frame.
+        lower: Lower ends of a box that holds them, of log parameters over nominal values, (d,).
+        upper: Upper ends.
+        modes: Ranges of the measured modes at a level.
+
+    Returns:
+        Its ends; None where no parameters agree.
+    """
+    amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
+    for _ in range(PASSES):
+        held = relaxation(chain, lower, upper, modes, amplitudes)
+        if held is not None and held.shapes:
+            amplitudes |= {key: held.ends(shape) for key, shape in held.shapes.items()}
+            if any(low > high for low, high in amplitudes.values()):
+                return None
+            held = relaxation(chain, lower, upper, modes, amplitudes)
+        if held is None:
+            return None
+        before, ends = upper - lower, np.stack([lower, upper])
+        for at in np.flatnonzero(before > 0):
+            low, high = held.ends(held.parameters[at])
+            ends[:, at] = max(low, lower[at]), min(high, upper[at])
+        lower, upper = ends
+        if (lower > upper).any():
+            return None
+        wide = before > 0
+        if (1 - (upper - lower)[wide] / before[wide]).max(initial=0.0) < SETTLED:
+            break
+    return lower, upper
+
+
 def relaxation(
     chain: Chain,
     lower: Array,
     upper: Array,
-    modes: list[tuple[MeasuredMode, ModeCut]],
+    modes: list[ModeCut],
     amplitudes: Mapping[tuple[int, int], tuple[float, float]],
 ) -> Relaxation | None:
     """The linear program over a box of log parameters (d,); None where it proves it empty.
@@ -144,22 +234,21 @@ def relaxation(
         chain: The frame.
         lower: Lower ends of the log parameters over their nominal values.
         upper: Upper ends.
-        modes: Measured modes and their cuts at a level.
+        modes: Ranges of the measured modes at a level.
         amplitudes: Known ends of amplitudes that were not measured, by mode and floor.
     """
     over = _Chains(chain, lower, upper)
     shapes: dict[tuple[int, int], Linear] = {}
-    for mode, cut in modes:
-        low = max(cut.low, over.least[mode.mode - 1])
-        high = min(cut.high, over.most[mode.mode - 1])
+    for cut in modes:
+        low, high = max(cut.low, over.least[cut.mode - 1]), min(cut.high, over.most[cut.mode - 1])
         if low > high:
             return None
-        over.require_frequency(mode.mode - 1, cut)
-        ends = over.amplitudes(high, cut) if mode.reference else None
+        over.require_frequency(cut)
+        ends = over.amplitudes(high, cut) if cut.shape else None
         if ends is not None:
-            known = {f: amplitudes.get((mode.mode, f), end) for f, end in ends.items()}
+            known = {f: amplitudes.get((cut.mode, f), end) for f, end in ends.items()}
             shape = {f: over.rows.variable(*known[f]) for f in sorted(known)}
-            shapes |= {(mode.mode, f): shape[f] for f in shape if f not in cut.shape}
+            shapes |= {(cut.mode, f): shape[f] for f in shape if f not in cut.shape}
             over.require_balance(shape, over.rows.variable(low / high, 1.0), high)
     return Relaxation(over.rows.program(), tuple(over.logs), shapes)
 
@@ -199,7 +288,9 @@ class _Chains:
         for z in range(n):
             inertia = rows.product(share, rows.product(self.mass[z], shape[z + 1]))
             force = scaled(inertia, eigenvalue * chain.mass[z] / unit)
-            rows.equal(total(shears[z], shears[z + 1], -1.0) if z + 1 < n else shears[z], force)
+            held = total(shears[z], shears[z + 1], -1.0) if z + 1 < n else shears[z]
+            rows.at_most(total(held, force, -1.0))
+            rows.at_most(total(force, held, -1.0))
 
     def amplitudes(self, eigenvalue: float, cut: ModeCut) -> dict[int, tuple[float, float]] | None:
         """Ends of all amplitudes; None where those between measured floors cannot be bounded.
@@ -228,9 +319,9 @@ class _Chains:
             amplitudes |= {int(floor) + 1: (-reach, reach) for floor in floors}
         return amplitudes
 
-    def require_frequency(self, k: int, cut: ModeCut) -> None:
-        """Two rows by the Rayleigh quotient of the shape of mode k at the middle of the box."""
-        chain, low, high = self.chain, self.low, self.high
+    def require_frequency(self, cut: ModeCut) -> None:
+        """Two rows by the Rayleigh quotient of the mode's shape at the middle of the box."""
+        chain, low, high, k = self.chain, self.low, self.high, cut.mode - 1
         below = self.most[k - 1] if k else -np.inf
         above = self.least[k + 1] if k + 1 < len(self.least) else np.inf
         centre, half = (low + high) / 2, (high - low) / 2
