@@ -9,7 +9,7 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 33_041,
+    "lines of the packages": 32_979,
     "files of the packages": 257,
     "places that raise": 362,
 }
