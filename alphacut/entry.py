@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 
-from alphacut.commands.parser import Parser, require_prism, split_petsc
+from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import rank, ranks, say, standard_output
@@ -19,9 +19,11 @@ from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import stoppable, uninterrupted
 
-NAMES = ("run", "check", "microstructure", "cell", "modulus", "envelope", "identify", "report")
-COMMANDS = {name: name for name in NAMES}
-"""Modules of `alphacut.commands` by the names that a user writes."""
+COMMANDS = {
+    **{"run": "run", "check": "check", "microstructure": "stage", "cell": "cell"},
+    **{"modulus": "stage", "envelope": "stage", "identify": "stage", "report": "run"},
+}
+"""Commands by the names that a user writes, each with its file in `alphacut.commands`."""
 STATUSES = """\
 exit status:
   0    done
@@ -46,14 +48,20 @@ def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str
         dest="command", metavar="COMMAND", required=True, parser_class=Parser
     )
     made: dict[str, Parser] = {}
-    for name, module_name in commands.items():
-        module = import_module(f"alphacut.commands.{module_name}")
-        about = f"{module.ABOUT[:1].upper()}{module.ABOUT[1:]}."
+    for name, file in commands.items():
+        command = command_of(name, file)
+        about = f"{command.about[:1].upper()}{command.about[1:]}."
         made[name] = inner.add_parser(
-            name, help=module.ABOUT, description=about, allow_abbrev=False
+            name, help=command.about, description=about, allow_abbrev=False
         )
-        module.arguments(made[name])
+        command.arguments(made[name])
     return top, made
+
+
+def command_of(name: str, file: str) -> Command:
+    """The command of a name, whose file is imported now."""
+    command: Command = import_module(f"alphacut.commands.{file}").COMMANDS[name]
+    return command
 
 
 def main(
@@ -67,7 +75,7 @@ def main(
     Args:
         arguments: The command line after the program's name; the process's own if left out.
         program: The program's name, for messages.
-        names: Names of the commands here to their modules.
+        names: Commands here, each with its file.
 
     Returns:
         Exit status, see `STATUSES`.
@@ -103,13 +111,13 @@ def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> in
     options, left = top.parse_known_args(ours)
     if left:
         made[options.command].refuse(next((one for one in left if one.startswith("-")), left[0]))
-    if names[options.command] not in ("run", "cell", "modulus"):
-        require_prism(petsc)
+    if "case" not in options:
+        require_petsc(petsc, False)
+    options.petsc = petsc
     check_destinations(made[options.command], options)
-    command = import_module(f"alphacut.commands.{names[options.command]}")
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
         warnings.showwarning = _warn
-        return int(command.run(options, petsc, out))
+        return command_of(options.command, names[options.command]).run(options, out)
 
 
 def _warn(message: Warning | str, *_: object, **__: object) -> None:

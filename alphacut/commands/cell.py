@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.case.load import load
 from alphacut.case.material import Mesh, RadiusMap, RoundCell
-from alphacut.commands import options as common
-from alphacut.commands.modulus import image as image_text
-from alphacut.commands.parser import require_prism
+from alphacut.commands.options import Command, add_common, answer, read
+from alphacut.commands.stage import image as image_text
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
 from alphacut.io.netcdf import document_of
@@ -21,13 +18,23 @@ from alphacut.rve.result import Homogenised
 from alphacut.stages import cell, image
 from alphacut.stages.store import Store
 
-ABOUT = "effective modulus and stresses of the cell at the modal values"
+KEYS = {
+    "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
+    "--a4": ("radius.a4", "slope of the radius at the upper end"),
+    "--inclusion-modulus": ("cell.inclusion_modulus", "as '80 GPa'"),
+    "--method": ("modulus.method", "prism, slices, series or auto"),
+}
+"""Options that change a key of the case, each with its key and help."""
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the options of the command."""
-    common.add_common(parser)
-    common.add_keys(parser, common.SAMPLE)
+    add_common(parser)
+    for option, (key, about) in KEYS.items():
+        change = f"{key}={{}}".format
+        parser.add_argument(
+            option, dest="set", action="append", type=change, metavar="VALUE", help=about
+        )
     parser.add_argument(
         "--cross-check",
         metavar="METHOD",
@@ -36,20 +43,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--export", metavar="FILE", help="mesh, displacements and stresses as .vtu")
 
 
-def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves and reports."""
-    case = load(options.case, common.changes(options, common.SAMPLE))
+    case = read(options)
     content = case.content
-    require_prism(petsc, content)
     if content.picture is not None:
         store = Store(None, case.text, quiet=options.quiet)
         data = store.take(image.stage(content.picture, (1.0,), content.modulus.average))
         document = document_of(data)
         text = text_table(*tables({"image": document})["image"]) + image_text(document)
-        common.answer(options, document, out, text)
+        answer(options, document, out, text)
         return 0
     radius, phases = content.round_cell
-    elements = {"petsc": petsc, "parallel": ranks() > 1, "estimate": True}
+    elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)
     result = cell.solve(radius, phases, model)
     cell.require_tolerance(result.error, content.modulus.tolerance)
@@ -62,7 +68,7 @@ def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> i
         document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)
     if options.export:
         document["export"] = export(radius, phases, content.mesh, Path(options.export))
-    common.answer(options, document, out, summary(result, document))
+    answer(options, document, out, summary(result, document))
     return 0
 
 
@@ -113,3 +119,7 @@ def summary(result: Homogenised, document: Document) -> str:
     return text_table((result.convention, "value", "± error"), rows) + (
         f"{result.method}, {result.unknowns} unknowns{words}\n"
     )
+
+
+ABOUT = "effective modulus and stresses of the cell at the modal values"
+COMMANDS = dict.fromkeys(("cell", "solve"), Command(ABOUT, arguments, run))

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict
 from math import pi
 from typing import TextIO
 
 from alphacut.case.content import Content
 from alphacut.case.keys import quantity_of
-from alphacut.case.load import load
 from alphacut.case.types import Section
-from alphacut.commands.options import add_common, answer
+from alphacut.commands.options import Command, add_common, answer, read
 from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
@@ -21,20 +20,14 @@ from alphacut.io.units import engineering
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
 
-ABOUT = "check a case, and print what it was read as and its first natural period"
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of the command."""
-    add_common(parser)
-
-
-def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+def run(options: argparse.Namespace, out: TextIO) -> int:
     """Checks and reports; with ``--json`` the problems as data."""
     try:
-        content = load(options.case, options.set).content
+        content = read(options).content
     except BadInput as error:
         problems = [asdict(problem) for problem in error.problems]
         answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
@@ -96,3 +89,7 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
 def _numbers(number: FuzzyNumber, unit: str) -> str:
     ends = dict.fromkeys((number.support.lower, *number.cut(1.0), number.support.upper))
     return " … ".join(engineering(x, unit) for x in ends)
+
+
+ABOUT = "check a case, and print what it was read as and its first natural period"
+COMMANDS = {"check": Command(ABOUT, add_common, run)}

@@ -1,27 +1,82 @@
-"""Options that the commands share, and how they change a case."""
+"""The command line: its parser, the options that commands share, and how they answer."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import NoReturn, TextIO
 
 from alphacut.case.load import Case, load
-from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io import quantity
 from alphacut.io.files import as_json, write_text
-from alphacut.stages.modulus import read_number
+from alphacut.io.problem import BadInput, Problem, suggestion
 from alphacut.stages.store import Store
 
-SAMPLE = {
-    "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
-    "--a4": ("radius.a4", "slope of the radius at the upper end"),
-    "--inclusion-modulus": ("cell.inclusion_modulus", "as '80 GPa'"),
-    "--method": ("modulus.method", "prism, slices, series or auto"),
-}
-"""Options of the cell that stand for keys of a case, each with its key and help."""
+PETSC_PREFIX = "-rve_"
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command.
+
+    Args:
+        about: What it does, in a line.
+        arguments: Adds its options to a parser.
+        run: Computes and writes to a stream, from the options; returns the exit status.
+    """
+
+    about: str
+    arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace, TextIO], int]
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that raises in place of printing its usage and leaving."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raises the complaint of argparse as a problem."""
+        choice = re.match(
+            r"argument COMMAND: invalid choice: '(.*?)' \(choose from (.*)\)", message
+        )
+        if choice:
+            known = [name.strip(" '") for name in choice[2].split(",")]
+            raise RefusedError("command", choice[1], ", ".join(known), suggestion(choice[1], known))
+        raise BadInput(Problem(self.prog.removeprefix("alphacut "), f"{message}; see --help"))
+
+    def refuse(self, word: str) -> NoReturn:
+        """Raises the problem of a word that is no option of this command."""
+        known = [name for name in self._option_string_actions if name.startswith("--")]
+        allowed, cure = ", ".join(known), suggestion(word, known)
+        raise RefusedError(f"{self.prog.removeprefix('alphacut ')}: option", word, allowed, cure)
+
+
+def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
+    """Options of PETSc (``-rve_ksp_rtol 1e-10``) apart from those of the program."""
+    ours: list[str] = []
+    petsc: dict[str, str] = {}
+    rest = list(arguments)
+    while rest:
+        word = rest.pop(0)
+        if not word.startswith(PETSC_PREFIX):
+            ours.append(word)
+            continue
+        has_value = bool(rest) and not re.match(r"--?[A-Za-z_]", rest[0])
+        has_value = has_value and not rest[0].endswith(".toml")
+        petsc[word.removeprefix(PETSC_PREFIX)] = rest.pop(0) if has_value else ""
+    return ours, petsc
+
+
+def require_petsc(petsc: Mapping[str, str], used: bool) -> None:
+    """Refuses PETSc options, named without their prefix, where no prisms are solved.
+
+    Raises:
+        RefusedError: There are such options.
+    """
+    option = PETSC_PREFIX + next(iter(petsc), "")
+    require(used or not petsc, option, "PETSc's", "options of a cell with method prism")
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -47,52 +102,37 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress and no table")
 
 
-def add_keys(parser: argparse.ArgumentParser, keys: Mapping[str, tuple[str, str]]) -> None:
-    """Adds options that stand for keys of the case."""
-    for option, (_, about) in keys.items():
-        parser.add_argument(option, metavar="VALUE", help=about)
-
-
 def add_run(parser: argparse.ArgumentParser, place: str = "nothing is kept") -> None:
-    """Adds ``--out`` and ``--workers``."""
+    """Adds the options of a command that keeps results: ``--out``, ``--workers``."""
+    add_common(parser)
     about = f"folder for results ({place} if left out); what is up to date there is taken"
     parser.add_argument("--out", metavar="FOLDER", help=about)
     parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes (default 1)")
 
 
-def add_modulus(parser: argparse.ArgumentParser) -> None:
-    """Adds ``--modulus``."""
-    parser.add_argument(
-        "--modulus",
-        metavar="QUANTITY|FILE.nc",
-        help="Young's modulus in place of the case's: '[22, 24, 26] GPa', or α-cuts",
-    )
+def read(options: argparse.Namespace) -> Case:
+    """The case, changed as the options say.
+
+    Raises:
+        BadInput: The case has problems.
+        RefusedError: It solves no prisms, and there are options of PETSc.
+    """
+    case = load(options.case, options.set)
+    prisms = case.content.round is not None and case.content.modulus.method == "prism"
+    require_petsc(options.petsc, prisms)
+    return case
 
 
-def opened(
-    options: argparse.Namespace, keys: Mapping[str, tuple[str, str]] | None = None
-) -> tuple[Case, Store]:
-    """The case, changed as the options say, and the folder of the results.
+def opened(options: argparse.Namespace) -> tuple[Case, Store]:
+    """The case, and the folder of the results.
 
     Raises:
         BadInput: The case has problems.
         RefusedError: There are fewer than one worker.
     """
     require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
-    case = load(options.case, changes(options, keys or {}))
-    folder = Path(options.out) if options.out else None
+    case, folder = read(options), Path(options.out) if options.out else None
     return case, Store(folder, case.text, quiet=options.quiet, workers=options.workers)
-
-
-def changes(options: argparse.Namespace, keys: Mapping[str, tuple[str, str]]) -> list[str]:
-    """Changes of the case by ``--set`` and by the options that stand for keys, as KEY=VALUE."""
-    values = {key: getattr(options, destination(option)) for option, (key, _) in keys.items()}
-    return [*options.set, *(f"{key}={x}" for key, x in values.items() if x is not None)]
-
-
-def destination(option: str) -> str:
-    """Name of the attribute of an option."""
-    return option.removeprefix("--").replace("-", "_")
 
 
 def answer(
@@ -106,22 +146,3 @@ def answer(
         write_text(options.json, as_json(document, indent=2))
     if not options.quiet:
         out.write(text)
-
-
-def modulus_option(text: str | None) -> FuzzyNumber | None:
-    """The modulus of ``--modulus`` in Pa: a quantity, or the α-cuts of a file.
-
-    Raises:
-        RefusedError: It is no positive modulus.
-    """
-    if text is None:
-        return None
-    if text.endswith(".nc"):
-        return read_number(text, "--modulus")
-    allowed = "a stress above 0 such as '[22.8, 24.8, 25.8] GPa', or FILE.nc"
-    try:
-        number = quantity.fuzzy(text, "Pa")
-    except ValueError as error:
-        raise RefusedError("--modulus", text, allowed, str(error)) from None
-    require(number.support.lower > 0, "--modulus", text, allowed)
-    return number

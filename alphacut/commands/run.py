@@ -1,4 +1,4 @@
-"""Command ``alphacut run``: all stages of a case, with files, figures and summary."""
+"""Commands on whole runs: ``run`` computes every stage of a case, ``report`` makes a page of it."""
 
 from __future__ import annotations
 
@@ -11,38 +11,35 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.case.load import Case
-from alphacut.commands import options as common
-from alphacut.commands.parser import require_prism
+from alphacut.commands.options import Command, add_quiet, add_run, answer, opened
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, as_json, rank, say, write_text
+from alphacut.io.netcdf import read_summary
 from alphacut.io.output_paths import alone, require_writable
 from alphacut.io.provenance import FORMAT, command, door, versions
-from alphacut.report.tables import run_text
+from alphacut.report.page import report as page_of
+from alphacut.report.tables import run_text, write_tables
 from alphacut.stages.chain import Chain
 from alphacut.stages.store import Store
 
-ABOUT = "run every stage of a case: files, figures, summary"
 
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of the command."""
-    common.add_common(parser)
-    common.add_run(parser, "results/NAME")
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Adds the options of a run."""
+    add_run(parser, "results/NAME")
     parser.add_argument("--fresh", action="store_true", help="compute everything anew")
     parser.add_argument("--no-figures", action="store_true", help="numbers only")
 
 
-def run(options: argparse.Namespace, petsc: Mapping[str, str], out: TextIO) -> int:
+def run(options: argparse.Namespace, out: TextIO) -> int:
     """Computes, draws, reports."""
     folder = Path(options.out or f"results/{Path(options.case).stem}")
-    case, store = common.opened(options)
+    case, store = opened(options)
     store = replace(store, folder=folder, fresh=options.fresh)
-    require_prism(petsc, case.content if "modulus" in case.stages else None)
     require_writable("--out", str(folder), folder=True)
     with alone("--out", folder) if rank() == 0 else nullcontext():
-        document = computed(case, store, folder, petsc, figures=not options.no_figures)
-    common.answer(options, document, out, run_text(document))
+        document = computed(case, store, folder, options.petsc, figures=not options.no_figures)
+    answer(options, document, out, run_text(document))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {document['seconds']:.0f} s")
         if store.taken:
@@ -76,3 +73,33 @@ def computed(
     }
     write_text(folder / "summary.json", as_json(document, indent=2))
     return document
+
+
+def add_page(parser: argparse.ArgumentParser) -> None:
+    """Adds the options of a report."""
+    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/paper")
+    parser.add_argument(
+        "--out", metavar="FILE.html", help="file for the page (default: FOLDER/report.html)"
+    )
+    parser.add_argument("--csv", metavar="FOLDER", help="folder for every table as a CSV file")
+    add_quiet(parser)
+
+
+def report(options: argparse.Namespace, out: TextIO) -> int:
+    """Writes the page, and the tables where they are requested."""
+    folder = Path(options.folder)
+    path = Path(options.out) if options.out else folder / "report.html"
+    page = page_of(folder)
+    write_text(path, page)
+    tables = []
+    if options.csv:
+        tables = write_tables(read_summary(folder), folder, Path(options.csv))
+    document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
+    answer(options, document, out, "".join(f"{file}\n" for file in (path, *tables)))
+    return 0
+
+
+COMMANDS = {
+    "run": Command("run every stage of a case: files, figures, summary", add_options, run),
+    "report": Command("one self-contained HTML page of a run's results", add_page, report),
+}

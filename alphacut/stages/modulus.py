@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds as Cuts
 from alphacut.fuzzy.sets.stepwise import outer_steps
 from alphacut.io.files import Document, as_json
-from alphacut.io.netcdf import read_dataset
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
@@ -300,8 +298,9 @@ def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     """The fuzzy modulus in Pa; between two levels the wider cut holds.
 
     Raises:
-        RefusedError: It is not positive, or lacks the levels 0 and 1.
+        RefusedError: There is none, or it is not positive, or lacks the levels 0 and 1.
     """
+    require("E" in data, key, "without E", "a modulus.nc of this program")
     alpha, ends = data["alpha"].values, data["E"].transpose("alpha", "bound").values
     require(ends.min() > 0, key, f"{ends.min() / GPA:.3g} GPa", "a modulus above 0")
     if tuple(alpha) == (1.0,):
@@ -309,15 +308,3 @@ def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     whole = (alpha[0], alpha[-1]) == (0, 1)
     require(whole, key, alpha.tolist(), "levels from 0 to 1, or 1 alone")
     return outer_steps(alpha, ends[:, 0], ends[:, 1])
-
-
-def read_number(path: Path | str, option: str = "--modulus") -> FuzzyNumber:
-    """The fuzzy modulus in Pa from a file of this program.
-
-    Raises:
-        RefusedError: The file holds none.
-    """
-    data = read_dataset(Path(path), key=option)
-    holds = {"E", "alpha"} <= {*map(str, data.variables)}
-    require(holds, option, str(path), "a modulus.nc of this program")
-    return number_of(data, option)

@@ -1,0 +1,109 @@
+"""Commands of one stage each: ``microstructure``, ``modulus``, ``envelope``, ``identify``."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TextIO
+
+from alphacut.commands.options import Command, add_common, add_run, answer, opened, read
+from alphacut.fuzzy.refused import require
+from alphacut.io.files import Document
+from alphacut.io.netcdf import document_of, read_dataset
+from alphacut.io.units import between
+from alphacut.report.results import ISOTROPIC, fibre_label, nature_of, width_text
+from alphacut.report.tables import run_text, tables, text_table
+from alphacut.stages.chain import Chain
+from alphacut.stages.identify import learned
+from alphacut.stages.modulus import number_of
+from alphacut.stages.results import Results
+
+
+def microstructure(options: argparse.Namespace, out: TextIO) -> int:
+    """Computes the map, writes it and prints the section [radius]."""
+    case, store = opened(options)
+    data = Chain(case.content, store).particles()
+    fragment = str(data.attrs["radius"])
+    answer(options, document_of(data) | {"fragment": fragment}, out, fragment)
+    return 0
+
+
+def modulus(options: argparse.Namespace, out: TextIO) -> int:
+    """Computes the modulus of a round cell or of an image."""
+    case, store = opened(options)
+    results = Results(case.content)
+    Chain(case.content, store, options.petsc).material(results)
+    document, words = results.document(), {"modulus": summary, "image": image}
+    for name in document.keys() & words.keys():
+        text = text_table(*tables(document)[name]) + words[name](document[name])
+        answer(options, document[name], out, text)
+    return 0
+
+
+def image(document: Document) -> str:
+    """The phases, and what widens the bounds."""
+    shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
+    return "".join(shares) + width_text(document) + "\n"
+
+
+def summary(document: Document) -> str:
+    """Constants of fibres on two levels, references, and what the α-cuts cost."""
+    nature, levels = nature_of(document["nature"]), (0, -1)
+    fibres = [
+        (fibre_label(key), *(between(of["lower"][k], of["upper"][k], nature, 5) for k in levels))
+        for key, of in document["fibres"].items()
+    ]
+    head = ("of fibres", *(f"α = {document['alpha'][k]:g}" for k in levels))
+    ends = document["references"].get("hashin_shtrikman_E_GPa")
+    return (
+        (text_table(head, fibres) if fibres else "")
+        + (f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else "")
+        + f"{document['samples']} samples, {document['solves']} linear systems,"
+        f" {document['seconds']:.1f} s, {document['method']}\n"
+    )
+
+
+def add_envelope(parser: argparse.ArgumentParser) -> None:
+    """Adds the options of an envelope."""
+    add_run(parser)
+    parser.add_argument("--modulus", metavar="FILE.nc", help="fuzzy modulus of an earlier command")
+
+
+def envelope(options: argparse.Namespace, out: TextIO) -> int:
+    """Computes the envelope of [envelope]."""
+    case, store = opened(options)
+    chain, results = Chain(case.content, store), Results(case.content)
+    number = None
+    if options.modulus:
+        number = number_of(read_dataset(options.modulus, key="--modulus"), "--modulus")
+    chain.motion(results, chain.structure(number), studies=False)
+    document = results.document()
+    answer(options, document["envelopes"]["all"], out, run_text(document))
+    return 0
+
+
+def identify(options: argparse.Namespace, out: TextIO) -> int:
+    """Identifies and reports; status 0 also where the measurement refutes the frame."""
+    content = read(options).content
+    section, frame, motion = content.identify, content.frame, content.envelope
+    whole = section is not None and frame is not None and motion is not None
+    require(whole, "identify", None, "sections [identify], [frame] and [envelope]")
+    assert section is not None
+    assert frame is not None
+    assert motion is not None
+    document, _ = learned(section, frame.structure(), motion.alpha)
+    answer(options, document, out, run_text({"update": document}))
+    return 0
+
+
+COMMANDS = {
+    "microstructure": Command(
+        "from particles, packed or measured, to the random radius and its fuzzy map",
+        add_run,
+        microstructure,
+    ),
+    "modulus": Command("fuzzy effective modulus of the cell or of the image", add_run, modulus),
+    "envelope": Command(
+        "envelopes of the structure's vibration on every α-cut", add_envelope, envelope
+    ),
+    "identify": Command("inputs of a frame from its measured natural modes", add_common, identify),
+}
