@@ -16,14 +16,17 @@ from alphacut.case.material import (
 )
 from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
-from alphacut.case.structure import Structure
-from alphacut.case.structures import Frame, Pendulum
+from alphacut.case.structure import Frame, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import require
+from alphacut.questions.decision import Decision
+from alphacut.questions.probability import Probability
 from alphacut.questions.question import Question
-from alphacut.questions.table import QUESTIONS
+from alphacut.questions.tolerances import Tolerances
 
 Stage = Literal["microstructure", "modulus", "envelope"]
+QUESTIONS: tuple[type[Question], ...] = (Probability, Decision, Tolerances)
+"""Questions that a case may put to its motion."""
 
 
 class Content(Section):

@@ -14,15 +14,12 @@ from pydantic_core import CoreSchema
 
 from alphacut.case.types import (
     ALPHA,
-    Any_,
     CaseFile,
     Each,
-    Grey,
     Length,
     Levels,
     Modulus,
     Quantity,
-    Radius,
     Ratio,
     Section,
     after,
@@ -35,6 +32,8 @@ from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 
+Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
+Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
 Theta = Annotated[float, Quantity(least=-10, most=10)]
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
@@ -50,8 +49,8 @@ class RadiusMap(Section):
     )
     a1: Radius = Field(description="radius at the lower end of θ")
     a3: Radius = Field(description="radius at the upper end of θ")
-    a2: Any_ = Field(description="slope dr/dξ at the lower end")
-    a4: Any_ = Field(description="slope dr/dξ at the upper end")
+    a2: Number = Field(description="slope dr/dξ at the lower end")
+    a4: Number = Field(description="slope dr/dξ at the upper end")
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
@@ -115,19 +114,14 @@ def _outline(particles: str) -> Ellipse | None:
     try:
         aspect, turn = map(float, match.groups() if match else ())
     except ValueError:
-        raise RefusedError("", particles, SHAPES) from None
+        raise RefusedError("cell.particles", particles, SHAPES) from None
     return Ellipse(aspect, turn)
-
-
-def _with_outline(particles: str) -> str:
-    _outline(particles)
-    return particles
 
 
 class RoundCell(Section):
     """The two elastic phases of the periodic cell, and the shape of its particle."""
 
-    particles: Annotated[str, after(_with_outline)] = Field(
+    particles: str = Field(
         default="cylinders",
         description=f"{SHAPES}; cylinders and ellipses in plane strain, spheres in a cubic array",
     )
@@ -180,7 +174,8 @@ class RoundCell(Section):
 
     @model_validator(mode="after")
     def _one_material(self) -> Self:
-        """Refuses a material that is none, or that is none of spheres."""
+        """Refuses a shape or a material that is none, or a material that is none of spheres."""
+        _outline(self.particles)
         ratio = self.inclusion_poisson is not None
         allowed = "a number beside Young's modulus, none beside a stiffness"
         value = "there" if ratio else "missing"
@@ -198,7 +193,7 @@ class ImageCell(Section):
     pixel: Annotated[tuple[Length, ...], Each] = Field(
         description="side of a pixel, or its width and height"
     )
-    threshold: tuple[Grey, ...] | None = Field(
+    threshold: tuple[Number, ...] | None = Field(
         default=None, description="grey value from which on a pixel is of the next phase"
     )
     labels: tuple[Annotated[float, Quantity()], ...] | None = Field(

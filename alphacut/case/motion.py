@@ -44,8 +44,6 @@ class Tolerance:
 
 
 def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
-    if isinstance(value, Tolerance):
-        return value
     for unit in ("m", "N", ""):
         try:
             number = quantity.number(value, unit)

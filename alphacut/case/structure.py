@@ -1,19 +1,47 @@
-"""A structure at modal values, and its parameters as fuzzy numbers."""
+"""A structure at modal values with its fuzzy parameters, and the sections that give one."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Literal, Self
 
-from alphacut.frame import StoreyFrame
+from pydantic import Field, ValidationInfo, model_validator
+
+from alphacut.case.types import Each, Modulus, Quantity, Section, case_file, text
+from alphacut.frame import Accelerogram, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import flow_of
-from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
+from alphacut.frame.structures.storey import SYMBOLS
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.accelerogram import accelerogram
 from alphacut.io.problem import suggestion
 
+Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
+Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
+Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
+Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
+Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
+Damping = Annotated[FuzzyNumber, Quantity("N*s/m", least=0, fuzzy=True)]
+Critical = Annotated[FuzzyNumber, Quantity(least=0, below=1, fuzzy=True)]
+Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
+Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
+Rate = Annotated[FuzzyNumber, Quantity("1/s", least=0, fuzzy=True)]
+Delay = Annotated[FuzzyNumber, Quantity("s", least=0, fuzzy=True)]
+Acceleration = Annotated[FuzzyNumber, Quantity("m/s^2", above=0, fuzzy=True)]
+Turning = Annotated[FuzzyNumber, Quantity("N*m*s", least=0, fuzzy=True)]
+Angle = Annotated[FuzzyNumber, Quantity("rad", fuzzy=True)]
+Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
+
+ZERO = Crisp(0.0)
+NAMES = {"q0": "displacements", "v0": "velocities", "output": "outputs"}
+"""Keys by the names of the frame's own arguments, where they differ."""
+DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
+STAND_IN = Crisp(2e10)
+"""Young's modulus in Pa of a frame whose own is yet to be computed."""
 INPUTS = {"modulus": "E", "second_moment": "I", "masses": "m", "lengths": "l", "columns": "c"}
 INPUTS |= {"stiffness": "k", "dampers": "d", "displacements": "q0", "velocities": "v0"}
 INPUTS |= {"damping_ratio": "zeta"}
@@ -97,3 +125,165 @@ class Structure:
     ) -> Flow:
         """Trajectories as a function of parameters, by the midpoint rule by default."""
         return flow_of(self.model, names, duration, step, integrator or "midpoint")
+
+
+def _record(value: object, info: ValidationInfo) -> Accelerogram:
+    return accelerogram(case_file(value, info))
+
+
+class Frame(Section):
+    """Storey frame: rigid floors on elastic columns, numbered from the ground.
+
+    A key with one value for each floor may hold one value for all of them.
+    """
+
+    masses: Annotated[tuple[Mass, ...], Each] = Field(description="mass of each floor")
+    lengths: Annotated[tuple[Span, ...], Each] | None = Field(
+        default=None, description="height of each storey"
+    )
+    modulus: Modulus | None = Field(
+        default=None, description="Young's modulus where no stage computes it"
+    )
+    second_moment: Annotated[tuple[Moment, ...], Each] | None = Field(
+        default=None, description="second moment of area of one column of each storey"
+    )
+    columns: Annotated[tuple[Count, ...], Each] = Field(
+        default=(Crisp(2.0),), description="clamped columns in each storey"
+    )
+    stiffness: Annotated[tuple[Stiffness, ...], Each] | None = Field(
+        default=None, description="stiffness of each storey, in place of columns and modulus"
+    )
+    damping_ratio: Annotated[tuple[Critical, ...], Each] | None = Field(
+        default=None, description="damping over the critical one, of all modes or of each"
+    )
+    dampers: Annotated[tuple[Damping, ...], Each] = Field(
+        default=(ZERO,), description="viscous damper of each floor"
+    )
+    damper_placement: Literal["ground", "storey"] | None = Field(
+        default=None, description="dampers to the ground, or between storeys"
+    )
+    displacements: Annotated[tuple[Displacement, ...], Each] = Field(
+        default=(ZERO,), description="displacement of each floor at the start"
+    )
+    velocities: Annotated[tuple[Velocity, ...], Each] = Field(
+        default=(ZERO,), description="velocity of each floor at the start"
+    )
+    rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
+    rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
+    accelerogram: Annotated[Accelerogram, text(_record)] | None = Field(
+        default=None,
+        description="CSV or AT2 file of the ground's acceleration; motion is relative to it",
+    )
+    outputs: tuple[str, ...] = Field(
+        default=(), description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"
+    )
+
+    @property
+    def damped(self) -> bool:
+        """True if any damper is there."""
+        return any(number.support.upper > 0 for number in self.dampers)
+
+    @property
+    def is_whole(self) -> bool:
+        """True if it needs no modulus of a stage."""
+        return self.modulus is not None or self.stiffness is not None
+
+    @property
+    def floors(self) -> int:
+        """Number of floors."""
+        return len(self.masses)
+
+    def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
+        """One value for each floor; a single one holds for all of them."""
+        several = values or ()
+        return several * self.floors if len(several) == 1 else several
+
+    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
+        """The frame with a Young's modulus in Pa, its own by default.
+
+        Raises:
+            RefusedError: Its values make no frame.
+        """
+        number = self.modulus if self.stiffness else modulus or self.modulus or STAND_IN
+        try:
+            model = self._model(number)
+        except RefusedError as error:
+            key = f"frame.{NAMES.get(error.key, error.key)}"
+            raise RefusedError(key, error.value, error.allowed, error.cure) from None
+        every = self._numbers(number)
+        return Structure(model, {name: every[name] for name in model.parameters})
+
+    def _model(self, modulus: FuzzyNumber | None) -> StoreyFrame:
+        return StoreyFrame(
+            self._modal(self.masses),
+            self._modal(self.lengths),
+            None if modulus is None else modulus.modal,
+            tuple(x.modal for x in self.second_moment or ()) or None,
+            dampers=self._modal(self.dampers),
+            damper_placement=self.damper_placement or "ground",
+            q0=self._modal(self.displacements),
+            v0=self._modal(self.velocities),
+            outputs=self.outputs,
+            rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
+            ground=self.accelerogram,
+            damping_ratio=tuple(x.modal for x in self.damping_ratio or ()),
+            columns=() if self.stiffness else self._modal(self.columns),
+            stiffness=self._modal(self.stiffness),
+        )
+
+    def _modal(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
+        return tuple(x.modal for x in self.per_floor(values))
+
+    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+        """Every number by the name of its parameter; some are none of this frame's."""
+        numbers: dict[str, FuzzyNumber] = {
+            "E": modulus or STAND_IN,
+            "rayleigh_mass": self.rayleigh_mass,
+            "rayleigh_stiffness": self.rayleigh_stiffness,
+        }
+        for symbol, key in {"I": "second_moment", "zeta": "damping_ratio"}.items():
+            values: tuple[FuzzyNumber, ...] = getattr(self, key) or ()
+            numbers |= {symbol: values[0]} if len(values) == 1 else {}
+        for key, symbol in SYMBOLS.items():
+            each = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)
+            numbers |= {symbol.format(place): value for place, value in each}
+        return numbers
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Refuses a frame without damping or motion, or that is none."""
+        if self.names("dampers") != (self.damper_placement is not None):
+            raise RefusedError("frame.damper_placement", None, "both dampers and damper_placement")
+        if not any(map(self.names, DAMPING)):
+            raise RefusedError("frame.dampers", None, " or ".join(DAMPING), '"0 %" for none')
+        starts = (*self.displacements, *self.velocities)
+        if self.accelerogram is None and not any(any(x.support) for x in starts):
+            cure = "nothing moves the frame"
+            raise RefusedError("frame.displacements", None, "a start, or an accelerogram", cure)
+        self.structure()
+        return self
+
+
+class Pendulum(Section):
+    """Damped pendulum: a mass on a bar under gravity; the output is the force in the bar."""
+
+    mass: Mass = Field(description="mass")
+    length: Span = Field(description="length of the bar")
+    damping: Turning = Field(description="moment over angular velocity")
+    gravity: Acceleration = Field(description="acceleration of gravity")
+    angle: Angle = Field(description="angle at the start, 0 hanging down")
+    angular_velocity: Spin = Field(description="angular velocity at the start")
+
+    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
+        """The pendulum; it takes no modulus."""
+        model = pendulum(
+            mass=self.mass.modal,
+            length=self.length.modal,
+            damping=self.damping.modal,
+            gravity=self.gravity.modal,
+            phi0=self.angle.modal,
+            omega0=self.angular_velocity.modal,
+        )
+        keys = ("mass", "length", "damping", "gravity", "angle", "angular_velocity")
+        numbers = {x: getattr(self, key) for x, key in zip(model.parameters, keys, strict=True)}
+        return Structure(replace(model, observed={"force": model.observed["force"]}), numbers)

@@ -97,8 +97,6 @@ class Quantity:
             if isinstance(value, bool) or not isinstance(value, int):
                 raise ValueError("this is no whole number")
             return value
-        if isinstance(value, FuzzyNumber):
-            return value
         if isinstance(value, str) and not self.si and "%" not in value and "[" not in value:
             raise ValueError("a number stands without quotes")
         return quantity.fuzzy(value, self.si) if self.fuzzy else quantity.number(value, self.si)
@@ -198,24 +196,6 @@ Names = Annotated[tuple[str, ...], Each, after(unlike)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
-Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
-Any_ = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
-Grey = Any_
-Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
-Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
-Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
-Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
-Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
-Damping = Annotated[FuzzyNumber, Quantity("N*s/m", least=0, fuzzy=True)]
-Critical = Annotated[FuzzyNumber, Quantity(least=0, below=1, fuzzy=True)]
-Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
-Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
-Rate = Annotated[FuzzyNumber, Quantity("1/s", least=0, fuzzy=True)]
-Delay = Annotated[FuzzyNumber, Quantity("s", least=0, fuzzy=True)]
-Acceleration = Annotated[FuzzyNumber, Quantity("m/s^2", above=0, fuzzy=True)]
-Turning = Annotated[FuzzyNumber, Quantity("N*m*s", least=0, fuzzy=True)]
-Angle = Annotated[FuzzyNumber, Quantity("rad", fuzzy=True)]
-Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]
 Length = Annotated[float, Quantity("m", above=0)]

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from alphacut.case.content import QUESTIONS
 from alphacut.figures import envelope, follower, frame, modulus, radius
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
@@ -17,7 +18,6 @@ from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.files import Document, as_json, write_text
 from alphacut.io.progress import progress
 from alphacut.io.provenance import NESTED, fingerprint, version_of
-from alphacut.questions.table import QUESTIONS
 from alphacut.stages import microstructure
 from alphacut.stages.cell import modal_cell
 from alphacut.stages.results import Results

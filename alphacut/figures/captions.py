@@ -6,7 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from alphacut.questions.table import QUESTIONS
+from alphacut.case.content import QUESTIONS
 
 _TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 FIGURES: dict[str, str] = _TABLES["figures"] | {one.key: one.caption for one in QUESTIONS}

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.structures import Frame
+from alphacut.case.structure import Frame
 from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, figure
 from alphacut.fuzzy import Crisp
 

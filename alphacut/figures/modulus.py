@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.case.structures import Frame
+from alphacut.case.structure import Frame
 from alphacut.figures import style as look
 from alphacut.fuzzy.arrays import Array
 from alphacut.stages.cell import GPA

@@ -14,8 +14,7 @@ from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering
-from alphacut.questions.limits import in_words
-from alphacut.questions.question import Motion, Question, Row
+from alphacut.questions.question import Motion, Question, Row, in_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,6 +128,3 @@ class Decision(Question):
         axes.set_yticks(places, list(each), color=INK)
         axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
         return drawn
-
-
-QUESTION = Decision

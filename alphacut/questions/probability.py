@@ -13,15 +13,15 @@ from alphacut.case.types import Quantity
 from alphacut.figures import style
 from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
 from alphacut.frame.questions.passing import ANY
-from alphacut.frame.questions.probability import Probability, probabilities
+from alphacut.frame.questions.probability import Probability as Bounds
+from alphacut.frame.questions.probability import probabilities
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.units import axis_prefix, between, engineering
-from alphacut.questions.limits import in_words
-from alphacut.questions.question import Motion, Question, Row
+from alphacut.questions.question import Motion, Question, Row, in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +45,7 @@ def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Arr
     return draw
 
 
-def _document(name: str, one: Probability, limits: dict[str, float]) -> Document:
+def _document(name: str, one: Bounds, limits: dict[str, float]) -> Document:
     return {
         "limit": limits.get(name, 1.0),
         "unit": "" if name == ANY else Output(name).unit,
@@ -73,7 +73,7 @@ def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
     axes.set_title(f"limit {words} ({'dashed' if near else 'far off'})", loc="left", fontsize=10)
 
 
-class ProbabilitySection(Question):
+class Probability(Question):
     """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
 
     key = "probability"
@@ -179,6 +179,3 @@ class ProbabilitySection(Question):
         axes.set_ylim(0, 1.02)
         alpha_legend(axes, alpha)
         return drawn
-
-
-QUESTION = ProbabilitySection

@@ -112,6 +112,3 @@ class Tolerances(Question):
         axes.set_xlabel("value over the modal one")
         axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         return drawn
-
-
-QUESTION = Tolerances

@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.units import STANDARD_GRAVITY, axis_prefix, between
-from alphacut.questions.table import QUESTIONS
 
 Row = tuple[str, ...]
 Table = tuple[Row, list[Row]]

@@ -7,10 +7,10 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from alphacut.case.content import QUESTIONS
 from alphacut.figures.captions import caption, in_words
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.questions.table import QUESTIONS
 from alphacut.report.results import (
     ANSWERS,
     Row,

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.netcdf import read_dataset
 from alphacut.io.units import ends, engineering
-from alphacut.questions.table import QUESTIONS
 from alphacut.report.results import (
     Row,
     Table,
