@@ -9,8 +9,8 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 32_867,
-    "files of the packages": 252,
+    "lines of the packages": 32_775,
+    "files of the packages": 248,
     "places that raise": 360,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
