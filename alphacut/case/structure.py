@@ -153,8 +153,8 @@ class Frame(Section):
     stiffness: Annotated[tuple[Stiffness, ...], Each] | None = Field(
         default=None, description="stiffness of each storey, in place of columns and modulus"
     )
-    damping_ratio: Annotated[tuple[Critical, ...], Each] | None = Field(
-        default=None, description="damping over the critical one, of all modes or of each"
+    damping_ratio: Critical | None = Field(
+        default=None, description="damping over the critical one, of all modes"
     )
     dampers: Annotated[tuple[Damping, ...], Each] = Field(
         default=(ZERO,), description="viscous damper of each floor"
@@ -226,7 +226,7 @@ class Frame(Section):
             outputs=self.outputs,
             rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
             ground=self.accelerogram,
-            damping_ratio=tuple(x.modal for x in self.damping_ratio or ()),
+            damping_ratio=None if self.damping_ratio is None else self.damping_ratio.modal,
             columns=() if self.stiffness else self._modal(self.columns),
             stiffness=self._modal(self.stiffness),
         )
@@ -241,9 +241,10 @@ class Frame(Section):
             "rayleigh_mass": self.rayleigh_mass,
             "rayleigh_stiffness": self.rayleigh_stiffness,
         }
-        for symbol, key in {"I": "second_moment", "zeta": "damping_ratio"}.items():
-            values: tuple[FuzzyNumber, ...] = getattr(self, key) or ()
-            numbers |= {symbol: values[0]} if len(values) == 1 else {}
+        if self.damping_ratio is not None:
+            numbers["zeta"] = self.damping_ratio
+        if self.second_moment is not None:
+            numbers["I"] = self.second_moment[0]  # of all storeys, where it is one
         for key, symbol in SYMBOLS.items():
             each = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)
             numbers |= {symbol.format(place): value for place, value in each}

@@ -55,33 +55,34 @@ class LagrangianSystem:
     def __post_init__(self) -> None:
         real("coordinates", self.coordinates, whole=True, least=1)
         for name in ("parameters", "observed"):
-            if not isinstance(getattr(self, name), Mapping) or not getattr(self, name):
-                raise RefusedError(name, getattr(self, name), "values by name, one at least")
+            named = getattr(self, name)
+            some = isinstance(named, Mapping) and bool(named)
+            require(some, name, named, "values by name, one at least")
         for name, value in self.parameters.items():
             real(f"parameter {name}", value)
         eq = self.symbols
-        if eq.mass.free_symbols & set(eq.v):
-            raise RefusedError("lagrangian", eq.mass.tolist(), "functions quadratic in v")
+        quadratic = not eq.mass.free_symbols & set(eq.v)
+        require(quadratic, "lagrangian", eq.mass.tolist(), "functions quadratic in v")
         for name in self.observed:
             self.output(name, eq.v)
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
         modal = {eq.p[name]: value for name, value in self.parameters.items()}
-        if abs(eq.mass.subs(start).subs(modal).evalf().det()) < 1e-300:
-            raise RefusedError("mass of the lagrangian", "singular", "inertia of each coordinate")
+        inert = abs(eq.mass.subs(start).subs(modal).evalf().det()) >= 1e-300
+        require(inert, "mass of the lagrangian", "singular", "inertia of each coordinate")
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
         """The initial state (q0, v0) in symbols."""
-        state = _called("initial", self.initial, self.symbols.p)
-        if not isinstance(state, Sequence) or len(state) != 2:
-            raise RefusedError("initial", state, "two lists, displacements and velocities")
-        q0, v0 = (_listed("initial", part, self.coordinates) for part in state)
-        return q0, v0
+        p, n = self.symbols.p, self.coordinates
+        q0 = _expressions("initial", lambda: self.initial(p)[0], p, n)
+        return q0, _expressions("initial", lambda: self.initial(p)[1], p, n)
 
     def output(self, name: str, velocity: Symbols) -> Expr:
         """An observed quantity in symbols, for velocities in any symbols."""
-        eq, key = self.symbols, f"observed: {name}"
-        value = _called(key, self.observed[name], list(eq.q), list(velocity), eq.p)
-        return _expression(key, value)
+        eq, of = self.symbols, self.observed[name]
+        value = _expressions(
+            f"observed: {name}", lambda: [of(list(eq.q), list(velocity), eq.p)], eq.p
+        )
+        return value[0]
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -127,11 +128,11 @@ class Equations:
         q, v = (sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("q", "v"))
         p = {name: sympy.Symbol(f"p_{name}", real=True) for name in system.parameters}
         state = (list(q), list(v), p)
-        L = _expression("lagrangian", _called("lagrangian", system.lagrangian, *state))
+        (L,) = _expressions("lagrangian", lambda: [system.lagrangian(*state)], p)
         momentum = sympy.Matrix([L.diff(x) for x in v])
         push = sympy.Matrix([L.diff(x) for x in q])
-        if system.force is not None:
-            push += sympy.Matrix(_listed("force", _called("force", system.force, *state), n))
+        if force := system.force:
+            push += sympy.Matrix(_expressions("force", lambda: force(*state), p, n))
         return cls(q, v, p, momentum, push, momentum.jacobian(v))
 
     def velocity(self, momentum: Matrix) -> Matrix:
@@ -139,33 +140,22 @@ class Equations:
         return self.mass.LUsolve(momentum - self.momentum.subs({x: 0 for x in self.v}))
 
 
-def _called(name: str, function: Callable[..., Any], *arguments: Symbols | Named) -> Any:
-    """Value of a function for symbols: of (q, v, p), or of p, the parameters by name."""
-    try:
-        return function(*arguments)
-    except (KeyError, IndexError, TypeError, AttributeError) as failure:
-        allowed = f"functions of {', '.join(arguments[-1])} and the coordinates by {SMOOTH}"
-        raise RefusedError(name, repr(failure), allowed) from None
-
-
-def _listed(name: str, values: Any, count: int) -> list[Expr]:
-    """The expressions of a sequence, one for each coordinate."""
-    entries = list(values) if isinstance(values, Sequence) or hasattr(values, "tolist") else []
-    require(len(entries) == count, name, values, f"a list of {count}, one for each coordinate")
-    return [_expression(name, x) for x in entries]
-
-
-def _expression(name: str, value: object) -> Expr:
-    """An expression of SymPy with two derivatives."""
+def _expressions(
+    name: str, values: Callable[[], Any], parameters: Named, count: int = 1
+) -> list[Expr]:
+    """Expressions of SymPy with two derivatives, `count` of them, that a function gives."""
     import sympy
 
+    allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"
     try:
-        made = sympy.sympify(value)
-    except sympy.SympifyError:
-        raise RefusedError(name, repr(value), SMOOTH) from None
-    rough = sorted({type(part).__name__ for part in sympy.preorder_traversal(made)} & ROUGH)
-    if rough or not isinstance(made, sympy.Expr):
-        raise RefusedError(name, rough[0] if rough else value, SMOOTH)
+        made = [sympy.sympify(value) for value in values()]
+    except (KeyError, IndexError, TypeError, AttributeError, sympy.SympifyError) as failure:
+        raise RefusedError(name, repr(failure), allowed) from None
+    every = {type(part).__name__ for value in made for part in sympy.preorder_traversal(value)}
+    rough = sorted(every & ROUGH)
+    require(not rough, name, ", ".join(rough), allowed)
+    fits = len(made) == count and all(isinstance(value, sympy.Expr) for value in made)
+    require(fits, name, made, f"{count} by coordinate, {allowed}")
     return made
 
 

@@ -10,11 +10,11 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, variables
 from alphacut.frame.calculus.numbers import require_numbers
-from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.modes import ratio_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, real, require
+from alphacut.fuzzy.refused import real, require
 
 KINDS = ("mass", "damping", "stiffness")
 Factor = Callable[[Mapping[str, Any]], Any]
@@ -40,14 +40,13 @@ class MatrixStructure:
         v0: Initial velocities, shape (n,), in m/s; zero when None.
         ground: Base excitation, or None.
         pattern: ι, how the unknowns move rigidly with the ground, shape (n,); ones when None.
-        ratios: Damping ratios ζ, numbers or names of parameters: one for all modes, or n by rising
-            frequency; added to `damping`, they follow the parameters through the modes
-            (`frame.damping`).
+        ratios: The damping ratio ζ of all modes, a number or the name of a parameter; added to
+            `damping`, it follows the parameters through the modes. Empty for none.
 
     Raises:
         RefusedError: A shape does not fit, a number is not finite, a factor names no parameter, an
-            array is not symmetric, the modal mass matrix is not positive definite, or a modal ratio
-            is outside [0, 1).
+            array is not symmetric, the modal mass matrix is not positive definite, or the modal
+            ratio is outside [0, 1).
     """
 
     parameters: Mapping[str, float]
@@ -69,11 +68,13 @@ class MatrixStructure:
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
-        self._require_shapes()
-        self._require_ratios()
+        self._require_vectors()
         modal = sum(float(value_of(f, self.parameters)) * A for f, A in self.mass)
-        if not np.linalg.eigvalsh(modal).min() > 0:
-            raise RefusedError("mass", "not positive definite", "a mass for every unknown")
+        positive = np.linalg.eigvalsh(modal).min() > 0
+        require(positive, "mass", "not positive definite", "a mass for every unknown")
+        own = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
+        fits = len(own) < 2 and all(Parameter("", range=RATIO).admits(x, x) for x in own)
+        require(fits, "ratios", self.ratios, f"one number or parameter, {RATIO}")
 
     @property
     def size(self) -> int:
@@ -92,44 +93,43 @@ class MatrixStructure:
 
     def _term(self, kind: str, term: object) -> tuple[Factor | str | float, Array]:
         """A factor that exists and has derivatives, and its array without round-off."""
-        if isinstance(term, str) or not isinstance(term, Sequence) or len(term) != 2:
-            raise RefusedError(f"term of {kind}", type(term).__name__, "pairs (factor, array)")
-        factor, array = term
+        pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
+        require(pair, f"term of {kind}", type(term).__name__, "pairs (factor, array)")
+        factor, array = term  # type: ignore[misc]
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
             value = value_of(factor, variables(values, names, names[:1]))
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
-            allowed = (
-                f"arithmetic, sin, cos, exp of alphacut.frame.calculus.jet, of {', '.join(names)}"
-            )
-            raise RefusedError(f"factor of {kind}", repr(failure), allowed) from None
-        if not isinstance(value, Jet | float | int | np.number):
-            raise RefusedError(f"factor of {kind}", type(value).__name__, "functions to one number")
-        return factor, _symmetric(kind, array)
+            value = failure
+        allowed = "arithmetic, sin, cos, exp of alphacut.frame.calculus.jet, to one number, of "
+        number = isinstance(value, Jet | float | int | np.number)
+        require(number, f"factor of {kind}", repr(value), allowed + ", ".join(names))
+        return factor, self._symmetric(kind, array)
 
-    def _require_shapes(self) -> None:
-        n, pairs = self.size, [(kind, A) for kind in KINDS for _, A in getattr(self, kind)]
-        for kind, array in pairs:
-            if array.shape != (n, n):
-                raise RefusedError(f"array of {kind}", f"of shape {array.shape}", f"({n}, {n})")
+    def _symmetric(self, kind: str, value: Any) -> Array:
+        """The array, also a sparse one, without the round-off that parts its triangles."""
+        array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
+        size = np.shape(self.mass[0][1])[0]
+        square = array.shape == (size, size)
+        require(square, f"{key} {kind}", f"of shape {array.shape}", f"({size}, {size})")
+        require_numbers(kind, array)
+        off = np.abs(array - array.T)
+        i, j = np.unravel_index(off.argmax(), off.shape)
+        even = off[i, j] <= 1e-9 * np.abs(array).max()
+        what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
+        require(even, f"{key} {kind}", what, "symmetric arrays", "mirror one triangle")
+        return np.asarray((array + array.T) / 2, float)
+
+    def _require_vectors(self) -> None:
+        n = self.size
         vectors: list[tuple[str, Any, tuple[int, ...]]]
         vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
         vectors += [(f"observed: {k}", row, (n, 2 * n)) for k, row in self.observed.items()]
         for name, value, lengths in vectors:
-            if value is None:
-                continue
-            require_numbers(name, value)
-            if np.ndim(value) != 1 or len(value) not in lengths:
-                raise RefusedError(name, f"of shape {np.shape(value)}", f"{lengths} numbers")
-
-    def _require_ratios(self) -> None:
-        if isinstance(self.ratios, str) or len(self.ratios) not in (0, 1, self.size):
-            raise RefusedError("ratios", self.ratios, f"lists of one, or {self.size} by frequency")
-        for ratio in self.ratios:
-            if isinstance(ratio, str) and ratio not in self.parameters:
-                raise RefusedError("ratios", ratio, ", ".join(self.parameters))
-            value = float(value_of(ratio, self.parameters))
-            require(Parameter("", range=RATIO).admits(value, value), "ratios", f"{value:g}", RATIO)
+            if value is not None:
+                require_numbers(name, value)
+                fits = np.ndim(value) == 1 and len(value) in lengths
+                require(fits, name, f"of shape {np.shape(value)}", f"{lengths} numbers")
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""
@@ -151,8 +151,7 @@ class MatrixStructure:
         pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
         mass, damping, stiffness = (total(getattr(self, kind)) for kind in KINDS)
         if self.ratios:
-            ratios = [lifted(ratio) for ratio in self.ratios]
-            damping = damping + modal_damping(mass, stiffness, ratios)
+            damping = damping + ratio_damping(mass, stiffness, lifted(self.ratios[0]))
         return Matrices(mass, damping, stiffness, q0, v0, pattern)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
@@ -162,20 +161,6 @@ class MatrixStructure:
         for k, row in enumerate(self.observed.values()):
             rows[k, : len(row)] = row
         return like.like(np.tile(rows, (like.value.size, 1, 1)))
-
-
-def _symmetric(kind: str, value: Any) -> Array:
-    """The array, also a sparse one, without the round-off that parts its triangles."""
-    array = np.asarray(value.toarray() if hasattr(value, "toarray") else value)
-    if array.ndim != 2 or array.shape[0] != array.shape[1]:
-        raise RefusedError(f"array of {kind}", f"of shape {array.shape}", "square arrays")
-    require_numbers(kind, array)
-    off = np.abs(array - array.T)
-    i, j = np.unravel_index(off.argmax(), off.shape)
-    if off[i, j] > 1e-9 * np.abs(array).max():
-        what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
-        raise RefusedError(f"array of {kind}", what, "symmetric arrays", "mirror one triangle")
-    return np.asarray((array + array.T) / 2, float)
 
 
 def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:

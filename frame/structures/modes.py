@@ -1,4 +1,4 @@
-"""Modes with derivatives: q(t; p) = 2 Re Σ C_k(p) exp(λ_k(p) t), complex or classical."""
+"""Modes with derivatives, q(t; p) = 2 Re Σ C_k(p) exp(λ_k(p) t), and damping that follows them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
 from alphacut.frame.structures.linear import Matrices
-from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.refused import FailedError, require
 
 
 def state_matrix(m: Matrices) -> Jet:
@@ -149,3 +149,40 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
     Z2 = second * weight
     right = X @ Jet(eye, Z1, Z2)
     return Jet(values, slope, np.einsum("...kk->...k", second)), right, inverse(right)
+
+
+def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
+    """D = 2 ζ M √(M⁻¹K) at S parameter sets: every mode has the ratio ζ, V = (S, n, n), in N s/m.
+
+    D follows the parameters through the modes; it is not frozen at their modal values. The root R
+    with R R = M⁻¹K is smooth however the frequencies lie.
+
+    Args:
+        mass: M, symmetric and positive definite, V = (S, n, n), in kg.
+        stiffness: K, symmetric and positive definite, V = (S, n, n), in N/m.
+        ratio: ζ, V = (S,).
+
+    Raises:
+        RefusedError: A stiffness is not positive definite.
+    """
+    operator, lower = inverse(mass) @ stiffness, np.linalg.cholesky(mass.value)
+    below = np.linalg.inv(lower)
+    squared, U = np.linalg.eigh(below @ (mass.value @ operator.value) @ below.swapaxes(-1, -2))
+    share = (squared / abs(squared).max(-1, keepdims=True)).min()
+    key, what = "squared frequency of a damped mode", f"{share:.1e} of the greatest"
+    cure = "give dampers, or join storeys that are too stiff"
+    require(share > 1e-12, key, what, "above rounding, 1e-12", cure)
+    omega = np.sqrt(squared)
+    X = below.swapaxes(-1, -2) @ U
+    Y = U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2)
+    total = omega[:, :, None] + omega[:, None, :]
+
+    def solved(right: Array) -> Array:
+        return np.asarray(X @ ((Y @ right @ X) / total) @ Y)
+
+    first, value = solved(operator.first), (X * omega[:, None, :]) @ Y
+    second = np.zeros((0, 0, *value.shape))
+    if len(operator.second):
+        pair = first[:, None] @ first[None, :]
+        second = solved(operator.second - pair - pair.swapaxes(0, 1))
+    return 2.0 * ratio[:, None, None] * (mass @ Jet(value, first, second))

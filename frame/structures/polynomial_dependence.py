@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import singledispatch
 from math import ceil, log, sqrt
 
 import numpy as np
@@ -29,7 +28,6 @@ class UnprovedError(FailedError):
     """A property that a proof needs does not hold, or is not known to hold."""
 
 
-@singledispatch
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
     """Degree of M, K, start, observation rows and D in each parameter, to round-off.
 
@@ -40,22 +38,31 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
         box: Lower and upper end of each uncertain parameter, in SI units.
 
     Raises:
-        UnprovedError: They are no polynomials, or the damping may feed energy into the structure
-            somewhere in the box.
+        UnprovedError: They are no polynomials, a parameter leaves its range, or the damping may
+            feed energy into the structure somewhere in the box.
     """
-    raise UnprovedError(
-        f"nothing is known about how a {type(system).__name__} depends on its parameters"
-    )
+    if not isinstance(system, StoreyFrame | MatrixStructure):
+        raise UnprovedError(f"nothing is known about the parameters of a {type(system).__name__}")
+    for name, ends in box.items():
+        if not (own := system.parameter(name)).admits(*ends):
+            what = f"{name} reaches from {ends[0]:g} to {ends[1]:g}"
+            raise UnprovedError(f"{what}, and is known to be {own.range or 'finite'}")
+    if isinstance(system, StoreyFrame):
+        return _of_storey_frame(system, box)
+    for kind in ("mass", "damping", "stiffness"):
+        for factor, array in getattr(system, kind):
+            if callable(factor):
+                raise UnprovedError(
+                    f"{kind} has a factor that is a function; only numbers and names of parameters"
+                    " are known polynomials"
+                )
+            if kind == "damping":
+                lowest = system.parameters[factor] if isinstance(factor, str) else factor
+                _require_dissipation(box.get(str(factor), (lowest,))[0], array)
+    return dict.fromkeys(box, 1)
 
 
-@degrees.register
-def _(system: StoreyFrame, box: Box) -> dict[str, int]:
-    common_ratio(system)  # raises where modes have their own
-    for name, (lower, _) in box.items():
-        if (name[0] == "d" or name.startswith(("rayleigh", "zeta"))) and lower < 0:
-            raise UnprovedError(
-                f"{name} reaches {lower:g}: a negative damper feeds energy into the structure"
-            )
+def _of_storey_frame(system: StoreyFrame, box: Box) -> dict[str, int]:
     degree = dict.fromkeys(box, 1)
     degree |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
     if accelerations(system):  # forces over masses; forces hold the masses too where weights press
@@ -71,43 +78,15 @@ def accelerations(system: LinearSystem) -> dict[int, int]:
     return {place: int(name[1:]) - 1 for place, name in named if name[0] == "a"}
 
 
-@degrees.register
-def _(system: MatrixStructure, box: Box) -> dict[str, int]:
-    ratio = common_ratio(system)
-    if isinstance(ratio, str) and box.get(ratio, (0.0, 0.0))[0] < 0:
-        raise UnprovedError(f"the damping ratio {ratio} may be negative and feed energy in")
-    for kind in ("mass", "damping", "stiffness"):
-        for factor, array in getattr(system, kind):
-            if callable(factor):
-                raise UnprovedError(
-                    f"{kind} has a factor that is a function; only numbers and names of parameters"
-                    " are known polynomials"
-                )
-            if kind == "damping":
-                lowest = system.parameters[factor] if isinstance(factor, str) else factor
-                _require_dissipation(box.get(str(factor), (lowest,))[0], array)
-    return dict.fromkeys(box, 1)
-
-
 def common_ratio(system: LinearSystem) -> str | float | None:
-    """Damping ratio of all modes, a number or the name of a parameter; None where there is none.
-
-    Raises:
-        UnprovedError: Modes have ratios of their own.
-    """
-    ratios = tuple(getattr(system, "ratios", ()))
-    if len(ratios) > 1 and len(ratios) == getattr(system, "size", len(ratios)):
-        raise UnprovedError(
-            "a damping ratio for each mode follows the modes, and that their frequencies stay apart"
-            " over the box is not proved; one ratio for all modes can be proved"
-        )
-    return ratios[0] if ratios else None
+    """Damping ratio of all modes, a number or the name of a parameter; None where there is none."""
+    return next(iter(getattr(system, "ratios", ())), None)
 
 
 def without_ratio(system: LinearSystem) -> LinearSystem:
     """The structure without its damping ratio, whose damping is a polynomial."""
     if isinstance(system, StoreyFrame):
-        return replace(system, damping_ratio=())
+        return replace(system, damping_ratio=None)
     assert isinstance(system, MatrixStructure)
     return replace(system, ratios=())
 
@@ -122,17 +101,13 @@ def _require_dissipation(factor: float, array: Array) -> None:
 
 
 def inverse_cube_degree(lower: float, upper: float) -> int:
-    """Degree at which the Chebyshev series of x⁻³ on an interval is round-off, of x⁻¹ too.
+    """Degree at which the series of x⁻³ on a positive interval is round-off, of x⁻¹ too.
 
     Inside the Bernstein ellipse with semi-axes sum ρ > 1 the function stays below M, and what
     follows after degree N is at most 2 M ρ^−N / (ρ − 1) (Trefethen, Approximation Theory and
     Approximation Practice, theorem 8.2).
     """
     share = (upper - lower) / (upper + lower)
-    if not 0 <= share < 1:
-        raise UnprovedError(
-            f"a length or mass between {lower:g} and {upper:g} is not positive throughout"
-        )
     if share == 0:
         return 0
 

@@ -16,17 +16,19 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
 from alphacut.frame.calculus.numbers import require_numbers
-from alphacut.frame.structures.damping import modal_damping
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.quantities import NOT_NEGATIVE, Output, Parameter, of_storey_frame
+from alphacut.frame.structures.modes import ratio_damping
+from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, real, require
+from alphacut.fuzzy.refused import RefusedError, chosen, real, require
 
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
-    **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}", "damping_ratio": "zeta{}"},
+    **{"q0": "q{}_0", "v0": "v{}_0", "second_moment": "I{}"},
 }
-"""Names of the parameters that each list holds, by floor, storey or mode."""
+"""Names of the parameters that each list holds, by floor or storey."""
+SINGLE = {"modulus": "E", "damping_ratio": "zeta"}
+"""The same of single values."""
 MADE = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
@@ -37,7 +39,7 @@ class StoreyFrame:
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
     storey), or "k1" … where stiffnesses are given (and "l1" … with gravity alone); "d1" …, "q1_0" …
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
-    and "zeta", or "zeta1" … where each mode has its own ratio.
+    and "zeta" where there is a damping ratio.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
@@ -56,8 +58,8 @@ class StoreyFrame:
         rayleigh: Mass and stiffness factors a (1/s), b (s) of a damping a M + b K added to the
             dampers.
         ground: Base excitation, if any; displacements are then relative to the ground.
-        damping_ratio: ζ of all modes, or one for each by rising frequency, added to the other
-            damping; it follows the parameters through the modes (`frame.damping`).
+        damping_ratio: ζ of all modes, added to the other damping; it follows the parameters through
+            the modes.
         columns: Columns in each storey, each with the second moment I; where a storey's are
             stiffer, their number times that ratio. Two in each when empty.
         stiffness: Stiffness k_z of each storey, in N/m, in place of modulus, second moment and
@@ -83,7 +85,7 @@ class StoreyFrame:
     outputs: tuple[str, ...] = ()
     rayleigh: tuple[float, float] = (0.0, 0.0)
     ground: Accelerogram | None = None
-    damping_ratio: float | Sequence[float] = ()
+    damping_ratio: float | None = None
     columns: Sequence[float] = ()
     stiffness: Sequence[float] = ()
     gravity: float = 0.0
@@ -95,7 +97,6 @@ class StoreyFrame:
         filled: dict[str, Sequence[float]] = {
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
         }
-        filled["damping_ratio"] = tuple(map(float, np.atleast_1d(self.damping_ratio)))
         filled["stiffness"] = tuple(self.stiffness)
         if not filled["stiffness"]:
             filled["columns"] = tuple(self.columns) or (2.0,) * n
@@ -109,26 +110,23 @@ class StoreyFrame:
 
     def _require_values(self) -> None:
         """Refuse what is no number or out of range, and lists that do not fit the floors."""
-        ranges = {name: of_storey_frame(of.format("")).range for name, of in SYMBOLS.items()}
-        ranges |= {"modulus": of_storey_frame("E").range}
-        ranges |= {"rayleigh": NOT_NEGATIVE, "gravity": NOT_NEGATIVE}
         n = len(self.masses)
         require(n > 0, "masses", None, "one value a floor, from below")
-        for name, rule in ranges.items():
-            values = getattr(self, name)
+        real("gravity", self.gravity, least=0)
+        for name, symbol in {**SYMBOLS, **SINGLE, "rayleigh": "rayleigh_mass"}.items():
+            values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
             if values is None:
                 continue
-            single = name in ("modulus", "gravity") or np.ndim(values) == 0
+            single = name in SINGLE or np.ndim(values) == 0
             (real if single else require_numbers)(name, values)
             for value in np.atleast_1d(values):
-                if not Parameter(name, range=rule).admits(value, value):
-                    raise RefusedError(name, f"{value:g}", rule or "finite numbers")
-            size = np.size(values)
-            one = size == 1 and name in ("second_moment", "damping_ratio")
-            if name in SYMBOLS and not one and size not in (0, n):
-                raise RefusedError(name, f"a list of {size}", f"{n}, as masses has, from below")
-        if self.damper_placement not in ("ground", "storey"):
-            raise RefusedError("damper_placement", self.damper_placement, "ground, storey")
+                allowed = parameter.range or "finite numbers"
+                require(parameter.admits(value, value), name, f"{value:g}", allowed)
+            sizes = (1, n) if name == "second_moment" else (0, n)
+            fits = name not in SYMBOLS or np.size(values) in sizes
+            what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
+            require(fits, name, what, allowed)
+        chosen("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
         """Either stiffnesses, or all that makes them; heights where weights press."""
@@ -156,8 +154,8 @@ class StoreyFrame:
 
     @property
     def ratios(self) -> dict[str, float]:
-        """Damping ratios by the names of their parameters; empty where there are none."""
-        return _named("zeta{}", np.atleast_1d(self.damping_ratio))
+        """Damping ratio by the name of its parameter; empty where there is none."""
+        return {} if self.damping_ratio is None else {"zeta": float(self.damping_ratio)}
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -184,10 +182,9 @@ class StoreyFrame:
         patterns |= {x: x + "{}" for x in "klcI" if f"{x}1" in self.parameters}
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
-        if name == "zeta" and self.ratios:
-            return tuple(self.ratios)
-        if name not in self.parameters:
-            raise RefusedError("parameter", name, ", ".join([*patterns, *self.parameters]))
+        require(
+            name in self.parameters, "parameter", name, ", ".join([*patterns, *self.parameters])
+        )
         return (name,)
 
     def springs(self, p: Mapping[str, Jet]) -> Jet:
@@ -219,7 +216,7 @@ class StoreyFrame:
             _require_standing(links.value, soft.value)
             stiffness = elastic - soft.map(chain)
         if self.ratios:
-            damping = damping + modal_damping(mass, stiffness, [p[name] for name in self.ratios])
+            damping = damping + ratio_damping(mass, stiffness, p["zeta"])
         q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
         return Matrices(mass, damping, stiffness, q0, v0)
 

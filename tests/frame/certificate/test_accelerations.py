@@ -23,7 +23,7 @@ def test_bounds_of_accelerations_hold_with_fuzzy_masses(gravity: float, zeta: fl
         stiffness=(1e6, k2),
         gravity=gravity,
         rayleigh=(a, b),
-        damping_ratio=(zeta,) if zeta else (),
+        damping_ratio=zeta or None,
         q0=(0.01, 0.02),
         outputs=("a1", "a2"),
     )

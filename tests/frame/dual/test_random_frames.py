@@ -37,7 +37,7 @@ def frame(rng):
         own |= {"lengths": tuple(rng.uniform(2.8, 4, n)), "modulus": 3e10}
         own |= {"second_moment": tuple(rng.uniform(2e-3, 6e-3, n))}
     if rng.random() < 0.5:
-        own |= {"damping_ratio": tuple(rng.uniform(0.02, 0.06, n if rng.random() < 0.5 else 1))}
+        own |= {"damping_ratio": float(rng.uniform(0.02, 0.06))}
     else:
         own |= {"rayleigh": (rng.uniform(0.2, 0.6), rng.uniform(5e-4, 2e-3))}
     free = rng.random() < 0.4
