@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.stochastic.theta.truncated_normal import Array
+from alphacut.fuzzy.arrays import Array
 
 
 @dataclass(frozen=True)

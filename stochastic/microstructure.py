@@ -24,8 +24,8 @@ from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.particles.particles import SPHERES, Shape
 from alphacut.stochastic.sections import Measured, Section, Simulated, reduced_radii
 from alphacut.stochastic.tessellation.delaunay import Neighbours, cell_correlation, neighbours
+from alphacut.stochastic.theta.law import TruncatedNormal
 from alphacut.stochastic.theta.quadrature import gauss_rule
-from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 MOST_CAPPED = 0.15  # share of the area that may lie in cells tighter than `Shape.reach`
 SAME = 1e-6  # differences of r_n up to which it is one value, but for round-off

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
-from alphacut.stochastic.theta.law import ThetaLaw, require_support
-from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
+from alphacut.stochastic.theta.law import ThetaLaw, TruncatedNormal, require_support
 
 RADII = "radii inside (0, 1), in halves of the cell's side"
 
@@ -97,11 +96,6 @@ class HermiteMap:
         """Reduced radius at `theta`, any shape."""
         radius = np.polynomial.polynomial.polyval(self.xi(theta), self.monomials)  # eq. 12
         return np.asarray(radius, float)
-
-    def slope(self, theta: ArrayLike) -> Array:
-        """dr/dξ at `theta`, any shape."""
-        derivative = np.polynomial.polynomial.polyder(self.monomials)
-        return np.asarray(np.polynomial.polynomial.polyval(self.xi(theta), derivative), float)
 
     def extremes(self) -> tuple[float, float]:
         """Least and greatest radius on the support."""

@@ -15,9 +15,8 @@ from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
-from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
+from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, whole_cells
 from alphacut.stochastic.tessellation.power_cells import cell_volumes
-from alphacut.stochastic.tessellation.whole_cells import whole_cells
 
 Progress = Callable[[float], None]
 FEWEST = 5  # packings

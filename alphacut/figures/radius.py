@@ -9,8 +9,8 @@ import numpy as np
 
 from alphacut.case.material import RadiusMap
 from alphacut.figures.style import GREY, INK, PURPLE, figure
+from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.theta.truncated_normal import Array
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

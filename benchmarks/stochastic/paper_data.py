@@ -24,7 +24,7 @@ from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.tessellation.apollonius import apollonius
-from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
+from alphacut.stochastic.theta.law import TruncatedNormal
 
 RESULTS = Path(__file__).parents[1] / "results"
 LIMITS = (0.13, 0.87)  # Fig. 12

@@ -50,8 +50,7 @@ def plot_cells(axes: Axes, diagram: Apollonius, view: Array | None = None) -> No
     from matplotlib.collections import LineCollection
 
     discs = diagram.discs
-    angle = np.asarray(np.linspace(diagram.start, diagram.end, 24), float)
-    rho = diagram.radius_at(np.arange(len(diagram.cell), dtype=np.intp), angle)
+    angle, rho = diagram.walls(24)
     along = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     points = discs.centres[diagram.cell] + rho[..., None] * along
     walls = np.concatenate([points + shift for shift in _shifts(discs)], axis=1)

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.radius_map import HermiteMap
+from alphacut.stochastic.theta.law import TruncatedNormal
 from alphacut.stochastic.theta.quadrature import gauss_rule
-from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
 
 # h1 … h4 of eq. 12 in powers of ξ
 SHAPES = np.array([[1.0, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]])

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.stochastic.particles.csv_columns import LengthColumns, length_columns
+from alphacut.stochastic.particles.csv_columns import length_columns
 from alphacut.stochastic.particles.neighbour_search import close_pairs, surface_distance
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import require_radii
@@ -34,9 +35,9 @@ class CircleFile:
         Raises:
             RefusedError: The file cannot be read, or a circle lies outside or overlaps another one.
         """
-        table = length_columns(self.path, ("x", "y", "r"))
-        centres, radii = table.values[:, :2], table.values[:, 2]
-        for row, centre, radius in zip(table.rows, centres, radii, strict=True):
+        rows, values = length_columns(self.path, ("x", "y", "r"))
+        centres, radii = values[:, :2], values[:, 2]
+        for row, centre, radius in zip(rows, centres, radii, strict=True):
             require_radii(f"{self.path.name}, row {row}", radius)
             if not ((centre >= 0) & (centre <= self.size)).all():
                 value = f"a centre {(1e3 * centre).round(6).tolist()} mm from the corner"
@@ -44,17 +45,17 @@ class CircleFile:
                 allowed = f"places in the section of {width} × {height} mm"
                 raise RefusedError(f"{self.path.name}, row {row}", value, allowed)
         discs = Particles(centres, radii, np.array(self.size), periodic=False)
-        self._refuse_overlap(discs, table)
+        self._refuse_overlap(discs, rows)
         return discs
 
-    def _refuse_overlap(self, discs: Particles, table: LengthColumns) -> None:
+    def _refuse_overlap(self, discs: Particles, rows: Rows) -> None:
         """Refuses the file where two circles overlap."""
         first, second = close_pairs(discs, 0.0)
         smaller = np.minimum(discs.radii[first], discs.radii[second])
         share = -surface_distance(discs, first, second) / smaller
         if share.max(initial=0.0) > ROUNDING:
             worst = int(np.argmax(share))
-            one, other = sorted(int(table.rows[k]) for k in (first[worst], second[worst]))
+            one, other = sorted(int(rows[k]) for k in (first[worst], second[worst]))
             raise RefusedError(
                 f"{self.path.name}, row {other}",
                 f"a circle that overlaps that of row {one} by {share[worst]:.2g} of its radius",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
@@ -22,26 +21,16 @@ HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*"
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
-@dataclass(frozen=True, eq=False)
-class LengthColumns:
-    """Columns of lengths.
-
-    Args:
-        rows: Row numbers as an editor shows them, shape (n,).
-        values: The columns in m, shape (n, columns).
-    """
-
-    rows: Rows
-    values: Array
-
-
-def length_columns(path: Path, columns: Sequence[str]) -> LengthColumns:
+def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
     """Columns of a file; others are not read.
 
     Args:
         path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are
             passed over.
         columns: Names of the columns; a column d of diameters may stand in for "r".
+
+    Returns:
+        Row numbers as an editor shows them, shape (n,), and the columns in m, shape (n, columns).
 
     Raises:
         RefusedError: The file cannot be read, a column or its unit is missing, or a field is no
@@ -50,7 +39,7 @@ def length_columns(path: Path, columns: Sequence[str]) -> LengthColumns:
     (_, header), *rows = fields(path)
     places = [_place(header, name, path) for name in columns]
     values = [[factor * number(path, row, cells, k) for k, factor in places] for row, cells in rows]
-    return LengthColumns(np.array([row for row, _ in rows]), np.array(values))
+    return np.array([row for row, _ in rows]), np.array(values)
 
 
 def fields(path: Path) -> list[tuple[int, list[str]]]:

@@ -78,19 +78,15 @@ class Particles:
         centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()
         allowed = f"{len(centres)} positions, of one particle or more"
-        alike = 0 < len(radii) == len(centres)
-        require(alike, "radii", f"{len(radii)} numbers", allowed)
-        positive = np.isfinite(size).all() and (size > 0).all()
-        require(positive, "size", size.tolist(), "positive, finite lengths in m")
-        _refuse(
-            np.asarray(~np.isfinite(centres).all(axis=1)), "centres", centres, "finite lengths in m"
-        )
+        require(0 < len(radii) == len(centres), "radii", f"{len(radii)} numbers", allowed)
+        _refuse(~((size > 0) & (size < np.inf)), "size", size, "positive, finite lengths in m")
+        _refuse(~np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
         _refuse(~((radii >= 0) & (radii < np.inf)), "radii", radii, "finite lengths from 0 m on")
         if self.periodic:
             wrapped = np.mod(centres, size)
             centres = np.where(wrapped < size, wrapped, 0.0)
         else:
-            outside = np.asarray(((centres < 0) | (centres > size)).any(axis=1))
+            outside = ((centres < 0) | (centres > size)).any(axis=1)
             _refuse(outside, "centres", centres, f"places in the window of {size.tolist()} m")
         for name, value in (("centres", centres), ("radii", radii), ("size", size)):
             object.__setattr__(self, name, value)
@@ -129,7 +125,7 @@ def nearest_image(apart: Array, size: Array) -> Array:
     return np.asarray(apart - size * np.round(apart / size))
 
 
-def _refuse(bad: Mask, name: str, values: Array, allowed: str) -> None:
+def _refuse(bad: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:
     """Refuses the first bad one of some values."""
     row = int(np.argmax(bad))
     require(not bad.any(), f"{name}[{row}]", values[row].tolist(), allowed)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,31 +13,9 @@ from numpy.typing import ArrayLike
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.stochastic.particles.csv_columns import length_columns
-from alphacut.stochastic.theta.truncated_normal import TruncatedNormal
+from alphacut.stochastic.theta.law import TruncatedNormal
 
 LEAST, MOST = 1e-12, 1e6  # m; no particle of a material is smaller or larger
-
-
-class RadiusLaw(Protocol):
-    """A distribution of radii in m between `smallest` and `largest`."""
-
-    @property
-    def smallest(self) -> float:
-        """Least radius, in m."""
-
-    @property
-    def largest(self) -> float:
-        """Greatest radius, in m."""
-
-    @property
-    def label(self) -> str:
-        """The law in words."""
-
-    def cdf(self, radius: ArrayLike) -> Array:
-        """P(r ≤ radius), any shape."""
-
-    def sample(self, number: int, generator: np.random.Generator) -> Array:
-        """`number` independent radii, shape (number,), in m."""
 
 
 def require_radii(key: str, radii: ArrayLike) -> None:
@@ -60,7 +38,6 @@ class LogNormalRadii:
     Args:
         smallest: Radius at the lower end of θ, in m.
         largest: Radius at the upper end, in m; equal to `smallest` for particles of one size.
-        distribution: Law of θ.
 
     Raises:
         RefusedError: The radii are out of range or not in order.
@@ -68,7 +45,8 @@ class LogNormalRadii:
 
     smallest: float
     largest: float
-    distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
+
+    distribution: ClassVar[TruncatedNormal] = TruncatedNormal()
 
     def __post_init__(self) -> None:
         require_radii("smallest_radius", self.smallest)
@@ -137,10 +115,10 @@ class MeasuredRadii:
         Raises:
             RefusedError: The file cannot be read, or a row has no radius.
         """
-        table = length_columns(path, ("r",))
-        for row, radius in zip(table.rows, table.values[:, 0], strict=True):
+        rows, values = length_columns(path, ("r",))
+        for row, radius in zip(rows, values[:, 0], strict=True):
             require_radii(f"{path.name}, row {row}", radius)
-        return cls(tuple(table.values[:, 0]), path.name)
+        return cls(tuple(values[:, 0]), path.name)
 
     @property
     def smallest(self) -> float:
@@ -171,3 +149,6 @@ class MeasuredRadii:
     def sample(self, number: int, generator: np.random.Generator) -> Array:
         """`number` independent radii, shape (number,), in m."""
         return np.asarray(np.interp(generator.random(number), self._grade, self.values), float)
+
+
+RadiusLaw = LogNormalRadii | MeasuredRadii

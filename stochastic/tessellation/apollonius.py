@@ -2,9 +2,8 @@
 
 The cell of disc i holds the points x with |x − c_i| − r_i ≤ |x − c_j| − r_j for all j. It is
 star-shaped around c_i, and bounded by 1/ρ(φ) = max_j (a_j cos φ + b_j sin φ + c_j): one hyperbola
-per neighbour (see `wall`), joined by an upper envelope (see `upper_envelopes`). In an open window
-the cells are cut at the window's edges, each of which acts as the wall towards the disc's own
-mirror image.
+per neighbour, joined by an upper envelope (see `upper_envelopes`). In an open window the cells are
+cut at the window's edges, each of which acts as the wall towards the disc's own mirror image.
 
 This differs from the paper in: 1. No triangulation of the discs is made; every cell stands on its
 own, so that touching, overlapping, and cocircular discs need no special case.
@@ -17,7 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import require
+from alphacut.stochastic.particles.neighbour_search import Pairs, pairs_within
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.circle_envelope import (
     Arcs,
@@ -25,9 +26,11 @@ from alphacut.stochastic.tessellation.circle_envelope import (
     sector_area,
     upper_envelopes,
 )
-from alphacut.stochastic.tessellation.surroundings import Pairs, pairs_within
 
 NEAR = 3.0  # mean spacings from a disc's edge within which discs bound its cell at first
+EDGES = np.array([np.pi, 0.0, -np.pi / 2, np.pi / 2])
+"""Directions of the left, right, lower and upper edge."""
+ANGLES = 33
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,22 +62,15 @@ class Apollonius:
         """r_n = r/a with a = √A/2 (section 4.1), shape (n,)."""
         return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
-    @property
-    def cut(self) -> Mask:
-        """True if the cell touches the edge of the window, shape (n,)."""
-        touched = np.zeros(len(self.discs), bool)
-        touched[self.cell[self.neighbour < 0]] = True
-        return touched
+    def walls(self, count: int) -> tuple[Array, Array]:
+        """`count` angles along each arc, its ends among them, and the distance of its wall there.
 
-    def wall(self) -> tuple[Array, Array]:
-        """Sums d + Δ and differences d − Δ of every arc (see `wall`), shape (m,), in m."""
-        return _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
-
-    def radius_at(self, arc: Rows, angle: Array) -> Array:
-        """Distance from the centre to the wall of `arc` at `angle` (broadcast), in m."""
-        near, far = (side[arc] for side in self.wall())
-        psi = angle - np.arctan2(self.apart[arc, 1], self.apart[arc, 0])
-        return np.asarray(near * far / ((far - near) + (far + near) * np.cos(psi)))
+        Two arrays of shape (count, m), the distance from the centre in m.
+        """
+        angle = np.asarray(np.linspace(self.start, self.end, count), float)
+        near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
+        psi = angle - np.arctan2(self.apart[:, 1], self.apart[:, 0])
+        return angle, near * far / ((far - near) + (far + near) * np.cos(psi))
 
 
 def apollonius(discs: Particles) -> Apollonius:
@@ -89,22 +85,16 @@ def apollonius(discs: Particles) -> Apollonius:
     """
     widest = float(discs.radii.max())
     largest = np.zeros(len(discs))
-    for _, walls in _walls(discs, np.full(len(discs), widest + NEAR * discs.spacing)):
+    for walls in _walls(discs, np.full(len(discs), widest + NEAR * discs.spacing)):
         largest += walls.largest_radius()
     areas, parts = np.zeros(len(discs)), []
-    for _, walls in _walls(discs, 2 * largest - discs.radii + widest):
+    for walls in _walls(discs, 2 * largest - discs.radii + widest):
         areas += walls.areas()
         arcs, pairs = walls.arcs, walls.pairs
         second, apart = pairs.second[arcs.function], pairs.apart[arcs.function]
         parts.append((arcs.owner, second, apart, arcs.start, arcs.end))
     columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Apollonius(discs, areas, *columns)
-
-
-def _walls(discs: Particles, reach: Array) -> Iterator[tuple[Rows, _Walls]]:
-    """Cells of portions of the discs with all others within reach as their neighbours."""
-    for of, pairs in pairs_within(discs, np.arange(len(discs), dtype=np.intp), reach):
-        yield of, _Walls.towards(discs, pairs, of=of)
 
 
 def _near_far(radii: Array, first: Rows, second: Rows, apart: Array) -> tuple[Array, Array]:
@@ -121,22 +111,6 @@ class _Walls:
     discs: Particles
     pairs: Pairs
     arcs: Arcs
-
-    @classmethod
-    def towards(cls, discs: Particles, others: Pairs, *, of: Rows) -> _Walls:
-        """Cells of the discs `of` with the `others` and their own images as only neighbours."""
-        near, far = _near_far(discs.radii, others.first, others.second, others.apart)
-        pairs = Pairs.join([others.where((near > 0) & (far > 0)), _bounds(discs, of)])
-        near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
-        direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
-        amplitude = 1 / near + 1 / far
-        arcs = upper_envelopes(
-            amplitude * direction[:, 0],
-            amplitude * direction[:, 1],
-            1 / near - 1 / far,
-            np.bincount(pairs.first, minlength=len(discs)),
-        )
-        return cls(discs, pairs, arcs)
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
         """Anomalies at both ends of every arc, and d + Δ, d − Δ of its wall."""
@@ -176,6 +150,23 @@ class _Walls:
         return largest
 
 
+def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
+    """Cells of portions of the discs, with all others within reach and own images around them."""
+    for of, others in pairs_within(discs, reach):
+        near, far = _near_far(discs.radii, others.first, others.second, others.apart)
+        pairs = Pairs.join([others.where((near > 0) & (far > 0)), _bounds(discs, of)])
+        near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
+        direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
+        amplitude = 1 / near + 1 / far
+        arcs = upper_envelopes(
+            amplitude * direction[:, 0],
+            amplitude * direction[:, 1],
+            1 / near - 1 / far,
+            np.bincount(pairs.first, minlength=len(discs)),
+        )
+        yield _Walls(discs, pairs, arcs)
+
+
 def _bounds(discs: Particles, of: Rows) -> Pairs:
     """Bounds of every cell: own images in a periodic box, mirror images in a window."""
     if discs.periodic:
@@ -187,3 +178,50 @@ def _bounds(discs: Particles, of: Rows) -> Pairs:
     apart[:, 0, 0], apart[:, 1, 0] = -2 * centres[:, 0], 2 * (discs.size[0] - centres[:, 0])
     apart[:, 2, 1], apart[:, 3, 1] = -2 * centres[:, 1], 2 * (discs.size[1] - centres[:, 1])
     return Pairs(np.repeat(of, 4), np.full(4 * len(of), -1), apart.reshape(-1, 2))
+
+
+def whole_cells(diagram: Apollonius) -> tuple[Rows, Array]:
+    """Cells clear of the window's edge, with weights that make up for the others.
+
+    A cell counts only if no disc whose centre lies beyond the window's edge could change it. Such a
+    disc, if none is larger than the largest one seen, shows no deeper in the window than that one's
+    radius; taking all that lies beyond for one such disc, the wall towards it is a parabola, ρ = (D
+    + r)/(1 + cos ψ), D the distance from the centre to the edge less the largest radius: the cell
+    is whole if ρ (1 + cos ψ) − r ≤ D all around, for all four edges. Large cells fail this more
+    often than small ones; each whole cell therefore stands for 1/p cells, p the share of places in
+    the window where its like would be whole (Miles 1974, Lantuéjoul 1978). This holds for a section
+    that looks the same everywhere, with every disc listed whose centre lies in the window.
+
+    Returns:
+        Indices of the discs whose cells are whole, shape (k,), and the number of cells that each
+        stands for, shape (k,); all and 1 in a periodic box.
+
+    Raises:
+        RefusedError: No cell is whole.
+    """
+    discs = diagram.discs
+    if discs.periodic:
+        return np.arange(len(discs), dtype=np.intp), np.ones(len(discs))
+    reach = _reach(diagram)
+    inner, (x, y) = discs.size - 2 * discs.radii.max(), discs.centres.T - discs.radii.max()
+    room = np.stack([x, inner[0] - x, y, inner[1] - y], axis=1)
+    touching = np.isin(np.arange(len(discs)), diagram.cell[diagram.neighbour < 0])
+    disc = np.flatnonzero((reach <= room).all(axis=1) & ~touching)
+    allowed = "windows in which the edge leaves a cell whole"
+    require(len(disc) > 0, "size", discs.size.tolist(), allowed, "take a larger section")
+    taken = reach[disc].reshape(-1, 2, 2).sum(axis=2)  # across and along
+    return disc, discs.measure / (inner - taken).prod(axis=1)
+
+
+def _reach(diagram: Apollonius) -> Array:
+    """Greatest ρ (1 + cos ψ) − r of each cell towards the four edges, shape (n, 4), in m.
+
+    The greatest of `ANGLES` on each arc, its ends among them: their second order is far below what
+    the largest disc beyond the edge is known by.
+    """
+    angle, rho = diagram.walls(ANGLES)
+    reach = np.full((len(diagram.discs), 4), -np.inf)
+    for edge, direction in enumerate(EDGES):
+        out = (rho * (1 + np.cos(angle - direction))).max(axis=0)
+        np.maximum.at(reach[:, edge], diagram.cell, np.where(rho.min(axis=0) > 0, out, np.inf))
+    return reach - diagram.discs.radii[:, None]

@@ -1,7 +1,10 @@
-"""Laws of the basic random variable θ (section 3.1)."""
+"""Laws of the basic random variable θ (section 3.1); the truncated normal is the paper's."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+from math import erfc, sqrt
 from typing import Protocol
 
 import numpy as np
@@ -10,11 +13,7 @@ from numpy.typing import ArrayLike
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 
-MASS_GAP = 1e-8
-"""Most by which the integral of a density may miss the difference of its distribution function."""
 NARROWEST = 1e-4  # width of a support over its greater end, beside which rounding is small
-_PANEL_GAP = 1e-13
-_HALVINGS, _MOST_PANELS = 48, 400
 
 
 class ThetaLaw(Protocol):
@@ -54,56 +53,70 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
     require(wide, "support of θ", [lower, upper], f"two finite ends, rising{apart}")
 
 
-def require_shares(share: Array) -> None:
-    """Refuse probabilities outside [0, 1].
-
-    Raises:
-        RefusedError: One lies outside.
-    """
-    inside = (share >= 0) & (share <= 1)
-    wrong = share[~inside]
-    require(not wrong.size, "probability", next(wrong.flat, None), "values in [0, 1]")
-
-
-def panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Edges of panels on which a rule integrates the density, rising, shape (m + 1,), m ≥ n.
-
-    A panel whose integrals miss those by the distribution function is halved. Corners and
-    jumps of the density, steep ends and narrow peaks are met by halving alone.
+@dataclass(frozen=True)
+class TruncatedNormal:
+    """Standard normal law cut to [lower, upper], its density normalised there.
 
     Args:
-        law: Law of θ.
-        edges: To begin with, rising, shape (n + 1,).
-        rule: Nodes and weights of a rule on [−1, 1].
+        lower: Left end of the support, in standard deviations.
+        upper: Right end of the support, greater than `lower`.
 
     Raises:
-        RefusedError: What all panels miss together stays above `MASS_GAP`: density and distribution
-            function are not of one law, or the density is not finite.
+        RefusedError: The ends are not finite or not in order.
     """
-    for _ in range(_HALVINGS):
-        gaps = _mass_gaps(law, edges, rule)
-        coarse = np.flatnonzero(~(gaps <= _PANEL_GAP))  # also where a gap is not a number
-        if not coarse.size or len(edges) > _MOST_PANELS:
-            break
-        edges = np.insert(edges, coarse + 1, (edges[coarse] + edges[coarse + 1]) / 2)
-    total = float(_mass_gaps(law, edges, rule).sum())
-    key = "probability between the density of θ and its distribution function"
-    cure = "pdf must be the derivative of cdf, finite everywhere on the support"
-    require(total <= MASS_GAP, key, f"{total:.1e}", f"differences up to {MASS_GAP:g}", cure)
-    return edges
+
+    lower: float = -3.0
+    upper: float = 3.0
+
+    def __post_init__(self) -> None:
+        require_support(self.lower, self.upper, unit=1.0)
+        cure = "the standard normal law gives this one no probability"
+        ends = [self.lower, self.upper]
+        require(self.mass > 0, "support of θ", ends, "ends nearer to 0", cure)
+
+    @cached_property
+    def mass(self) -> float:
+        """Probability that the uncut standard normal gives to the support."""
+        return float(self._below(self.upper))
+
+    def _below(self, theta: ArrayLike) -> Array:
+        """Uncut probability of [lower, theta], a difference of the smaller tails."""
+        if self.lower > 0:
+            return _normal(-self.lower) - _normal(-np.asarray(theta))
+        return _normal(theta) - _normal(self.lower)
+
+    def pdf(self, theta: ArrayLike) -> Array:
+        """Density f_Θ at `theta` (any shape); zero outside the support."""
+        theta = np.asarray(theta, float)
+        inside = (theta >= self.lower) & (theta <= self.upper)
+        return np.where(inside, np.exp(-(theta**2) / 2) / (np.sqrt(2 * np.pi) * self.mass), 0.0)
+
+    def cdf(self, theta: ArrayLike) -> Array:
+        """P(Θ ≤ theta), any shape."""
+        inside = np.clip(np.asarray(theta, float), self.lower, self.upper)
+        return np.asarray(self._below(inside) / self.mass, float)
+
+    def quantile(self, probability: ArrayLike) -> Array:
+        """The θ below which a share `probability` in [0, 1] lies, any shape."""
+        from scipy.special import ndtri
+
+        share = np.asarray(probability, float)
+        wrong = share[~((share >= 0) & (share <= 1))]
+        require(not wrong.size, "probability", next(wrong.flat, None), "values in [0, 1]")
+        theta = (
+            -ndtri(_normal(-self.lower) - share * self.mass)
+            if self.lower > 0
+            else ndtri(_normal(self.lower) + share * self.mass)
+        )
+        return np.asarray(np.clip(theta, self.lower, self.upper))
+
+    def sample(self, number: int, generator: np.random.Generator) -> Array:
+        """`number` independent values of θ, shape (number,)."""
+        return self.quantile(generator.random(number))
 
 
-def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Probability by which the rule on each panel misses that of the distribution function F.
-
-    Of f and of x f, x from −1 to 1 over the panel, whose integral is [x F] − ∫ F dx: a jump right
-    in the middle of a panel shows in the second alone.
-    """
-    x, w = rule
-    half = np.diff(edges)[:, None] / 2
-    theta = edges[:-1, None] + half * (1 + x)
-    mass, below = half * w * law.pdf(theta), law.cdf(edges)
-    even = mass.sum(axis=1) - np.diff(below)
-    odd = (mass * x).sum(axis=1) - (below[1:] + below[:-1] - (w * law.cdf(theta)).sum(axis=1))
-    gaps: Array = np.maximum(np.abs(even), np.abs(odd))
-    return gaps
+def _normal(theta: ArrayLike) -> Array:
+    """Distribution function of the standard normal law, any shape; SciPy would start later."""
+    values = np.asarray(theta, float)
+    shares = [erfc(-one / sqrt(2)) / 2 for one in values.ravel()]
+    return np.array(shares).reshape(values.shape)

@@ -8,8 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real
-from alphacut.stochastic.theta.law import ThetaLaw, panel_edges
+from alphacut.fuzzy.refused import real, require
+from alphacut.stochastic.theta.law import ThetaLaw
+
+MASS_GAP = 1e-8
+"""Most by which the integral of a density may miss the difference of its distribution function."""
+_PANEL_GAP = 1e-13
+_HALVINGS, _MOST_PANELS = 48, 400
+_FIRST_PANELS = 64
+_NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
+FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
+LARGEST = 30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
+MOST = 40  # nodes of a polynomial
 
 
 @dataclass(frozen=True)
@@ -27,10 +37,6 @@ class ThetaRule:
     def mean(self, values: Array) -> Array:
         """Mean of `values`, shape (n, …), under f_Θ."""
         return np.asarray(np.tensordot(self.weights, values, axes=1), float)
-
-
-_MOST_PANELS = 64  # to begin with
-_NEGLIGIBLE = 1e-200  # weight of nodes so far off that polynomials overflow there
 
 
 def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRule:
@@ -85,15 +91,54 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
 
 def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
     """Legendre rule in panels of at most 1 that integrates the density."""
-    panels = min(math.ceil(law.upper - law.lower), _MOST_PANELS)
+    panels = min(math.ceil(law.upper - law.lower), _FIRST_PANELS)
     edges = np.asarray(np.linspace(law.lower, law.upper, panels + 1), float)
     rule = np.polynomial.legendre.leggauss(points)
-    return _weighted(law, panel_edges(law, edges, rule), rule)
+    return _weighted(law, _panel_edges(law, edges, rule), rule)
 
 
-FEWEST = 10  # nodes, from which on a polynomial through those of a Gauss rule beats pieces
-LARGEST = 30.0  # Lebesgue constant of a polynomial that is trusted; rules in layers have far more
-MOST = 40  # nodes of a polynomial
+def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
+    """Edges of panels on which a rule integrates the density, rising, shape (m + 1,), m ≥ n.
+
+    A panel whose integrals miss those by the distribution function is halved. Corners and
+    jumps of the density, steep ends and narrow peaks are met by halving alone.
+
+    Args:
+        law: Law of θ.
+        edges: To begin with, rising, shape (n + 1,).
+        rule: Nodes and weights of a rule on [−1, 1].
+
+    Raises:
+        RefusedError: What all panels miss together stays above `MASS_GAP`: density and distribution
+            function are not of one law, or the density is not finite.
+    """
+    for _ in range(_HALVINGS):
+        gaps = _mass_gaps(law, edges, rule)
+        coarse = np.flatnonzero(~(gaps <= _PANEL_GAP))  # also where a gap is not a number
+        if not coarse.size or len(edges) > _MOST_PANELS:
+            break
+        edges = np.insert(edges, coarse + 1, (edges[coarse] + edges[coarse + 1]) / 2)
+    total = float(_mass_gaps(law, edges, rule).sum())
+    key = "probability between the density of θ and its distribution function"
+    cure = "pdf must be the derivative of cdf, finite everywhere on the support"
+    require(total <= MASS_GAP, key, f"{total:.1e}", f"differences up to {MASS_GAP:g}", cure)
+    return edges
+
+
+def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
+    """Probability by which the rule on each panel misses that of the distribution function F.
+
+    Of f and of x f, x from −1 to 1 over the panel, whose integral is [x F] − ∫ F dx: a jump right
+    in the middle of a panel shows in the second alone.
+    """
+    x, w = rule
+    half = np.diff(edges)[:, None] / 2
+    theta = edges[:-1, None] + half * (1 + x)
+    mass, below = half * w * law.pdf(theta), law.cdf(edges)
+    even = mass.sum(axis=1) - np.diff(below)
+    odd = (mass * x).sum(axis=1) - (below[1:] + below[:-1] - (w * law.cdf(theta)).sum(axis=1))
+    gaps: Array = np.maximum(np.abs(even), np.abs(odd))
+    return gaps
 
 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:

@@ -75,8 +75,7 @@ def raster_shares(discs: Particles, pixels: int) -> np.ndarray:
 
 def perimeter(diagram) -> np.ndarray:
     """Length of each cell's boundary, to about a percent."""
-    angle = np.linspace(diagram.start, diagram.end, 17)
-    rho = diagram.radius_at(np.arange(len(diagram.cell)), angle)
+    angle, rho = diagram.walls(17)
     x, y = rho * np.cos(angle), rho * np.sin(angle)
     return np.bincount(
         diagram.cell,
@@ -213,18 +212,14 @@ def test_arcs_close_and_meet():
         arc = np.flatnonzero(diagram.cell == cell)
         assert diagram.end[arc[:-1]] == pytest.approx(diagram.start[arc[1:]], abs=1e-12)
         assert diagram.end[arc[-1]] == pytest.approx(diagram.start[arc[0]] + 2 * np.pi, abs=1e-12)
-        outgoing, incoming = (
-            diagram.radius_at(arc, diagram.end[arc]),
-            diagram.radius_at(np.roll(arc, -1), diagram.start[np.roll(arc, -1)]),
-        )
-        assert outgoing == pytest.approx(incoming, rel=1e-6)
+        incoming, outgoing = diagram.walls(2)[1][:, arc]
+        assert outgoing == pytest.approx(np.roll(incoming, -1), rel=1e-6)
 
 
 def test_walls_are_equally_far_from_both_discs():
     discs = Particles(np.random.default_rng(2).random((40, 2)), np.linspace(0.01, 0.06, 40), (1, 1))
     diagram = apollonius(discs)
-    angle = (diagram.start + diagram.end) / 2
-    rho = diagram.radius_at(np.arange(len(angle)), angle)
+    angle, rho = (middle[1] for middle in diagram.walls(3))
     beyond = rho[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1) - diagram.apart
     towards = np.hypot(beyond[:, 0], beyond[:, 1]) - discs.radii[diagram.neighbour]
     assert towards == pytest.approx(rho - discs.radii[diagram.cell], abs=1e-12)

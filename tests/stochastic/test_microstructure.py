@@ -22,9 +22,8 @@ from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Measured, Simulated, reduced_radii, section_of
-from alphacut.stochastic.tessellation.apollonius import apollonius
+from alphacut.stochastic.tessellation.apollonius import apollonius, whole_cells
 from alphacut.stochastic.tessellation.delaunay import neighbours
-from alphacut.stochastic.tessellation.whole_cells import whole_cells
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 SOURCE = Simulated(Packing(300, 0.2, TENFOLD), 12)

@@ -9,9 +9,9 @@ from scipy import stats
 from scipy.spatial.distance import pdist
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.stochastic.particles import relaxation
+from alphacut.stochastic.particles import packing as packings
 from alphacut.stochastic.particles.neighbour_search import close_pairs
-from alphacut.stochastic.particles.packing import Packing, random_sequential
+from alphacut.stochastic.particles.packing import Packing, random_sequential, relaxed
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
 from alphacut.stochastic.sections import Simulated
@@ -81,7 +81,7 @@ def _generator():
 
 def test_what_finds_no_place_fails_with_the_numbers():
     with pytest.raises(FailedError, match="still overlap"):
-        relaxation.relaxed(np.ones(40), np.full(2, 11.5), _generator())
+        relaxed(np.ones(40), np.full(2, 11.5), _generator())
     with pytest.raises(FailedError, match=r"no place for \d+ of"):
         random_sequential(np.ones(300), np.full(2, 36.0), _generator())
 
@@ -92,7 +92,7 @@ def test_particles_without_meaning_are_refused():
         (dict(radii=[0.1]), "radii"),
         (dict(radii=[0.1, -0.2]), "radii[1]"),
         (dict(radii=[0.1, np.nan]), "radii[1]"),
-        (dict(size=(1, 0)), "size"),
+        (dict(size=(1, 0)), "size[1]"),
         (dict(centres=[(0.1, 0.1), (2, 0.5)], periodic=False), "centres[1]"),
     ):
         with pytest.raises(RefusedError) as refused:
@@ -112,9 +112,9 @@ def test_sequential_centres_are_uniform_and_without_direction():
 def test_shaking_brings_discs_nearer_than_pushing_left_them(monkeypatch):
     box = np.full(2, np.sqrt(400 * np.pi / 0.6))
     nearest = []
-    for sweeps in (0, relaxation.SWEEPS):
-        monkeypatch.setattr(relaxation, "SWEEPS", sweeps)
-        centres = relaxation.relaxed(np.ones(400), box, np.random.default_rng(1))
+    for sweeps in (0, packings.SWEEPS):
+        monkeypatch.setattr(packings, "SWEEPS", sweeps)
+        centres = relaxed(np.ones(400), box, np.random.default_rng(1))
         nearest.append(np.sort(pdist(centres) - 2)[:40].mean())
     assert nearest[1] < 0.5 * nearest[0]
 
