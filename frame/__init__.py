@@ -8,11 +8,10 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
-from alphacut.frame.methods.named import METHODS
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
-from alphacut.frame.propagation import envelope
+from alphacut.frame.propagation import METHODS, envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
 from alphacut.frame.checks.admissible import require_admissible
-from alphacut.frame.checks.between_nodes import with_stray
-from alphacut.frame.checks.step_error import require_stable, step_error, with_step_error
+from alphacut.frame.checks.step_error import (
+    require_stable,
+    step_error,
+    with_step_error,
+    with_stray,
+)
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
@@ -19,8 +24,8 @@ from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.auto import Auto
 from alphacut.frame.methods.graph_follower import GraphFollower
 from alphacut.frame.methods.improved_follower import ImprovedFollower
-from alphacut.frame.methods.named import Method, named
 from alphacut.frame.methods.proof import Proof
+from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
@@ -30,10 +35,25 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, chosen, require
 
 JUDGED = 4
 """Most inputs of a follower's envelope that a proof is made beside."""
+
+
+class Method(Protocol):
+    """How an envelope is found; a frozen dataclass whose fields are its options."""
+
+    name: ClassVar[str]
+
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+        """Envelope of all outputs on all levels."""
+
+
+METHODS: dict[str, type[Any]] = {
+    x.name: x for x in (Auto, Proof, DualProof, Search, GraphFollower, ImprovedFollower, Sampled)
+}
+"""The methods by the words that a case file has for them."""
 
 
 def envelope(
@@ -122,14 +142,16 @@ def _method(
     method: Method | str | None,
     options: Mapping[str, object],
 ) -> Method:
-    if isinstance(method, str):
-        return named(method, options)
     if method is None:
-        name = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
-        return named(name, options)
-    if options:
-        raise RefusedError("options", [*options], "none beside a method that is no name")
-    return method
+        method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
+    if not isinstance(method, str):
+        require(not options, "options", [*options], "none beside a method that is no name")
+        return method
+    chosen("method", method, METHODS)
+    for option in options:
+        chosen(f"option of {method}", option, [field.name for field in fields(METHODS[method])])
+    made: Method = METHODS[method](**options)
+    return made
 
 
 def _flow(

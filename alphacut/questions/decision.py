@@ -9,8 +9,7 @@ import numpy as np
 from alphacut.figures import style
 from alphacut.figures.style import GREY, INK, ORANGE, colours
 from alphacut.frame import Auto, envelope
-from alphacut.frame.questions.passing import ANY, Passing, passing
-from alphacut.frame.questions.peaks import peaks
+from alphacut.frame.questions.peaks import ANY, Passing, passing, peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.units import engineering

@@ -12,7 +12,7 @@ from alphacut.case.structure import Structure
 from alphacut.case.types import Quantity
 from alphacut.figures import style
 from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
-from alphacut.frame.questions.passing import ANY
+from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.questions.probability import Probability as Bounds
 from alphacut.frame.questions.probability import probabilities
 from alphacut.frame.structures.quantities import Output

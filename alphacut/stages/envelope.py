@@ -12,7 +12,6 @@ import numpy as np
 from alphacut import frame
 from alphacut.case.motion import Envelope, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.methods.named import options_of
 from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import FailedError, require
@@ -63,7 +62,7 @@ class EnvelopeTask:
         """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
         method, own = self.section.method, self.tolerance(structure).value
         auto = method == "auto" and self.section.tolerance is None
-        if auto or "tolerance" not in options_of(method):
+        if auto or not hasattr(frame.METHODS[method], "tolerance"):
             return {}
         return {"tolerance": own * (self.section.gain if method in FOLLOWERS else 1.0)}
 

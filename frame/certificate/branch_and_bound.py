@@ -11,13 +11,14 @@ the Taylor model there, made less concave by the remainder. Else it is halved.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.certificate.frontier import Frontier
+from alphacut.frame.certificate.kernel import FACES, examine
 from alphacut.frame.certificate.remainder import Remainder
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import refine
@@ -28,23 +29,8 @@ PIECE = 30_000
 """Items examined together."""
 HIGHER = 1e-10
 """Least gain for which a better point is taken over."""
-
-
-@dataclass(frozen=True, eq=False)
-class Enclosed:
-    """Outcome for N problems.
-
-    Args:
-        point: Best points, shape (N, d).
-        value: side × output there, shape (N,).
-        proved: Proved bounds above `value`, shape (N,).
-        boxes: Boxes looked at, each as often as there are problems that need it.
-    """
-
-    point: Array
-    value: Array
-    proved: Array
-    boxes: int
+LOWER, UPPER = -1, -2
+"""Places of an axis that is confined to an end of the domain."""
 
 
 def enclosed(
@@ -57,8 +43,8 @@ def enclosed(
     budget: float = 4000,
     workers: int = 1,
     progress: Progress | None = None,
-) -> Enclosed:
-    """Encloses all problems of `optima`, whose points are the best known so far.
+) -> tuple[Array, int]:
+    """Encloses all problems of `optima`, whose points are the best known so far and improve.
 
     Args:
         model: The modal model.
@@ -69,6 +55,10 @@ def enclosed(
         budget: Most boxes per problem on average; where it ends, the gap reported is wider.
         workers: Threads; the result does not depend on their number.
         progress: Called with the fraction done.
+
+    Returns:
+        Proved bounds above the values, shape (N,), and boxes looked at, each as often as there are
+        problems that need it.
     """
     tree = Tree.of(model, lower, upper, optima, gap)
     frontier, size, used = Frontier.whole(len(lower), tree.numbers), len(tree.numbers), 0
@@ -77,8 +67,7 @@ def enclosed(
         frontier = tree.examined(frontier, workers)
         if progress:
             progress(1 - len(np.unique(frontier.problem)) / size)
-    proved = tree.proved(frontier)  # what the budget left open keeps its own bound
-    return Enclosed(optima.point, optima.value, proved, used)
+    return tree.proved(frontier), used  # what the budget left open keeps its own bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +137,6 @@ class Tree:
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
         """Codes, side × output at the centres and upper bounds of some items; see `kernel`."""
-        from alphacut.frame.certificate.kernel import examine  # Numba takes time to import
-
         model, over, d = self.model, self.remainder, len(self.lower)
         n, m = model.count, len(model.outputs)
         centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
@@ -198,6 +185,97 @@ class Tree:
         row, column = np.triu_indices(g.shape[1])
         self.best[own], self.point[own] = optima.value[which], point
         self.jets[own] = np.column_stack([f, g, H[:, row, column]])
+
+
+@dataclass(frozen=True, eq=False)
+class Frontier:
+    """Open items by box, node and column.
+
+    Along each axis a box is a dyadic interval of the domain, 2^depth + index, or one of its ends,
+    `LOWER` or `UPPER`.
+
+    Args:
+        place: Intervals of the boxes, shape (B, d).
+        box: Box of each item, rising, shape (I,).
+        problem: Number of its problem, rising for each box, shape (I,).
+    """
+
+    place: Array
+    box: Array
+    problem: Array
+
+    @classmethod
+    def whole(cls, d: int, problems: Array) -> Frontier:
+        """The domain for all `problems` (N,)."""
+        return cls(np.ones((1, d), np.int64), np.zeros(len(problems), np.int64), problems)
+
+    def __len__(self) -> int:
+        return len(self.box)
+
+    def geometry(
+        self, lower: Array, upper: Array, boxes: slice = slice(None)
+    ) -> tuple[Array, Array, Array]:
+        """Centres and radii (B, d) in the domain, and which faces are its own (B, 2, d)."""
+        place = self.place[boxes]
+        inner = np.maximum(place, 1)
+        width = 2.0 ** -np.floor(np.log2(inner + 0.5))  # share of the domain
+        begin = inner * width - 1
+        ends = [place == LOWER, place == UPPER]
+        share = np.select(ends, [0.0, 1.0], begin + width / 2)
+        radius = np.where(place < 0, 0.0, (upper - lower) / 2 * width)
+        return (
+            lower + (upper - lower) * share,
+            radius,
+            np.stack([begin == 0, begin + width == 1], 1),
+        )
+
+    def pieces(self, most: int) -> Iterator[tuple[slice, slice]]:
+        """Boxes and items in parts of about `most` items, box by box."""
+        ends = np.append(np.searchsorted(self.box, np.arange(len(self.place))), len(self))
+        start = 0
+        while start < len(self.place):
+            stop = int(np.searchsorted(ends, ends[start] + most, "right")) - 1
+            stop = min(max(stop, start + 1), len(self.place))
+            yield slice(start, stop), slice(int(ends[start]), int(ends[stop]))
+            start = stop
+
+    def children(self, code: Array) -> Frontier:
+        """Boxes and items that the examination's codes (I,) leave open."""
+        d = self.place.shape[1]
+        split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
+        count, box = 2 * d + 3**d, self.box[split]
+        votes = np.bincount(box * d + code[split] - 1, minlength=d * len(self.place))
+        halves = box * count + 2 * votes.reshape(-1, d).argmax(1)[box]
+        faces = self.box[faced] * count + 2 * d + code[faced] - FACES
+        keys = np.concatenate([halves, halves + 1, faces])
+        problem = self.problem[np.concatenate([split, split, faced])]
+        fresh = np.unique(keys)
+        place, merged = _distinct(self._places(fresh, count))
+        most = int(problem.max(initial=0)) + 1
+        items = np.unique(merged[np.searchsorted(fresh, keys)] * most + problem)
+        return Frontier(place, *np.divmod(items, most))
+
+    def _places(self, keys: Array, count: int) -> Array:
+        """Intervals of the children with these keys, shape (K, d)."""
+        d = self.place.shape[1]
+        place: Array = self.place[keys // count].copy()
+        local = keys % count
+        rows = np.flatnonzero(local < 2 * d)
+        axis, half = np.divmod(local[rows], 2)
+        place[rows, axis] = 2 * place[rows, axis] + half
+        rows = np.flatnonzero(local >= 2 * d)
+        ternary = (local[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
+        place[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], place[rows])
+        return np.asarray(place)
+
+
+def _distinct(rows: Array) -> tuple[Array, Array]:
+    """Distinct rows (B, d) of integers, rising, and which of them each row is, as `np.unique`."""
+    order = np.lexsort(rows.T[::-1])
+    fresh = np.any(np.diff(rows[order], axis=0, prepend=-3), axis=1)
+    number = np.empty(len(rows), np.int64)
+    number[order] = np.cumsum(fresh) - 1
+    return rows[order][fresh], number
 
 
 def _tables(rate: Array, C: Array, d: int) -> Array:

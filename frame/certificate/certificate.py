@@ -8,11 +8,11 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.certificate.branch_and_bound import Enclosed, enclosed
-from alphacut.frame.certificate.remainder import Remainder, largest_growth, suprema
-from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.certificate.branch_and_bound import enclosed
+from alphacut.frame.certificate.remainder import Remainder, largest_growth, parts, suprema
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import first_optima
+from alphacut.frame.modal.optima import Optima
 from alphacut.fuzzy.progress_bar import Progress, share
 
 LEFT = 0.02
@@ -76,21 +76,20 @@ def certify(
             f"certify: the gap {gap:.3g} is not above twice the model error, {limit:.3g}; ask"
             " for a wider gap or a lower tolerance"
         )
-    levels, done = len(model.boxes.alpha), list[Enclosed]()
+    levels, done = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
     for level in reversed(range(levels)):
         tick = share(progress, len(done) / levels, (len(done) + 1) / levels)
         lower, upper = model.boxes.unit(level)
         optima = first_optima(model, lower, upper, LEFT * slack)
         if done:  # what the level inside attains is attained here too
-            kept = done[-1].value > optima.value
-            optima.value[kept], optima.point[kept] = done[-1].value[kept], done[-1].point[kept]
-        how = {"gap": slack, "budget": budget}
-        done.append(enclosed(model, lower, upper, optima, **how, workers=workers, progress=tick))
+            kept = (inside := done[-1][0]).value > optima.value
+            optima.value[kept], optima.point[kept] = inside.value[kept], inside.point[kept]
+        how = {"gap": slack, "budget": budget, "workers": workers}
+        done.append((optima, *enclosed(model, lower, upper, optima, **how, progress=tick)))
     shape = (levels, *error.shape, 2)
-    inner, outer, at = (
-        np.stack([getattr(part, name) for part in done[::-1]]).reshape(*shape, *extra)
-        for name, extra in (("value", ()), ("proved", ()), ("point", (len(model.boxes.names),)))
-    )
+    inner = np.stack([optima.value for optima, *_ in done[::-1]]).reshape(shape)
+    at = np.stack([optima.point for optima, *_ in done[::-1]]).reshape(*shape, -1)
+    outer = np.stack([proved for _, proved, _ in done[::-1]]).reshape(shape)
     # what holds on a wider box holds on those inside it
     outer = np.minimum.accumulate(outer, axis=0) + error[..., None]
     between = _between(model) + _growth(model, error)
@@ -99,7 +98,7 @@ def certify(
         at,
         outer * unit,
         between * scale,
-        sum(part.boxes for part in done),
+        sum(used for *_, used in done),
     )
 
 

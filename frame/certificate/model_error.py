@@ -18,8 +18,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
-from alphacut.frame.certificate.remainder import largest_growth, suprema
-from alphacut.frame.certificate.wave_bounds import Part, parts
+from alphacut.frame.certificate.remainder import Part, largest_growth, parts, suprema
 from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence as dependence

@@ -20,8 +20,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, fit
-from alphacut.frame.modal.analyses import analyse
-from alphacut.frame.modal.fitting import fit_points
+from alphacut.frame.modal.fitting import analyse, fit_points
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence as dependence
 

@@ -1,4 +1,4 @@
-"""Error of time stepping and of a reduction in an envelope, and steps too long for the scheme."""
+"""Errors of time steps in an envelope: at nodes, between them, and of steps too long."""
 
 from __future__ import annotations
 
@@ -25,6 +25,12 @@ GROWTH = 1e-6
 """Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
+AT_ONCE = 16
+"""Trajectories that are held at once."""
+SAFETY = 1.5
+"""Factor on the largest stray of the trajectories looked at."""
+FLOOR = 0.1
+"""Least stray of a step, as a share of the largest of all steps."""
 
 
 def probes(cuts: Boxes) -> Array:
@@ -121,3 +127,41 @@ def require_stable(flow: Flow, cuts: Boxes) -> None:
             f"at most {most:.3g} s for {flow.integrator.name}",
             "the integrators exact and midpoint are always stable",
         )
+
+
+def with_stray(of: Envelope, flow: UnitFlow) -> Envelope:
+    """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
+    if of.between is not None:
+        return of
+    corners = probes(flow.boxes)
+    between = stray(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
+    facts = {**of.facts, "between_nodes": float((between / flow.scale).max())}
+    return replace(of, between=between, facts=facts)
+
+
+def stray(flow: Flow, points: Array) -> Array:
+    """Estimate of how far outputs stray from straight lines between nodes, shape (T, m).
+
+    Row j is that of the step that ends at node j, 0 for the first node.
+
+    Args:
+        flow: The trajectories.
+        points: Parameters of those that are looked at, shape (S, d), in SI units.
+    """
+    pieces = np.array_split(points, -(-len(points) // AT_ONCE))
+    off = np.max([_off(flow, some) for some in pieces], axis=0)
+    # where the trajectories looked at are straight, others are not
+    near = [np.roll(off, k, 0) for k in (-1, 0, 1)]
+    near.append(np.broadcast_to(FLOOR * off.max(0), off.shape))
+    return np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(near, 0)])
+
+
+def _off(flow: Flow, points: Array) -> Array:
+    """Largest distance of trajectories from straight lines in each step, shape (T − 1, m)."""
+    finer, parts = flow.finer()
+    fine = finer.values(points)
+    ends = fine[:, ::parts]
+    share = (np.arange(1, parts) / parts)[:, None]
+    inner = fine[:, :-1].reshape(len(fine), -1, parts, fine.shape[-1])[:, :, 1:]
+    straight = ends[:, :-1, None] * (1 - share) + ends[:, 1:, None] * share
+    return np.asarray(np.abs(inner - straight).max((0, 2)))

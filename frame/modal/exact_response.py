@@ -12,8 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.calculus.polynomial import Polynomial, fit
-from alphacut.frame.modal.analyses import analyse
-from alphacut.frame.modal.fitting import fit_points
+from alphacut.frame.modal.fitting import analyse, fit_points
 from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures.modes import Modes

@@ -3,6 +3,11 @@
 At the nodes no motion peaks higher than its envelope, and each has at least the magnitude that its
 band is away from zero. Both are read off bounds that exclude values and bounds that are attained,
 so that a peak is as sure as its envelope; what the steps between nodes may add counts as error.
+
+Exceeding a limit is possible to the degree of the highest α-cut that holds such a motion. It is
+necessary to one less the degree to which not exceeding it is possible (Dubois and Prade,
+Possibility Theory, chapter 1). The α-cut of a peak is the answer: a peak that stays below the limit
+excludes the motion on its level and above. One that is attained above it proves the possibility.
 """
 
 from __future__ import annotations
@@ -13,9 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.envelope import Envelope
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends, Nature
+
+ANY = "any of them"
+"""Name of the event that any of several limits is exceeded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +121,88 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     for name, limit in limits.items():
         require(name in outputs, "limits", name, ", ".join(outputs))
         require(limit > 0, f"limit of {name}", limit, "a positive number")
+
+
+@dataclass(frozen=True, eq=False)
+class Passing:
+    """Degrees to which a limit is exceeded at some time.
+
+    Args:
+        possibility: Lower and upper bound, from 0 to 1.
+        necessity: Likewise.
+        margin: Limit less peak on each level: lower and upper ends, shape (A, 2), in SI units;
+            −inf where nothing excludes a greater peak. Of any limit: the least share of a limit
+            that is left.
+        lowest: Lowest level looked at; below it nothing is known.
+        nature: Worth of the bounds that both degrees rest on.
+    """
+
+    possibility: tuple[float, float]
+    necessity: tuple[float, float]
+    margin: Array
+    lowest: float
+    nature: Nature
+
+    @property
+    def verdict(self) -> str:
+        """(Not) exceeded, can be exceeded, or undecided; with the level from which on if not 0."""
+        level = f" from α = {self.lowest:g} up" if self.lowest else ""
+        if self.possibility[1] <= self.lowest:
+            return f"not exceeded{level}"
+        if self.necessity[0] >= 1 - self.lowest:
+            return f"exceeded{level}"
+        return "can be exceeded" if self.possibility[0] > 0 else "undecided"
+
+
+def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
+    """Degrees to which the magnitude of each output exceeds its limit.
+
+    Args:
+        peaks: Fuzzy peaks of the outputs.
+        limits: Largest magnitude allowed by output, in SI units.
+
+    Returns:
+        One for each limit, and one for `ANY` beside several.
+
+    Raises:
+        RefusedError: There is no limit, one is not positive, or it names no output.
+    """
+    require_limits(limits, peaks.outputs)
+    each = {name: _one(peaks, name, float(limit)) for name, limit in limits.items()}
+    if len(each) > 1:
+        each[ANY] = _any(each, limits)
+    return each
+
+
+def _one(peaks: Peaks, output: str, limit: float) -> Passing:
+    most, least, alpha = peaks.most(output), peaks.least(output), peaks.alpha
+    possible = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
+    keeps = np.broadcast_to(least.upper <= limit, alpha.shape)
+    kept = _highest(alpha, keeps), _excluded(alpha, least.lower > limit)
+    margin = limit - np.stack([most.upper, least.lower], axis=1)
+    necessary, nature = (1 - kept[1], 1 - kept[0]), peaks.nature([output])
+    return Passing(possible, necessary, margin, float(alpha[0]), nature)
+
+
+def _any(each: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
+    """Degrees to which any limit is exceeded: as possible as the most possible of them."""
+    every = list(each.values())
+    possible = tuple(max(one.possibility[k] for one in every) for k in (0, 1))
+    least = max(one.necessity[0] for one in every)
+    surely_kept = all(one.possibility[1] < 1 for one in every)  # by all motions of the highest cut
+    margin = np.min([one.margin / limits[name] for name, one in each.items()], axis=0)
+    nature = Nature.weakest(one.nature for one in every)
+    necessary = least, 0.0 if surely_kept else 1.0
+    return Passing((possible[0], possible[1]), necessary, margin, every[0].lowest, nature)
+
+
+def _highest(alpha: Array, holds: Mask) -> float:
+    """Level that is certain: the highest on which something holds, 0 without one."""
+    return float(alpha[holds][-1]) if holds.any() else 0.0
+
+
+def _excluded(alpha: Array, excluded: Mask) -> float:
+    """Level that is not reached: the lowest from which on all are excluded, 1 without one."""
+    open_ = np.flatnonzero(~excluded)
+    first = open_[-1] + 1 if len(open_) else 0
+    return float(alpha[first]) if first < len(alpha) else 1.0

@@ -14,11 +14,9 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
-from alphacut.frame.checks.between_nodes import stray
-from alphacut.frame.checks.step_error import MARGIN
+from alphacut.frame.checks.step_error import MARGIN, stray
 from alphacut.frame.dynamics.nonlinear import flow_of
-from alphacut.frame.questions.passing import ANY
-from alphacut.frame.questions.peaks import require_limits, within_steps
+from alphacut.frame.questions.peaks import ANY, require_limits, within_steps
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber

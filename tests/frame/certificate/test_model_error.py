@@ -23,8 +23,7 @@ from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate import model_error
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
-from alphacut.frame.certificate.remainder import largest_growth
-from alphacut.frame.certificate.wave_bounds import parts
+from alphacut.frame.certificate.remainder import largest_growth, parts
 from alphacut.frame.dynamics.record_load import responses
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.ground_response import left_out

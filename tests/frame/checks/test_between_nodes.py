@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.checks import between_nodes
-from alphacut.frame.checks.between_nodes import stray
+from alphacut.frame.checks import step_error
+from alphacut.frame.checks.step_error import stray
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Interval
 
@@ -55,7 +55,7 @@ def test_trajectories_halfway_to_the_corners_are_looked_at(monkeypatch: pytest.M
         looked.extend(points[:, 0])
         return np.zeros((len(flow.time), len(flow.outputs)))
 
-    monkeypatch.setattr(between_nodes, "stray", kept)
+    monkeypatch.setattr(step_error, "stray", kept)
     frame = StoreyFrame((1e4,), stiffness=(1e6,), q0=(0.1,))
     envelope(
         frame, {"k1": Interval(0.8e6, 1.2e6)}, duration=0.4, step=0.01, method="quasi-monte-carlo"

@@ -8,8 +8,7 @@ import pytest
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.questions.passing import ANY, passing
-from alphacut.frame.questions.peaks import Peaks, peaks
+from alphacut.frame.questions.peaks import ANY, Peaks, passing, peaks
 from alphacut.frame.questions.probability import probabilities
 from alphacut.frame.questions.tolerances import _judged, scaled, tolerances
 from alphacut.fuzzy import Triangular
