@@ -13,20 +13,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.hermite_fit import HermiteFit, SlopeBand, slope_band
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
-from alphacut.stochastic.particles.particles import SPHERES, Shape
-from alphacut.stochastic.sections import Measured, Section, Simulated, reduced_radii
-from alphacut.stochastic.tessellation.delaunay import Neighbours, cell_correlation, neighbours
-from alphacut.stochastic.theta.law import TruncatedNormal
+from alphacut.stochastic.particles.circles_csv import CircleFile
+from alphacut.stochastic.particles.image import SectionImage
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
+from alphacut.stochastic.sections import Section, Simulated, reduced_radii, section_of
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
+SHARE = 0.9927  # of the area that the limits keep where none are set (Fig. 12)
+CONFIDENCE = 0.99  # of both bootstrap bands
+RESAMPLES = 500
 MOST_CAPPED = 0.15  # share of the area that may lie in cells tighter than `Shape.reach`
 SAME = 1e-6  # differences of r_n up to which it is one value, but for round-off
 ROUNDS, NEAR = 6, 5e-3  # packings of spheres, and relative difference of fractions that ends them
@@ -39,45 +42,23 @@ class Study:
 
     Args:
         source: Source of the discs or spheres.
-        limits: Lower and upper limit of r_n; None for those that keep `share`, up to `Shape.reach`.
-        share: Share of area to keep, above 0, with equal shares cut off at both ends; used without
-            `limits`.
+        limits: Lower and upper limit of r_n; None for those that cut off equal shares of area at
+            both ends and keep `SHARE` of it, up to `Shape.reach`.
         seed: Seed of everything that is left to chance.
-        confidence: Level of the simultaneous bootstrap band, above 0, up to 0.9999.
-        bootstrap: Number of resamples, at least 100.
-        sampling: Whether the supports of a2 and a4 also hold the slopes' own bootstrap band, so
-            that fewer data make a fuzzier map.
-        distribution: Law of θ.
-
-    Raises:
-        RefusedError: A value lies outside its range.
     """
 
-    source: Simulated | Measured
+    source: Simulated | CircleFile | SectionImage
     limits: tuple[float, float] | None = None
-    share: float = 0.9927
     seed: int = 0
-    confidence: float = 0.99
-    bootstrap: int = 500
-    sampling: bool = True
-    distribution: TruncatedNormal = field(default_factory=TruncatedNormal)
-
-    def __post_init__(self) -> None:
-        low, high = self.limits or (0.1, 0.9)
-        allowed = "two values in (0, 1), rising"
-        require(0 < low < high < 1, "microstructure.limits", self.limits, allowed)
-        real("microstructure.share", self.share, positive=True, most=1)
-        real("microstructure.confidence", self.confidence, positive=True, most=0.9999)
-        real("microstructure.bootstrap", self.bootstrap, whole=True, least=100)
 
     @property
     def shape(self) -> Shape:
         """Kind of the particles."""
-        return self.source.shape
+        return self.source.packing.shape if isinstance(self.source, Simulated) else DISCS
 
     def limits_of(self, sample: AreaWeighted) -> tuple[float, float]:
         """Limits of r_n of a sample."""
-        lower, upper = self.limits or sample.limits(self.share)
+        lower, upper = self.limits or sample.limits(SHARE)
         return lower, upper if self.limits else min(upper, self.shape.reach)
 
     def used(self, sample: AreaWeighted) -> AreaWeighted:
@@ -104,7 +85,6 @@ class Microstructure:
     Args:
         study: Settings that it was made by.
         sections: Particles and cells.
-        direct: Delaunay neighbours in each section of discs.
         sample: r_n of all whole cells, weighted by area or volume.
         kept: The part of it within the limits.
         pbox: Fuzzy radius map.
@@ -115,7 +95,6 @@ class Microstructure:
 
     study: Study
     sections: list[Section]
-    direct: list[Neighbours]
     sample: AreaWeighted
     kept: AreaWeighted
     pbox: PBox
@@ -149,7 +128,7 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Microstructure:
-    """All of it: cells, distribution, limits, fit, p-box, neighbours.
+    """All of it: cells, distribution, limits, fit, p-box.
 
     Args:
         case: The settings.
@@ -163,11 +142,9 @@ def study(
     tick = progress or (lambda share: None)
     sections = _sections(case, executor, lambda share: tick(0.7 * share))
     sample = reduced_radii(sections)
-    kept, pbox, slopes, band = fitted_map(case, sample)
-    tick(0.9)
-    direct = [neighbours(one.particles) for one in sections if one.diagram]
+    made = Microstructure(case, sections, sample, *fitted_map(case, sample))
     tick(1.0)
-    return Microstructure(case, sections, direct, sample, kept, pbox, slopes, band)
+    return made
 
 
 def _sections(
@@ -175,7 +152,9 @@ def _sections(
 ) -> list[Section]:
     """Sections of the source; spheres as dense as makes the map's volume fraction the one set."""
     source = case.source
-    if not isinstance(source, Simulated) or case.shape is not SPHERES:
+    if not isinstance(source, Simulated):
+        return [section_of(source.read())]
+    if case.shape is not SPHERES:
         return source.sections(case.seed, executor=executor, progress=progress)
     goal = source.packing.fraction
     best, off, fraction = [], np.inf, goal
@@ -205,23 +184,23 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
     cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
     value = f"{upper:.10g} in all cells"
     require(upper - lower >= SAME, "r_n", value, "cells of unequal r_n", cure)
-    kept, fit = used.truncated(lower, upper), HermiteFit(lower, upper, case.distribution)
-    band = kept.band(case.confidence, case.bootstrap, np.random.default_rng(streams[0]))
+    kept, fit = used.truncated(lower, upper), HermiteFit(lower, upper)
+    band = kept.band(CONFIDENCE, RESAMPLES, np.random.default_rng(streams[0]))
     slopes = slope_band(
         fit,
         kept,
-        level=case.confidence,
-        resamples=case.bootstrap,
+        level=CONFIDENCE,
+        resamples=RESAMPLES,
         generator=np.random.default_rng(streams[1]),
     )
-    pbox = least_pbox(fit, kept, band, hold=slopes if case.sampling else None)
+    pbox = least_pbox(fit, kept, band, hold=slopes if case.shape is DISCS else None)
     return kept, pbox, slopes, band
 
 
 def _mapped_fraction(case: Study, sample: AreaWeighted) -> float:
     """Volume fraction of the map fitted to a sample within its own limits."""
     lower, upper = case.limits_of(sample)
-    fit = HermiteFit(lower, upper, case.distribution)
+    fit = HermiteFit(lower, upper)
     return _fraction(case.shape, fit, fit.slopes(sample.truncated(lower, upper)))
 
 
@@ -229,9 +208,3 @@ def _fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> flo
     """Mean share of the cell that the particle takes, for the map with these slopes."""
     rule = gauss_rule(fit.distribution, points=8)
     return float(rule.mean(shape.shares(fit.map(slopes)(rule.nodes))))
-
-
-def mean_correlation(result: Microstructure) -> float:
-    """Mean correlation of r_n between cells of discs that share a wall."""
-    diagrams = [section.diagram for section in result.sections if section.diagram]
-    return float(np.mean([cell_correlation(one, one.reduced_radii) for one in diagrams]))

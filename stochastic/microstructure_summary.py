@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.stochastic.microstructure import Microstructure, mean_correlation
+from alphacut.stochastic.microstructure import CONFIDENCE, Microstructure
+from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neighbours
 
 if TYPE_CHECKING:
     import xarray
@@ -39,8 +40,10 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
     diagrams = [section.diagram for section in result.sections if section.diagram]
     if not diagrams:
         return {}
-    number = np.concatenate([one.number for one in result.direct])
-    distance = np.concatenate([one.distances for one in result.direct])
+    direct = [neighbours(one.discs) for one in diagrams]
+    number = np.concatenate([one.number for one in direct])
+    distance = np.concatenate([one.distances for one in direct])
+    sharing = [neighbouring_values(one, one.reduced_radii) for one in diagrams]
     return {
         "cell_areas_sum_error": max(
             abs(one.areas.sum() / one.discs.measure - 1) for one in diagrams
@@ -50,7 +53,7 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
             "mean": float(number.mean()) if len(number) else None,
             "mean_distance": float(distance.mean()) if len(distance) else None,
         },
-        "correlation": mean_correlation(result),
+        "correlation": float(np.mean([np.corrcoef(pairs)[0, 1] for pairs in sharing])),
     }
 
 
@@ -69,7 +72,7 @@ def _of_map(result: Microstructure) -> dict[str, object]:
         "a4": list(box.a4),
         "a2_band": list(result.slopes.a2),
         "a4_band": list(result.slopes.a4),
-        "confidence": result.study.confidence,
+        "confidence": CONFIDENCE,
         "band": result.band,
         "pbox_area": box.area,
         "pbox_breach": box.excess(result.kept),

@@ -1,4 +1,4 @@
-"""Sources of particles, simulated or measured, and their cells."""
+"""Particles of a section or a packing with their cells, and the reduced radii of all."""
 
 from __future__ import annotations
 
@@ -9,17 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
-from alphacut.stochastic.particles.circles_csv import CircleFile
-from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing
-from alphacut.stochastic.particles.particles import DISCS, Particles, Shape
+from alphacut.stochastic.particles.particles import DISCS, Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, whole_cells
 from alphacut.stochastic.tessellation.power_cells import cell_volumes
 
-Progress = Callable[[float], None]
-FEWEST = 5  # packings
 PATCHES = 5  # a single section is cut into 5 × 5 patches, drawn as wholes in the bootstrap
 
 
@@ -64,25 +60,18 @@ class Simulated:
 
     Args:
         packing: Specification of each.
-        packings: Their number, at least 5 (the bootstrap draws them as wholes).
-
-    Raises:
-        RefusedError: Fewer than five packings.
+        packings: Their number; the bootstrap draws them as wholes.
     """
 
     packing: Packing
     packings: int = 20
 
-    def __post_init__(self) -> None:
-        real("packing.packings", self.packings, whole=True, least=FEWEST)
-
-    @property
-    def shape(self) -> Shape:
-        """Kind of the particles."""
-        return self.packing.shape
-
     def sections(
-        self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
+        self,
+        seed: int,
+        *,
+        executor: Executor | None = None,
+        progress: Callable[[float], None] | None = None,
     ) -> list[Section]:
         """Every packing with its cells; the k-th depends on `seed` and k only."""
         seeds = np.random.SeedSequence(seed).spawn(self.packings)
@@ -94,31 +83,6 @@ class Simulated:
             if progress:
                 progress(len(made) / self.packings)
         return made
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One section read from a file of circles or an image.
-
-    Args:
-        file: The file.
-    """
-
-    file: CircleFile | SectionImage
-
-    @property
-    def shape(self) -> Shape:
-        """Kind of the particles."""
-        return DISCS
-
-    def sections(
-        self, seed: int, *, executor: Executor | None = None, progress: Progress | None = None
-    ) -> list[Section]:
-        """The section with its cells; `seed` and `executor` do nothing here."""
-        section = section_of(self.file.read())
-        if progress:
-            progress(1.0)
-        return [section]
 
 
 def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:

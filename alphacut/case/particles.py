@@ -14,7 +14,7 @@ from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing as Specification
 from alphacut.stochastic.particles.particles import DISCS, SPHERES
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
-from alphacut.stochastic.sections import Measured, Simulated
+from alphacut.stochastic.sections import Simulated
 
 SOURCES = ("packing", "circles", "image")
 
@@ -112,9 +112,8 @@ class Microstructure(Section):
         Args:
             spheres: Whether packed particles are spheres.
         """
-        source = self.circles or self.image
-        of: Simulated | Measured | None = Measured(source.source) if source else None
         if self.packing:
-            of = self.packing.source(spheres)
-        assert of is not None
-        return Study(of, self.limits, seed=self.seed, sampling=not spheres)
+            return Study(self.packing.source(spheres), self.limits, self.seed)
+        seen = self.circles or self.image
+        assert seen is not None
+        return Study(seen.source, self.limits, self.seed)

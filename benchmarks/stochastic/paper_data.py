@@ -24,7 +24,6 @@ from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.radius_map import HermiteMap
 from alphacut.stochastic.sections import Simulated
 from alphacut.stochastic.tessellation.apollonius import apollonius
-from alphacut.stochastic.theta.law import TruncatedNormal
 
 RESULTS = Path(__file__).parents[1] / "results"
 LIMITS = (0.13, 0.87)  # Fig. 12
@@ -53,7 +52,7 @@ def sample_of(sections: Sequence[Particles]) -> AreaWeighted:
 def row(name: str, sample: AreaWeighted) -> str:
     """Shares and slopes of a sample in one line."""
     below, within = float(sample.cdf(LIMITS[0])), sample.share_within(*LIMITS)
-    a2, a4 = HermiteFit(*ENDS, TruncatedNormal()).slopes(sample.truncated(*ENDS))
+    a2, a4 = HermiteFit(*ENDS).slopes(sample.truncated(*ENDS))
     above = 1 - below - within
     return f"{name:40} {within:9.2%} {below:9.3%} {above:9.3%} {a2:7.3f} {a4:7.3f}"
 

@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     circles = LogNormalRadii(1e-3, 1e-2).sample(CIRCLES, np.random.default_rng(options.seed))
     law = unfolded(circles, visible=1e-3, largest=1e-2)
     packing = Packing(options.spheres, FRACTION, law, shape=SPHERES)
-    result = study(Study(Simulated(packing, options.packings), seed=options.seed, sampling=False))
+    result = study(Study(Simulated(packing, options.packings), seed=options.seed))
     print(fragment(result), end="")
     print(f"# share of the volume beyond r_n = {SPHERES.reach:g}: {result.share_beyond:.4f}")
 

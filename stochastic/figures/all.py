@@ -1,4 +1,8 @@
-"""All figures of a microstructure."""
+"""All figures of a microstructure.
+
+Here are distributions of radii (Fig. 11), neighbours (Figs. 6, 7) and r_n (Figs. 12, 13); pictures
+of discs are in `cells`.
+"""
 
 from __future__ import annotations
 
@@ -9,31 +13,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.stochastic.figures.cells import (
+    EQUAL,
     draw_cells,
     draw_neighbours,
     draw_overlay,
     draw_two_point,
 )
-from alphacut.stochastic.figures.statistics import (
-    draw_areas,
-    draw_correlation,
-    draw_map,
-    draw_neighbour_statistics,
-    draw_pbox,
-    draw_radii,
-)
-from alphacut.stochastic.figures.style import save, style
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE, beside, save, style
 from alphacut.stochastic.microstructure import Microstructure
+from alphacut.stochastic.microstructure_summary import to_dataset
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles
-from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.sections import Measured, Simulated
-from alphacut.stochastic.tessellation.apollonius import apollonius
+from alphacut.stochastic.particles.radius_laws import LogNormalRadii, RadiusLaw
+from alphacut.stochastic.sections import Simulated
+from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
+from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neighbours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+REDUCED = "reduced radius $r_n$ = r/a"
+"""Name of the axis."""
 Figures = dict[str, Callable[[], "Figure"]]
 
 
@@ -74,8 +75,8 @@ def of_discs(result: Microstructure) -> Figures:
     }
     if (diagram := first.diagram) is not None:
         figures["10_cells"] = lambda: draw_cells(diagram)
-    if isinstance(source, Measured) and isinstance(source.file, SectionImage):
-        picture = source.file.picture()
+    if isinstance(source, SectionImage):
+        picture = source.picture()
         figures["image_circles"] = lambda: draw_overlay(picture, first.particles)
     return figures
 
@@ -88,3 +89,126 @@ def _equal_discs(result: Microstructure, number: int) -> Particles:
     return Packing(number, min(fraction, DISCS.densest), LogNormalRadii(radius, radius)).make(
         np.random.default_rng([result.study.seed, number])
     )
+
+
+def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
+    """Distribution function of the radii, and their law if there is one (Fig. 11)."""
+    import matplotlib.pyplot as plt
+
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    particles = result.study.shape.particles
+    values = 1e3 * np.concatenate([one.particles.radii for one in result.sections])
+    axes.ecdf(values, color=BLUE, label=f"{len(values)} {particles}")
+    if law is not None and law.smallest < law.largest:
+        grid = np.linspace(law.smallest, law.largest, 400)
+        axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
+    axes.set(xlabel="radius [mm]", ylabel=f"share of {particles}", ylim=(0, 1.02))
+    axes.legend()
+    return drawn
+
+
+def draw_neighbour_statistics(discs: Particles) -> Figure:
+    """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one size."""
+    drawn, (left, right) = beside(EQUAL.format(len(discs)))
+    direct = neighbours(discs)
+    distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
+    left.hist(distance, bins=80, density=True, color=BLUE)
+    left.axvline(1, color=ORANGE, label="one diameter")
+    left.set(xlabel="distance of direct neighbours / diameter", ylabel="density")
+    left.set(xlim=(0.8, np.quantile(distance, 0.999)))
+    left.legend()
+    counts = np.bincount(number)
+    right.bar(np.arange(len(counts)), counts / counts.sum(), color=BLUE)
+    right.axvline(number.mean(), color=ORANGE, label=f"mean {number.mean():.4g}")
+    right.set(xlabel="number of direct neighbours", ylabel="share of discs")
+    right.set(xlim=(2.3, number.max() + 0.7))
+    right.legend()
+    return drawn
+
+
+def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
+    """Values of r_n of cells that share a wall, beside those of equal discs (Fig. 9)."""
+    import matplotlib.pyplot as plt
+
+    drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.4))
+    diagrams = [section.diagram for section in result.sections if section.diagram]
+    for axes, shown, title in zip(
+        both, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
+    ):
+        pairs = np.concatenate(
+            [neighbouring_values(one, one.reduced_radii) for one in shown], axis=1
+        )
+        axes.hist2d(*pairs, bins=80, cmap="Blues", range=[np.quantile(pairs, (0.0005, 0.9995))] * 2)
+        axes.set(xlabel="reduced radius of a cell", ylabel="that of a neighbour", aspect="equal")
+        axes.set_title(f"{title}: correlation {np.corrcoef(pairs)[0, 1]:+.3f}")
+        axes.grid(visible=False)
+    return drawn
+
+
+def draw_areas(result: Microstructure) -> Figure:
+    """Measure of the cells over r_n, with the limits and what no particle can reach (Fig. 12)."""
+    import matplotlib.pyplot as plt
+
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    shape, (low, high) = result.study.shape, result.limits
+    for section in result.sections:
+        radius, measure = section.reduced_radii, 1e3**shape.dimensions * section.cells
+        inside = (radius >= low) & (radius <= high)
+        for part, size, colour in ((inside, 1.5, GREY), (~inside, 4, BLUE)):
+            axes.plot(radius[part], measure[part], ".", ms=size, color=colour, rasterized=True)
+    for limit in result.limits:
+        axes.axvline(limit, color=BLUE, lw=1)
+    bound, unit = shape.largest, {2: "mm²", 3: "mm³"}[shape.dimensions]
+    axes.axvspan(bound, bound + 0.07, facecolor="none", edgecolor=GREY, hatch="///", lw=0)
+    text = f"{shape.particles[:-1]} larger\nthan its cell "
+    axes.text(bound, axes.get_ylim()[1], text, ha="right", va="top", color=GREY)
+    axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
+    kept = f"{100 * result.share_kept:.2f} % of the {shape.cells}"
+    axes.set_title(f"limits {low:.4g} and {high:.4g} keep {kept}")
+    return drawn
+
+
+def draw_pbox(result: Microstructure) -> Figure:
+    """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
+    import matplotlib.pyplot as plt
+
+    drawn, (axes, apart) = plt.subplots(
+        2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
+    )
+    table = to_dataset(result)
+    radius, share = table["r_n"].values, table["cdf"].values
+    for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
+        scale = 1 if panel is axes else 100
+        low, high = np.maximum(share - result.band, 0), np.minimum(share + result.band, 1)
+        label = f"band of ± {result.band:.2g}"
+        panel.fill_between(
+            radius, scale * (low - base), scale * (high - base), fc=PALE, label=label
+        )
+        label = f"{len(result.kept.values)} cells"
+        panel.plot(radius, scale * (share - base), color=BLUE, label=label)
+        panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
+        panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
+    axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
+    apart.set(xlabel=REDUCED, ylabel="less the fit [%]")
+    axes.legend(loc="upper left")
+    return drawn
+
+
+def draw_map(result: Microstructure) -> Figure:
+    """The map θ ↦ r_n: the sample's own, the fitted cubic and its fuzzy bounds (eq. 12)."""
+    import matplotlib.pyplot as plt
+
+    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    fit, box = result.pbox.fit, result.pbox
+    law = fit.distribution
+    theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
+    axes.step(theta, result.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
+    fitted = fit.map((box.a2[1], box.a4[1]))
+    label = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}"
+    axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)
+    axes.fill_between(
+        theta, *box.bounds(theta), color=GREY, alpha=0.4, lw=0, label="fuzzy $a_2$, $a_4$"
+    )
+    axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
+    axes.legend()
+    return drawn

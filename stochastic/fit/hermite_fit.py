@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.polynomial import Polynomial, polynomial
@@ -39,12 +40,12 @@ class HermiteFit:
     Args:
         a1: Lower limit of r_n.
         a3: Upper limit of r_n.
-        distribution: Law of θ.
     """
 
     a1: float
     a3: float
-    distribution: TruncatedNormal
+
+    distribution: ClassVar[TruncatedNormal] = TruncatedNormal()
 
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
         """Slopes a2, a4 of the monotone cubic nearest to the sample between the limits.

@@ -59,10 +59,6 @@ class PBox:
         least, greatest = (np.interp(values, high, share), np.interp(values, low, share))
         return float(max((least - before).max(), (after - greatest).max(), 0.0))
 
-    def contains(self, sample: AreaWeighted, band: float) -> bool:
-        """True if the sample's distribution lies within the p-box, within a band of `band`."""
-        return self.excess(sample) <= band + 1e-6
-
 
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None

@@ -70,8 +70,3 @@ def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
     )
     pair = np.unique(np.stack([diagram.cell[beyond], diagram.neighbour[beyond]]), axis=1)
     return np.concatenate([values[pair], values[pair[::-1]]], axis=1)
-
-
-def cell_correlation(diagram: Apollonius, values: Array) -> float:
-    """Correlation of `values`, shape (n,), between cells that share a wall."""
-    return float(np.corrcoef(neighbouring_values(diagram, values))[0, 1])

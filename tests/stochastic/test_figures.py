@@ -4,13 +4,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from alphacut.stochastic.figures.all import draw_neighbour_statistics
 from alphacut.stochastic.figures.cells import (
     draw_cells,
     draw_neighbours,
     draw_two_point,
     plot_cells,
 )
-from alphacut.stochastic.figures.statistics import draw_neighbour_statistics
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
