@@ -13,8 +13,7 @@ from importlib import import_module
 from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.files import rank, ranks, say, standard_output
-from alphacut.io.output_paths import check_destinations
+from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
 from alphacut.io.problem import BadInput, Problem, missing
 from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import stoppable, uninterrupted

@@ -17,7 +17,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.accelerogram import accelerogram
+from alphacut.io.measured import accelerogram
 from alphacut.io.problem import suggestion
 
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]

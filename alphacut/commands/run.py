@@ -14,13 +14,13 @@ from alphacut.case.load import Case
 from alphacut.commands.options import Command, add_quiet, add_run, answer, opened
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.files import Document, as_json, rank, say, write_text
+from alphacut.io.files import Document, alone, as_json, rank, require_writable, say, write_text
 from alphacut.io.netcdf import read_summary
-from alphacut.io.output_paths import alone, require_writable
 from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.report.page import report as page_of
 from alphacut.report.tables import run_text, write_tables
 from alphacut.stages.chain import Chain
+from alphacut.stages.results import Results
 from alphacut.stages.store import Store
 
 
@@ -54,7 +54,7 @@ def computed(
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
-        results = Chain(case.content, store, petsc, figures, executor).run()
+        results = Chain(Results(case.content), store, petsc, figures, executor).run()
         look = {"fresh": store.fresh, "quiet": store.quiet}
         names = drawn(results, folder, executor, **look) if figures else []
     document: Document = {

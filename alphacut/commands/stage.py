@@ -21,7 +21,7 @@ from alphacut.stages.results import Results
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the map, writes it and prints the section [radius]."""
     case, store = opened(options)
-    data = Chain(case.content, store).particles()
+    data = Chain(Results(case.content), store).particles()
     fragment = str(data.attrs["radius"])
     answer(options, document_of(data) | {"fragment": fragment}, out, fragment)
     return 0
@@ -31,7 +31,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the modulus of a round cell or of an image."""
     case, store = opened(options)
     results = Results(case.content)
-    Chain(case.content, store, options.petsc).material(results)
+    Chain(results, store, options.petsc).material()
     document, words = results.document(), {"modulus": summary, "image": image}
     for name in document.keys() & words.keys():
         text = text_table(*tables(document)[name]) + words[name](document[name])
@@ -71,12 +71,12 @@ def add_envelope(parser: argparse.ArgumentParser) -> None:
 def envelope(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the envelope of [envelope]."""
     case, store = opened(options)
-    chain, results = Chain(case.content, store), Results(case.content)
+    chain = Chain(Results(case.content), store)
     number = None
     if options.modulus:
         number = number_of(read_dataset(options.modulus, key="--modulus"), "--modulus")
-    chain.motion(results, chain.structure(number), studies=False)
-    document = results.document()
+    chain.motion(chain.structure(number), studies=False)
+    document = chain.results.document()
     answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures import style as look
-from alphacut.figures.captions import INPUTS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
@@ -49,9 +48,7 @@ def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure
     nature = str(dataset.attrs["nature"])
     words = nature + error_band(axes, time, shown.isel(alpha=0), nature)
     time_axes(axes, time, output)
-    linear = output.startswith(("q", "v", "a", "drift", "shear", "base", "roof"))
-    fuzzy = (INPUTS.get(name, name) if linear else name for name in task.fuzzy)
-    title = f"{Output(output).words}; fuzzy: {', '.join(fuzzy)}; {words}"
+    title = f"{Output(output).words}; fuzzy: {', '.join(task.fuzzy)}; {words}"
     look.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     look.alpha_legend(axes, alpha)
     return drawn

@@ -1,10 +1,12 @@
-"""Output: one JSON object on standard output, whole files, one rank that speaks."""
+"""Output: places that are checked, whole files, one JSON object on standard output, one voice."""
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
@@ -13,7 +15,7 @@ from typing import Any, TextIO
 import numpy as np
 from pydantic_core import to_json
 
-from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.problem import printable
 
 FULL = 1 << 20
@@ -23,6 +25,8 @@ LONGEST = 1000
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 
+OUTPUTS = ("out", "json", "export", "csv")
+"""Options that name what is written."""
 Document = dict[str, Any]
 """A JSON document: numbers, texts, lists and documents by name; its reader knows their types."""
 
@@ -50,9 +54,7 @@ def whole_file(path: Path | str) -> Iterator[Path]:
     """
     path = Path(path)
     if is_special(path):
-        from tempfile import TemporaryDirectory
-
-        with TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder:
             yield (partial := Path(folder) / path.name)
             path.write_bytes(partial.read_bytes())
         return
@@ -116,3 +118,62 @@ def say(message: str) -> None:
     if rank() == 0:
         with suppress(OSError):
             print(f"alphacut: {printable(message, LONGEST)}", file=sys.stderr, flush=True)
+
+
+def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Refuses what a command could not write.
+
+    Raises:
+        RefusedError: An option names no such place.
+    """
+    for action in parser._actions:
+        value = getattr(options, action.dest, None)
+        if action.dest in OUTPUTS and isinstance(value, str) and value != "-":
+            folder = action.metavar == "FOLDER"
+            require_writable(action.option_strings[-1], value, folder=folder)
+
+
+def require_writable(option: str, value: str, *, folder: bool) -> None:
+    """Refuses a place where nothing can be written.
+
+    Raises:
+        RefusedError: It is one, or of the other kind.
+    """
+    path, kind = Path(value), "a folder" if folder else "a file"
+    if not value.strip() or (path.exists() and path.is_dir() != folder and not is_special(path)):
+        raise RefusedError(option, value or "empty", f"the name of {kind}")
+    there = path if folder else path.parent
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    try:
+        if not is_special(path):
+            tempfile.TemporaryFile(dir=there).close()
+    except OSError as error:
+        reason = f"nothing can be written in {there}: {error.strerror or error}"
+        raise RefusedError(option, value, f"{kind} where you may write", reason.lower()) from None
+
+
+@contextmanager
+def alone(option: str, folder: Path) -> Iterator[None]:
+    """Keeps other runs out of a folder; where the file system cannot, nothing is kept out.
+
+    Raises:
+        RefusedError: Another run is writing into it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                cure = "another run is writing into it"
+                raise RefusedError(option, str(folder), "a folder of its own", cure) from None
+        yield
+    finally:
+        os.close(handle)

@@ -15,16 +15,8 @@ from alphacut.io.provenance import FORMAT, door
 if TYPE_CHECKING:
     import xarray
 
-NEEDED = {
-    "case": str,
-    "title": str,
-    "case_text": str,
-    "command": str,
-    "versions": dict,
-    "seconds": float,
-    "fingerprints": dict,
-}
-"""Entries of summary.json that every reader needs, with their types."""
+PLAIN = re.compile(r"(?!.*\.\.)[\w+-][\w.+-]{0,100}")
+"""Names of files in a folder of results, which lead to no other folder."""
 
 
 def require_known(facts: Mapping[str, object], path: Path) -> None:
@@ -90,40 +82,41 @@ def fingerprint_of(path: Path) -> str:
 
 
 def read_summary(folder: Path) -> Document:
-    """summary.json of a folder that a run has written.
+    """summary.json of a folder that a run has written; what it names lies in that folder.
 
     Raises:
         RefusedError: There is none, it is damaged, or its format is another one.
     """
-    path = folder / "summary.json"
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-        whole = all(isinstance(summary[name], kind) for name, kind in NEEDED.items())
-    except OSError as error:
-        raise damaged(folder, "without summary.json") from error
-    except (ValueError, RecursionError, KeyError, TypeError) as error:
-        raise damaged(path, f"damaged ({type(error).__name__})") from error
-    if not whole:
-        raise damaged(path, "damaged")
-    require_known(summary, path)
-    return dict(summary)
+        summary: Document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        studies = summary.get("envelopes", {})
+        names = [*summary["fingerprints"], *studies]
+        names += [output for one in studies.values() for output in one["min"]]
+        names += [name.removeprefix("figures/") for name in summary["figures"]]
+        what = "" if all(map(PLAIN.fullmatch, names)) else "damaged"
+    except OSError:
+        what = "without summary.json"
+    except (ValueError, RecursionError, LookupError, TypeError, AttributeError) as error:
+        what = f"damaged ({type(error).__name__})"
+    if what:
+        raise damaged(folder, what)
+    require_known(summary, folder)
+    return summary
 
 
-def own_files(summary: Document, folder: Path) -> list[Path]:
-    """The NetCDF files of a summary that are in its folder.
+def require_own(summary: Document, folder: Path) -> None:
+    """Refuses the files of another run in a folder.
 
     Raises:
-        RefusedError: Some are not those of the run that wrote the summary.
+        RefusedError: A file there is not of the run that wrote the summary.
     """
-    keys: dict[str, str] = summary["fingerprints"]
-    files = [folder / f"{name}.nc" for name in keys if re.fullmatch(r"[\w+-][\w.+-]*", name)]
-    there = [file for file in files if file.is_file()]
-    other = ", ".join(file.name for file in there if fingerprint_of(file) != keys[file.stem])
+    files = {folder / f"{name}.nc": key for name, key in summary["fingerprints"].items()}
+    there = {file: key for file, key in files.items() if file.is_file()}
+    other = ", ".join(file.name for file, key in there.items() if fingerprint_of(file) != key)
     require(not other, str(folder), f"with {other} of another run", "one run's files")
-    return there
 
 
-def damaged(path: Path, what: str) -> RefusedError:
+def damaged(folder: Path, what: str) -> RefusedError:
     """The error of results that cannot be used."""
     cure = f"make it anew by {door('run', 'CASE.toml')}"
-    return RefusedError(str(path), what, "whole results of a run", cure)
+    return RefusedError(str(folder), what, "whole results of a run", cure)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
@@ -178,17 +176,3 @@ def drivers(summary: Document) -> Iterator[str]:
         first, *others = sorted(of[name].items(), key=lambda pair: -pair[1])[:3]
         more = "".join(f", {x} by {share:.0%}" for x, share in others)
         yield f"Fixing {first[0]} narrows {name} by {first[1]:.0%}{more}"
-
-
-def figures(summary: Document, folder: Path) -> Iterator[tuple[str, Path]]:
-    """Stem and PNG of each figure that the summary names, and that lies in the folder's figures."""
-    home = (folder / "figures").resolve()
-    for path in (folder / str(name) for name in summary.get("figures", ())):
-        inside = path.resolve().parent == home and path.is_file()
-        if inside and path.suffix == ".png" and plain_name(path.name):
-            yield path.stem, path
-
-
-def plain_name(name: str) -> bool:
-    """True of a name that stands for a file in its folder and leads to no other."""
-    return bool(re.fullmatch(r"[\w+-][\w.+-]{0,100}", name)) and ".." not in name

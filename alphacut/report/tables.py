@@ -23,7 +23,6 @@ from alphacut.report.results import (
     motion,
     nature_of,
     natures,
-    plain_name,
     whole,
 )
 
@@ -57,10 +56,9 @@ def write_tables(summary: Document, results: Path, folder: Path) -> list[Path]:
     """
     every = {name: table for name, table in tables(summary).items() if table[1]}
     for name, study in summary.get("envelopes", {}).items():
-        if plain_name(name):
-            data = read_dataset(results / f"envelope_{name}.nc", key=str(results))
-            for output in filter(plain_name, study["min"]):
-                every[f"envelope_{name}-{output}"] = over_time(data, output)
+        data = read_dataset(results / f"envelope_{name}.nc", key=str(results))
+        for output in study["min"]:
+            every[f"envelope_{name}-{output}"] = over_time(data, output)
     for name, (head, rows) in every.items():
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([head, *rows])

@@ -38,31 +38,39 @@ class Chain:
     """A run of the stages of a case.
 
     Args:
-        content: The sections of the case.
+        results: Where the results go; of the stages before, what is there.
         store: Folder of the results.
         petsc: PETSc options that override the solver's.
         figures: Whether the particles are drawn.
         executor: Processes that compute envelopes side by side.
     """
 
-    content: Content
+    results: Results
     store: Store
     petsc: Mapping[str, str] = field(default_factory=dict)
     figures: bool = True
     executor: Executor | None = None
 
+    @property
+    def content(self) -> Content:
+        """The sections of the case."""
+        return self.results.content
+
     def run(self) -> Results:
         """The results of every stage."""
-        results = Results(self.content)
-        if "microstructure" in self.content.stages:
+        results, stages = self.results, self.content.stages
+        if "microstructure" in stages:
             results.microstructure = self.particles()
             radius = microstructure.radius_of(results.microstructure)
-            self.content = results.content = self.content.model_copy(update={"radius": radius})
-        if "modulus" in self.content.stages:
-            self.material(results)
-        if "envelope" in self.content.stages:
-            self._motion(results, self.structure(self._number(results)))
-        self._shares(results)
+            results.content = self.content.model_copy(update={"radius": radius})
+        if "modulus" in stages:
+            self.material()
+        if "envelope" in stages:
+            data = results.modulus if results.image is None else results.image
+            self._motion(self.structure(None if data is None else modulus.number_of(data)))
+        samples = self.campaign if results.modulus is not None else None
+        richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
+        results.shares = self.store.take(shares.stage(samples, results.structure, richest))
         return results
 
     def particles(self) -> xarray.Dataset:
@@ -79,22 +87,16 @@ class Chain:
         content = self.content
         return Campaign(*content.round_cell, content.mesh, content.modulus, self.petsc)
 
-    def material(self, results: Results) -> None:
+    def material(self) -> None:
         """The modulus of the cell, round or an image."""
-        section = self.content.modulus
+        results, section = self.results, self.content.modulus
         if self.content.picture is not None:
             stage = image.stage(self.content.picture, section.alpha, section.average)
             results.image = self.store.take(stage)
             return
-        samples = self.campaign
-        results.modulus = data = self.store.take(modulus.stage(samples))
+        results.modulus = data = self.store.take(modulus.stage(self.campaign))
         cell.require_tolerance(modulus.errors_of(data), section.tolerance)
         results.references = cell.references(*self.content.round_cell)
-
-    def _number(self, results: Results) -> FuzzyNumber | None:
-        """The modulus for the structure, in Pa; None for its own."""
-        data = results.modulus if results.image is None else results.image
-        return None if data is None else modulus.number_of(data)
 
     def structure(self, number: FuzzyNumber | None) -> Structure:
         """The structure with a modulus in Pa, None for its own."""
@@ -107,9 +109,10 @@ class Chain:
         require(young, "frame.modulus", None, "a modulus, or --modulus FILE.nc")
         return section.structure(number)
 
-    def motion(self, results: Results, structure: Structure, studies: bool = True) -> None:
+    def motion(self, structure: Structure, studies: bool = True) -> None:
         """Envelopes of the structure, of every study or of [envelope] alone."""
         assert self.content.envelope is not None
+        results = self.results
         results.structure = structure
         results.tasks = envelope.tasks(self.content.envelope, self.content.study if studies else ())
         longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
@@ -120,25 +123,20 @@ class Chain:
             envelope.require_tolerance(data, task, structure)
             results.envelopes[task.name] = data
 
-    def _motion(self, results: Results, structure: Structure) -> None:
+    def _motion(self, structure: Structure) -> None:
         """Envelopes after what was identified, and the answers to what the case asks of them."""
-        content = self.content
+        results, content = self.results, self.content
         assert content.envelope is not None
         (task,) = envelope.tasks(content.envelope, ())
         if content.identify is not None:
             measured, alpha = content.identify, task.section.alpha
             results.learned, structure = identify.learned(measured, structure, alpha)
-        self.motion(results, structure)
+        self.motion(structure)
         for key, section in content.questions.items():
             inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section]
             compute = partial(answered, section, structure, task)
             stage = Stage(key, inputs, ("fuzzy", "frame", "alphacut"), compute)
             results.answers[key] = document_of(self.store.take(stage))
-
-    def _shares(self, results: Results) -> None:
-        samples = self.campaign if results.modulus is not None else None
-        richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
-        results.shares = self.store.take(shares.stage(samples, results.structure, richest))
 
 
 def answered(

@@ -18,7 +18,7 @@ from alphacut.frame.identify.possibility import widest
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import require
 from alphacut.io.files import Document
-from alphacut.io.modes_csv import ModeRows, mode_rows
+from alphacut.io.measured import ModeRows, mode_rows
 
 
 def learned(

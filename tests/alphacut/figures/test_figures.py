@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 from alphacut.figures import envelope, modulus, style
-from alphacut.figures.captions import caption
+from alphacut.report.page import caption
 from tests.alphacut.one_case import run
 
 

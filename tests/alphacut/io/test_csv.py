@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.accelerogram import accelerogram
-from alphacut.io.modes_csv import mode_rows
+from alphacut.io.measured import accelerogram, mode_rows
 
 RECORD = "time [s],acceleration [g]\n0,0\n0.01,0.1\n0.02,-0.2\n"
 

@@ -38,7 +38,7 @@ def test_a_file_that_fails_leaves_the_old_one(tmp_path):
 
 
 def test_devices_may_be_named_for_output(tmp_path):
-    from alphacut.io.output_paths import require_writable
+    from alphacut.io.files import require_writable
 
     require_writable("--json", str(tmp_path / "a.json"), folder=False)
     require_writable("--json", "/dev/null", folder=False)
@@ -46,7 +46,7 @@ def test_devices_may_be_named_for_output(tmp_path):
 
 def test_a_second_run_into_the_same_folder_is_refused_while_the_first_writes(tmp_path):
     from alphacut.fuzzy.refused import RefusedError
-    from alphacut.io.output_paths import alone
+    from alphacut.io.files import alone
 
     place = tmp_path / "out"
     with alone("--out", place), pytest.raises(RefusedError, match="another run is writing into"):

@@ -12,7 +12,7 @@ from alphacut.case.content import Content
 from alphacut.case.load import Case, load
 from alphacut.entry import main
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.netcdf import own_files, read_dataset, read_summary
+from alphacut.io.netcdf import read_dataset, read_summary, require_own
 from alphacut.stages import envelope, modulus
 from alphacut.stages.chain import Chain
 from alphacut.stages.results import Results
@@ -87,7 +87,7 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
         'masses = ["[9, 10, 11] t"]', '[frame]\nmasses = ["[9, 10, 11] t"]'
     )
     content = load(written(tmp_path, text)).content
-    results = Chain(content, Store(tmp_path / "out", text, quiet=True)).run()
+    results = Chain(Results(content), Store(tmp_path / "out", text, quiet=True)).run()
     number = modulus.number_of(results.modulus)
     assert results.structure.numbers["E"] == number
     assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
@@ -136,11 +136,9 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
     folder = tmp_path / "out"
     assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
     summary = read_summary(folder)
-    assert {path.name for path in own_files(summary, folder)} == {"modulus.nc", "shares.nc"}
-    outside = {**summary, "fingerprints": {"../case": "", "/etc/passwd": ""}}
-    assert own_files(outside, folder) == []
+    require_own(summary, folder)
     with pytest.raises(RefusedError, match="of another run"):
-        own_files({**summary, "fingerprints": {"modulus": "other"}}, folder)
+        require_own({**summary, "fingerprints": {"modulus": "other"}}, folder)
     for text in ("", "[]", "{}", "[" * 100_000, '{"case": 1}', "null"):
         (folder / "summary.json").write_text(text)
         with pytest.raises(RefusedError, match="damaged"):
