@@ -41,7 +41,8 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     from matplotlib.lines import Line2D
 
     walk, column = recorded(results, task)
-    time, graphs = walk.storage.flow.time, np.array(walk.storage.graphs)[..., column]
+    flow, points = walk.storage.flow, walk.storage.points
+    time, graphs = flow.time, flow.values(points)[..., column]
     guess, new = walk.guess[0, :, column], walk.new[0, :, column]  # by node and side
     lower, upper = graphs.min(0), graphs.max(0)
     drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
@@ -83,7 +84,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
             fontsize=9,
         )
     panels[4].set_xlabel("time t (s)")
-    output = walk.storage.flow.outputs[column]
+    output = flow.outputs[column]
     for panel in panels[::2]:
         prefix_axis(panel, output, Output(output).unit)
     lines = [Line2D([], [], label=words, **look) for words, look in LINES.items()]
@@ -92,7 +93,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
 
 
 def recorded(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
-    """A run of the Graph Follower that keeps its graphs, and the column of the output drawn."""
+    """A run of the Graph Follower, and the column of the output drawn."""
     structure = results.structure
     assert structure is not None
     cuts = boxes(structure.inputs(task.fuzzy), (0.0,))
@@ -107,7 +108,7 @@ def recorded(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
     output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
     for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
         fine = share * task.section.gain * task.tolerance(structure).value
-        walk = GraphFollower(tolerance=fine, record=True).follow(flow)
+        walk = GraphFollower(tolerance=fine).follow(flow)
         if (walk.new[0, :, output] >= 0).any():
             break
     return walk, output

@@ -14,7 +14,7 @@ from alphacut.frame.identify import (
     measured_mode,
 )
 from alphacut.frame.identify import identify as identified
-from alphacut.frame.identify.possibility import widest
+from alphacut.frame.identify.identify import widest
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import require
 from alphacut.io.files import Document
@@ -69,7 +69,7 @@ def _document(after: Identified) -> Document:
         "inputs": {name: {"lower": low, "upper": high} for name, low, high in ends},
         "narrowed": dict(after.narrowed),
         "units": {name: of_storey_frame(name).unit for name in after.names},
-        "agreement": after.height,
+        "empty_from": after.empty,
         "claim": str(after.claim),
     }
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NoReturn
 
 import numpy as np
 
@@ -13,8 +12,9 @@ from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
-from alphacut.frame.structures.linear import LinearSystem, check_names, evaluate, frequencies
-from alphacut.fuzzy.refused import FailedError, RefusedError, real
+from alphacut.frame.structures.lagrangian import LagrangianSystem
+from alphacut.frame.structures.linear import LinearSystem, evaluate, frequencies
+from alphacut.fuzzy.refused import FailedError, RefusedError, chosen, real
 
 MOST_NODES = 10_000_000
 """Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
@@ -24,7 +24,7 @@ def nodes(duration: float, step: float) -> Array:
     """Time nodes from 0 to `duration` in s.
 
     Raises:
-        ValueError: One is no number, the step is not positive, or the duration is not a positive
+        RefusedError: One is no number, the step is not positive, or the duration is not a positive
             multiple of it, or of too many steps.
     """
     real("step", step, positive=True)
@@ -46,23 +46,34 @@ class StepError(FailedError):
     """A step of the integrator did not converge."""
 
 
+@dataclass(frozen=True, eq=False)
 class Flow(ABC):
     """Base of mappings from parameter sets to trajectories of the outputs, node by node.
 
     Args:
-        names: The uncertain parameters, in the order of the columns of points.
+        system: The structure.
+        names: Its uncertain parameters, in the order of the columns of points.
         duration: Length of the simulation, in s.
         step: Length of a step, in s.
+
+    Raises:
+        RefusedError: A name is unknown, or the duration is no multiple of the step.
     """
 
+    system: LinearSystem | LagrangianSystem
     names: tuple[str, ...]
     duration: float
     step: float
 
+    def __post_init__(self) -> None:
+        for name in self.names:
+            chosen("parameter", name, self.system.parameters)
+        nodes(self.duration, self.step)
+
     @property
-    @abstractmethod
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
+        return self.system.outputs
 
     @property
     @abstractmethod
@@ -91,7 +102,8 @@ class Flow(ABC):
         """Trajectories at `points` (S, d), shape (S, T, outputs).
 
         Raises:
-            ValueError: A trajectory does not exist, or leaves the range of floating-point numbers.
+            RefusedError: A trajectory does not exist, or leaves the range of floating-point
+                numbers.
             StepError: A step did not converge.
         """
         return self._finite(points, derivatives=False).value
@@ -104,18 +116,22 @@ class Flow(ABC):
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
-        except (np.linalg.LinAlgError, StepError) as failure:
-            self._locate(points, failure)
-        if not np.isfinite(motion.value).all():
-            bad, node = np.argwhere(~np.isfinite(motion.value).all(-1))[0]
-            when = f"not finite from t = {self.time[node]:g} s on at {self._named(points[bad])}"
-            raise RefusedError(
-                "trajectory", when, "motions that exist", f"{WITHIN}, or a smaller step"
-            )
+        except StepError as failure:
+            where = self._named(self._failing(points))
+            raise StepError(f"{failure}; it failed at {where}") from None
+        except np.linalg.LinAlgError:
+            what = f"a singular matrix at {self._named(self._failing(points))}"
+            raise RefusedError("trajectory", what, "motions that exist", WITHIN) from None
+        finite = np.isfinite(motion.value).all(-1)
+        if not finite.all():
+            bad, node = np.argwhere(~finite)[0]
+            what = f"not finite from t = {self.time[node]:g} s on at {self._named(points[bad])}"
+            cure = f"{WITHIN}, or a smaller step"
+            raise RefusedError("trajectory", what, "motions that exist", cure)
         return motion
 
-    def _locate(self, points: Array, failure: Exception) -> NoReturn:
-        """Raise a failure with its parameters, located by halving the set of points."""
+    def _failing(self, points: Array) -> Array:
+        """One of some points at which a motion fails, found by halving."""
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -123,16 +139,11 @@ class Flow(ABC):
                 points = points[len(half) :]
             except (np.linalg.LinAlgError, StepError):
                 points = half
-        where = f"at {self._named(points[0])}"
-        if isinstance(failure, StepError):
-            raise StepError(f"{failure}; it failed {where}") from None
-        raise RefusedError("trajectory", f"a singular matrix {where}", "motions that exist", WITHIN)
+        return np.asarray(points[0])
 
     def _named(self, point: Array) -> str:
-        return (
-            ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, point, strict=True))
-            or "the modal parameters"
-        )
+        pairs = zip(self.names, point, strict=True)
+        return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the modal parameters"
 
     @abstractmethod
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
@@ -144,30 +155,11 @@ class LinearFlow(Flow):
     """Trajectories of a linear structure by a one-step method.
 
     Args:
-        system: The structure.
-        names: Its uncertain parameters.
-        duration: Length of the simulation, in s.
-        step: Length of a step, in s.
-        integrator: The method.
-
-    Raises:
-        ValueError: A name is unknown, or the duration is no multiple of the step.
+        integrator: The method; the other arguments are those of `Flow`.
     """
 
     system: LinearSystem
-    names: tuple[str, ...]
-    duration: float
-    step: float
     integrator: Integrator = field(default_factory=Midpoint)
-
-    def __post_init__(self) -> None:
-        check_names(self.system, self.names)
-        nodes(self.duration, self.step)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-        return self.system.outputs
 
     @property
     def method(self) -> str:

@@ -11,12 +11,12 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.calculus.tape import Tape, tape, with_derivatives
-from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError, nodes
+from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.structures.lagrangian import Equations, LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import chosen
 
 TRIPLE_JUMP = (1 / (2 - 2 ** (1 / 3)), -(2 ** (1 / 3)) / (2 - 2 ** (1 / 3)), 1 / (2 - 2 ** (1 / 3)))
 """Lengths of three symmetric steps of order 2 that make one of order 4 (Yoshida 1990)."""
@@ -33,38 +33,15 @@ class LagrangianFlow(Flow):
     """Trajectories of a general system.
 
     Args:
-        system: The system.
-        names: Its uncertain parameters.
-        duration: Length of the simulation, in s.
-        step: Step, in s.
-        scheme: One of `SCHEMES`.
-        observe: Names of some outputs; all when empty.
-
-    Raises:
-        ValueError: A name is unknown, or the duration is no multiple of the step.
+        scheme: One of `SCHEMES`; the other arguments are those of `Flow`.
     """
 
     system: LagrangianSystem
-    names: tuple[str, ...]
-    duration: float
-    step: float
     scheme: str = "midpoint"
-    observe: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for kind, names, known in (
-            ("uncertain parameter", self.names, self.system.parameters),
-            ("output", self.observe, self.system.outputs),
-            ("integrator", (self.scheme,), SCHEMES),
-        ):
-            for name in names:
-                require(name in known, kind, name, ", ".join(known))
-        nodes(self.duration, self.step)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the observed quantities."""
-        return self.observe or self.system.outputs
+        super().__post_init__()
+        chosen("integrator", self.scheme, SCHEMES)
 
     @property
     def method(self) -> str:
@@ -188,7 +165,7 @@ def flow_of(
     if isinstance(model, LagrangianSystem):
         return LagrangianFlow(model, tuple(names), duration, step, str(integrator))
     if isinstance(integrator, str):
-        require(integrator in INTEGRATORS, "integrator", integrator, ", ".join(INTEGRATORS))
+        chosen("integrator", integrator, INTEGRATORS)
         integrator = INTEGRATORS[integrator]
     return LinearFlow(model, tuple(names), duration, step, integrator)
 

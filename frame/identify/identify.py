@@ -10,19 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
-from alphacut.frame.identify.measured import MeasuredMode
-from alphacut.frame.identify.possibility import Agreement, widest
+from alphacut.frame.identify.measured import MeasuredMode, ModeCut
 from alphacut.frame.identify.relaxation import enclosure
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
-from alphacut.fuzzy.sets.claimed import Claim, Claimed
+from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
+from alphacut.fuzzy.sets.numbers import Cut
 from alphacut.fuzzy.sets.stepwise import outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
@@ -30,6 +31,48 @@ ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 
 class RefutedError(FailedError):
     """No parameters in the priors agree with the measurement at the lowest level."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Opinions and claims on a frame's parameters and on its modes.
+
+    Args:
+        chain: The frame.
+        prior: Fuzzy number of each parameter of the chain.
+        measured: Measured modes, by rising number.
+    """
+
+    chain: Chain
+    prior: Mapping[str, FuzzyNumber]
+    measured: tuple[MeasuredMode, ...]
+
+    @cached_property
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """Parameters first, then the measured quantities."""
+        measured = {name: x for mode in self.measured for name, x in mode.quantities.items()}
+        return {**self.prior, **measured}
+
+    @cached_property
+    def joint(self) -> Joint | None:
+        """Rule by which the claims hold together; None where there is none."""
+        names = tuple(name for name, x in self.numbers.items() if isinstance(x, Claimed))
+        return Joint(names, False, "parameter of the measured frame", named=True) if names else None
+
+    def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
+        """Cut at the joint level α, of a claim at the level at which all hold together."""
+        if self.joint and isinstance(number, Claimed):
+            return number.cut(alpha / len(self.joint.names))
+        return number.cut(alpha)
+
+    def modes(self, alpha: float) -> list[ModeCut]:
+        """Ranges of the measured modes at the joint level α."""
+        return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
+
+
+def widest(number: FuzzyNumber) -> Cut:
+    """The widest cut that a number decides."""
+    return number.cut(number.decided) if isinstance(number, Claimed) else number.support
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,32 +95,31 @@ class Identified:
     """Parameters that agree with measured modes.
 
     Args:
-        agreement: Priors, measured modes and their joint possibility.
+        evidence: Priors and measured modes.
         alpha: Levels, shape (A,), rising.
-        lower: Lower ends of boxes proved to hold the sets, shape (A, d), in SI units. Above
-            `height` they repeat the last one that is not proved empty.
+        lower: Lower ends of boxes proved to hold the sets, shape (A, d), in SI units. From `empty`
+            on they repeat the last one that is not proved empty.
         upper: Upper ends.
-        height: Possibility of the parameters that agree best by least squares, and the least level
-            whose set is proved empty (1 if none is).
+        empty: Least level whose set is proved empty; 1 if none is.
     """
 
-    agreement: Agreement
+    evidence: Evidence
     alpha: Array
     lower: Array
     upper: Array
-    height: tuple[float, float]
+    empty: float
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters."""
-        return self.agreement.chain.names
+        return self.evidence.chain.names
 
     @property
     def claim(self) -> JointClaim:
         """Coverage of the boxes: the claims, and the conditions under which they hold."""
-        joint = JointClaim.of(self.agreement.numbers)
+        joint = JointClaim.of(self.evidence.numbers)
         model = ("the structure is such a storey frame",)
-        return JointClaim(self.agreement.joint, (*joint.conditions, *model), joint.opinions)
+        return JointClaim(self.evidence.joint, (*joint.conditions, *model), joint.opinions)
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
@@ -85,7 +127,7 @@ class Identified:
 
         Below the lowest level the prior's support holds.
         """
-        rule, priors = self.agreement.joint, self.agreement.prior
+        rule, priors = self.evidence.joint, self.evidence.prior
         numbers: dict[str, FuzzyNumber] = {}
         for column, name in enumerate(self.names):
             ends = np.stack([self.lower[:, column], self.upper[:, column]])
@@ -101,13 +143,13 @@ class Identified:
     @property
     def narrowed(self) -> dict[str, float]:
         """Width of each parameter's lowest cut over that of its prior."""
-        of, level = self.agreement, float(self.alpha[0])
+        of, level = self.evidence, float(self.alpha[0])
         widths = np.array([of.cut(of.prior[name], level).width for name in self.names])
         return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
 
     def predictions(self) -> tuple[Prediction, ...]:
         """Natural frequencies of all modes, measured or not, at each level."""
-        chain = self.agreement.chain
+        chain = self.evidence.chain
         logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
         ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
         hertz = np.sqrt(np.maximum(np.array(ranges), 0.0)) / (2 * np.pi)  # (A, 2, n)
@@ -137,9 +179,9 @@ def identify(
     """
     numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
     _refuse(frame, measured, numbers, alpha)
-    agreement = Agreement(Chain.of(frame, tuple(numbers)), numbers, tuple(measured))
+    evidence = Evidence(Chain.of(frame, tuple(numbers)), numbers, tuple(measured))
     levels = np.asarray(alpha, float)
-    boxes, empty = _boxes(agreement, levels)
+    boxes, empty = _boxes(evidence, levels)
     if not boxes:
         raise RefutedError(
             f"no parameters in their priors agree with the measured modes at α = {levels[0]:g}:"
@@ -147,11 +189,9 @@ def identify(
             "widen the priors, or check masses and numbers of modes",
         )
     boxes += [boxes[-1]] * (len(levels) - len(boxes))
-    best = agreement.chain.nominal * np.exp(agreement.best(*boxes[-1]))
-    height = float(agreement.possibility(best[None])[0]), empty
     lower, upper = (np.stack(side) for side in zip(*boxes, strict=True))
-    ends = _outward(lower, agreement, -1), _outward(upper, agreement, +1)
-    return Identified(agreement, levels, *ends, height)
+    ends = _outward(lower, evidence, -1), _outward(upper, evidence, +1)
+    return Identified(evidence, levels, *ends, empty)
 
 
 def _refuse(
@@ -179,27 +219,27 @@ def _refuse(
         require(meaningful, f"identify.{key}", value, allowed)
 
 
-def _boxes(agreement: Agreement, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
+def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
     """Ends of log parameters by level until none agree, and that level."""
     boxes: list[tuple[Array, Array]] = []
     for level in map(float, levels):
-        cuts = [agreement.cut(x, level) for x in agreement.prior.values()]
-        lower, upper = np.log(np.array(cuts).T / agreement.chain.nominal)
+        cuts = [evidence.cut(x, level) for x in evidence.prior.values()]
+        lower, upper = np.log(np.array(cuts).T / evidence.chain.nominal)
         if boxes:
             lower, upper = np.maximum(lower, boxes[-1][0]), np.minimum(upper, boxes[-1][1])
         box = None
         if (lower <= upper).all():
-            box = enclosure(agreement.chain, lower, upper, agreement.modes(level))
+            box = enclosure(evidence.chain, lower, upper, evidence.modes(level))
         if box is None:
             return boxes, level
         boxes.append(box)
     return boxes, 1.0
 
 
-def _outward(logs: Array, agreement: Agreement, sign: int) -> Array:
+def _outward(logs: Array, evidence: Evidence, sign: int) -> Array:
     """Parameters of log ends (A, d), rounded outward but not beyond the priors."""
-    ends = agreement.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)
-    limits = np.array([widest(x) for x in agreement.prior.values()])
+    ends = evidence.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)
+    limits = np.array([widest(x) for x in evidence.prior.values()])
     return np.asarray(
         np.minimum(ends, limits[:, 1]) if sign > 0 else np.maximum(ends, limits[:, 0])
     )

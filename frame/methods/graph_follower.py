@@ -58,7 +58,6 @@ class GraphFollower:
         order: Degree κ of the Taylor models, 1 or 2.
         tolerance: Promised gain above which a new trajectory is computed, in the unit of the first
             output.
-        record: Keep the trajectories themselves.
 
     Raises:
         RefusedError: A switch is out of its range.
@@ -67,7 +66,6 @@ class GraphFollower:
     name: ClassVar[str] = "graph-follower"
     order: int = 2
     tolerance: float = 1e-4
-    record: bool = False
 
     def __post_init__(self) -> None:
         require(self.order in (1, 2), "order", self.order, "1 and 2, the degrees of a Taylor model")
@@ -98,7 +96,7 @@ class GraphFollower:
 
     def follow(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Followed:
         """Follows the graphs on all levels of `flow.boxes`."""
-        storage = Storage(flow, self.record)
+        storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
         levels = len(flow.boxes.alpha)
         shape = (levels, *storage.top.shape)

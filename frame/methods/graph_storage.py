@@ -22,9 +22,7 @@ class Storage:
 
     Args:
         flow: Computes graphs.
-        record: Whether to keep the graphs themselves.
         points: Their unit coordinates, shape (G, d).
-        graphs: They, each of shape (T, m), where they are kept.
         top: The best value at each place.
         best: Which graph has it, the first where several do.
         first: First derivatives of that graph's output, shape (T, m, 2, d).
@@ -33,9 +31,7 @@ class Storage:
     """
 
     flow: UnitFlow
-    record: bool = False
     points: Array = field(init=False)
-    graphs: list[Array] = field(default_factory=list)
     top: Array = field(init=False)
     best: Index = field(init=False)
     first: Array = field(init=False)
@@ -71,8 +67,6 @@ class Storage:
         self.first[places] = np.moveaxis(jet.first, 0, -1)[where]
         self.second[places] = np.moveaxis(jet.second, (0, 1), (-2, -1))[where]
         self.points = np.vstack([self.points, points])
-        if self.record:
-            self.graphs += list(jet.value)
         return places
 
     def promised(

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, variables
 from alphacut.frame.structures.quantities import Parameter
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import require
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,25 +57,18 @@ class Accelerogram:
     acceleration: Array = field(repr=False)
 
     def __post_init__(self) -> None:
-        if (
-            not 0 < self.step < np.inf
-            or np.ndim(self.acceleration) != 1
-            or np.size(self.acceleration) < 2
-            or not np.isfinite(self.acceleration).all()
-        ):
-            what = f"{np.size(self.acceleration)} samples every {self.step:g} s"
-            raise RefusedError("accelerogram", what, "two or more finite samples, a positive step")
-        object.__setattr__(self, "acceleration", np.asarray(self.acceleration, float))
+        samples = np.asarray(self.acceleration, float)
+        several = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
+        what = f"{samples.size} samples every {self.step:g} s"
+        allowed = "two or more finite samples, a positive step"
+        require(several and 0 < self.step < np.inf, "accelerogram", what, allowed)
+        object.__setattr__(self, "acceleration", samples)
 
     @property
     def extremes(self) -> tuple[float, float, float]:
         """Largest magnitude (m/s²), slope between samples (m/s³) and jump at the end (m/s²)."""
-        a = np.asarray(self.acceleration)
-        return (
-            float(np.abs(a).max()),
-            float(np.abs(np.diff(a)).max()) / self.step,
-            abs(float(a[-1])),
-        )
+        size, slope = np.abs(self.acceleration), np.abs(np.diff(self.acceleration))
+        return float(size.max()), float(slope.max()) / self.step, float(size[-1])
 
 
 class LinearSystem(Protocol):
@@ -124,12 +117,6 @@ def evaluate(
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
     p = variables(values, [*names, *fixed], names if derivatives else (), 1 + bent)
     return system.matrices(p), system.observation(p)
-
-
-def check_names(system: LinearSystem, names: Sequence[str]) -> None:
-    """Raises RefusedError when a name is no parameter of `system`."""
-    for name in names:
-        require(name in system.parameters, "parameter", name, ", ".join(system.parameters))
 
 
 def round_off(largest: float, slowest: float, time: Array) -> Array:
