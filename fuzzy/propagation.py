@@ -17,7 +17,7 @@ from alphacut.fuzzy.campaign.workers import running
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
-from alphacut.fuzzy.plans.method import Method
+from alphacut.fuzzy.plans.design import Method
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.result import Bounds, Nature

@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
 from alphacut.fuzzy import Crisp, Extended, FuzzyNumber, General, Known, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.plans.method import Method as Plan
+from alphacut.fuzzy.plans.design import Method as Plan
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds as Cuts
 from alphacut.fuzzy.sets.stepwise import outer_steps

@@ -27,7 +27,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.plans.method import Method
+from alphacut.fuzzy.plans.design import Method
 from benchmarks.rows import write
 
 _GRID = 1e-4  # share of the widest cut that the grid of the true bounds may miss

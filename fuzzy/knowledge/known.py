@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +12,6 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import chosen, require
 
 Signs = NDArray[np.int8]
-GradientRange = Callable[[Array, Array], Mapping[str, tuple[Array, Array]]]
 ROUND_OFF = 1e-11
 """Of the range and of the largest value: smaller differences contradict nothing."""
 _COMPARED = 400  # samples of an output that are compared pair by pair at most
@@ -27,9 +26,6 @@ class Known:
             mapping by output, `{"load": {"deflection": 1}}`.
         monotone: Inputs in which every output is monotone while the others are fixed, in whatever
             direction; inputs with a sign need not be named again.
-        gradient_range: Function of the corners (lower, upper) of a box, two arrays (inputs,), that
-            returns for each output (`y` where it has no name) a lower and an upper bound of its
-            gradient over the box, two arrays (inputs,): it verifies signs box by box.
         source: Where the facts come from, named beside every guarantee that rests on them.
 
     Raises:
@@ -38,7 +34,6 @@ class Known:
 
     signs: Mapping[str, int | Mapping[str, int]] = field(default_factory=dict)
     monotone: tuple[str, ...] = ()
-    gradient_range: GradientRange | None = None
     source: str = "as stated by the caller"
 
     def __post_init__(self) -> None:
@@ -52,7 +47,6 @@ class Known:
         facts = {
             f"the signs of {', '.join(self.signs)} hold": self.signs,
             f"the outputs are monotone in {', '.join(self.monotone)}": self.monotone,
-            "the range of the gradient holds": self.gradient_range,
         }
         return tuple(f"{fact}, {self.source}" for fact, there in facts.items() if there)
 

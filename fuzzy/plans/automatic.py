@@ -18,13 +18,15 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.values import SpentError
-from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation, attained, searched
-from alphacut.fuzzy.plans.level_search import LevelSearch, cuts
+from alphacut.fuzzy.plans.alpha_cut_optimisation import LevelSearch, Optimisation, attained, cuts
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
+_STARTS = 2  # descents per bound of the search
+_LOOK = 6  # fresh points of a look per level and input
+_TOLERANCE = 1e-3  # of an output's range: how near descents agree; less found by a pass is nothing
 _MOST = 12  # outputs of which each bound is searched
 _SAFETY = 2  # the next pass may find more than the last one
 _ROUNDS = 12  # of a descent
@@ -37,45 +39,32 @@ _ROUNDING = 1e-9  # of an output's size
 class Automatic:
     """Corners where what is known of the model makes them suffice; a search elsewhere.
 
+    Of more than 12 outputs none is searched: their bounds are as the samples happen to be.
+
     Args:
-        tolerance: Share of an output's range within which a fresh descent agrees with the bound,
-            and of which the last pass must not find more.
-        starts: Descents per bound of the search.
-        look: Fresh points of a pass per level and input.
         passes: Passes at most; the last that finds nothing new ends them.
-        seed: Where the points start from.
-        outputs: Outputs whose bounds are searched; all if none is named, up to 12. The others are
-            as the samples happen to bound them.
 
     Raises:
-        RefusedError: A number is not positive, or the tolerance above 1.
+        RefusedError: There is no pass.
     """
 
-    tolerance: float = 1e-3
-    starts: int = 2
-    look: int = 6
     passes: int = 4
-    seed: int = 0
-    outputs: tuple[str, ...] = ()
 
     name = "automatic"
 
     def __post_init__(self) -> None:
-        real("tolerance", self.tolerance, positive=True, most=1)
-        for key in ("starts", "look", "passes"):
-            real(key, getattr(self, key), positive=True, whole=True)
-        real("seed", self.seed, whole=True)
+        real("passes", self.passes, positive=True, whole=True)
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output."""
-        outputs = searched(campaign, domain, self.outputs)
-        if not domain.interactions and corners_suffice(domain, outputs, campaign.known).all():
+        outputs = campaign(domain.modal[None]).columns
+        monotone = campaign.known.monotone_in(domain.names, outputs)
+        if not domain.interactions and corners_suffice(domain, monotone).all():
             return replace(Reduced().run(campaign, domain), method=self.name)
         outputs = outputs if len(outputs) <= _MOST else ()
-        search = Optimisation(starts=self.starts, look=self.look, seed=self.seed)
-        spent = search.search(campaign, domain, outputs)
-        check = _Passes(self, campaign, domain, outputs)
-        spent = spent or check.run()
+        spent = Optimisation(_STARTS, _LOOK).search(campaign, domain, outputs)
+        check = _Passes(campaign, domain, outputs)
+        spent = spent or check.run(self.passes)
         return check.judged(spent=spent)
 
 
@@ -84,7 +73,6 @@ class _Passes:
     """Passes that are independent of the search.
 
     Args:
-        method: Their settings.
         campaign: The model with the samples of the search.
         domain: Inputs and levels.
         outputs: Outputs whose bounds were searched.
@@ -94,22 +82,21 @@ class _Passes:
         ends: Where fresh descents ended: level and value by output and sign of the bound.
     """
 
-    method: Automatic
     campaign: Campaign
     domain: Domain
     outputs: tuple[str, ...]
     gain: Array = field(default_factory=lambda: np.zeros(()))
     ends: dict[tuple[str, float], list[tuple[int, float]]] = field(default_factory=dict)
 
-    def run(self) -> bool:
+    def run(self, passes: int) -> bool:
         """Pass until one finds nothing new; whether the budget ended that."""
         before = self._bounds()
-        for turn in range(self.method.passes):
-            spent = self._pass(self.method.seed + turn + 1)
+        for turn in range(passes):
+            spent = self._pass(turn + 1)
             after = self._bounds()
             self.gain = np.maximum(before.lower - after.lower, after.upper - before.upper)
             before = after
-            if spent or (self.gain <= self.method.tolerance * self._span()).all():
+            if spent or (self.gain <= _TOLERANCE * self._span()).all():
                 return spent
         return False
 
@@ -117,7 +104,7 @@ class _Passes:
         """Look and descend in every cut; whether the budget ended that."""
         try:
             for cut in cuts(self.campaign, self.domain):
-                fresh = cut.look(self.method.look * len(cut.moving), seed)
+                fresh = cut.look(_LOOK * len(cut.moving), seed)
                 for output, sign in product(self.outputs if len(fresh) else (), (1.0, -1.0)):
                     end = self._end(cut, fresh, output, sign)
                     self.ends.setdefault((output, sign), []).append((cut.level, end))
@@ -136,7 +123,7 @@ class _Passes:
 
     def judged(self, *, spent: bool) -> Bounds:
         """Bounds with their error where most fresh descents agree with them, else attained."""
-        bounds, near = self._bounds(), self.method.tolerance * self._span()
+        bounds, near = self._bounds(), _TOLERANCE * self._span()
         missed = [self._missed(bounds, column, near[column]) for column in range(len(near))]
         agrees = np.array([own is not None for own in missed]) & (self.gain <= near).all(axis=0)
         agrees[agrees] = [self._smooth(bounds, column) for column in np.flatnonzero(agrees)]
@@ -150,7 +137,7 @@ class _Passes:
         unsure = [name for name in self.outputs if not agrees[bounds.column(name)]]
         note = f"a better bound of {', '.join(unsure[:4])} is likely: an independent search ended"
         note += " elsewhere, or the bound lies at a kink or a jump"
-        last = attained(self.campaign, self.domain, self.method.name, spent=spent)
+        last = attained(self.campaign, self.domain, Automatic.name, spent=spent)
         return replace(
             last,  # the judgement took samples, too
             error=np.where(sure & ~crisp, error, 0.0),
@@ -184,7 +171,7 @@ class _Passes:
 
     def _bounds(self) -> Bounds:
         """Bounds so far."""
-        return attained(self.campaign, self.domain, self.method.name, spent=False)
+        return attained(self.campaign, self.domain, Automatic.name, spent=False)
 
     def _span(self) -> Array:
         """Range of each output over all samples, shape (columns,)."""

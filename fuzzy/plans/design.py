@@ -1,9 +1,10 @@
-"""A design: the samples of every α-level, and the retransformation of their values into α-cuts."""
+"""Methods, and designs: the samples of every α-level and how their values become α-cuts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -14,6 +15,17 @@ from alphacut.fuzzy.knowledge.known import contradiction, negligible
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import Domain
+
+
+class Method(Protocol):
+    """A way to search the boxes of the inputs for the extremes of a model: a frozen dataclass."""
+
+    @property
+    def name(self) -> str:
+        """The word for it in a case file."""
+
+    def run(self, campaign: Campaign, domain: Domain) -> Bounds:
+        """Bounds of every output on every level."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Function
 from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.plans.method import Method
+from alphacut.fuzzy.plans.design import Method
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.refused import real, require

@@ -1,9 +1,8 @@
 """Verification of monotonicity: the sign of every input's effect on every output, level by level.
 
-A sign is *proved* where a range of the gradient over the whole box excludes 0, or where the caller
-states it and no sample contradicts it: each stated input is changed alone to look. Otherwise it is
-*seen*: differences at probes of the box all have it, with a margin. What is seen is evidence, not
-proof, and the bounds that rest on it are attained only.
+A sign is *proved* where the caller states it and no sample contradicts it: each stated input is
+changed alone to look. Otherwise it is *seen*: differences at probes of the box all have it, with a
+margin. What is seen is evidence, not proof, and the bounds that rest on it are attained only.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.knowledge.known import Known, Signs
+from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.refused import chosen
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -31,12 +30,10 @@ class Effects:
         outputs: Names of the outputs.
         signs: +1, −1, or 0 where none holds, shape (levels, outputs, inputs); an input without
             width has +1.
-        proved: Whether the sign is proved, same shape.
     """
 
     outputs: tuple[str, ...]
     signs: Signs
-    proved: Mask
 
     def notes(self, domain: Domain) -> tuple[str, ...]:
         """Effects without a sign, and up to which level."""
@@ -62,21 +59,18 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
         chosen("output", name, columns)
     outputs = outputs or columns
     signs = campaign.known.stated(domain.names, outputs)
-    proved = signs != 0
     lowers, uppers = domain.boxes
-    for column in np.flatnonzero(proved.any(axis=0)):
+    for column in np.flatnonzero(signs.any(axis=0)):
         campaign(_changed(domain.modal, signs, lowers[0], uppers[0], int(column)))
-    rows = []
+    levels = []
     for row in range(len(lowers)):
         lower, upper = lowers[row], uppers[row]
-        signs, proved = signs.copy(), proved.copy()
-        signs[:, upper == lower], proved[:, upper == lower] = 1, True
-        _prove(signs, proved, campaign.known, outputs, lower, upper)
+        signs = np.where(upper == lower, np.int8(1), signs)
         if (signs == 0).any():
             seen = _Box(campaign, outputs, lower, upper).seen(domain.modal[None], signs)
             signs = np.where(signs == 0, seen, signs)
-        rows.append((signs, proved))
-    return Effects(outputs, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))
+        levels.append(signs)
+    return Effects(outputs, np.array(levels))
 
 
 def _changed(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
@@ -93,17 +87,6 @@ def _extreme(signs: Signs, lower: Array, upper: Array) -> Array:
     """The two extreme corners for every pattern of signs that occurs, shape (corners, inputs)."""
     rises = np.unique(signs >= 0, axis=0)
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
-
-
-def _prove(
-    signs: Signs, proved: Mask, known: Known, outputs: tuple[str, ...], lower: Array, upper: Array
-) -> None:
-    """Enter the signs that a range of the gradient over the box excludes from being others."""
-    ranges = known.gradient_range(lower, upper) if known.gradient_range else {}
-    for row, (least, most) in ((outputs.index(x), ranges[x]) for x in ranges if x in outputs):
-        for holds, sign in ((np.asarray(least) >= 0, 1), (np.asarray(most) <= 0, -1)):
-            fresh = holds & ~proved[row]
-            signs[row, fresh], proved[row, fresh] = sign, True
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,10 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.knowledge.known import Known, Signs
+from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.plans.design import Design, of_samples, proving
 from alphacut.fuzzy.plans.monotonicity import Effects, verify
-from alphacut.fuzzy.refused import chosen, require
+from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
@@ -94,13 +94,18 @@ def _transformed(
     domain.require_free(method)
     design = _combined(campaign, domain, refined, method)
     bounds = design.bounds(campaign(design.points), method)
-    return proving(bounds, campaign, corners_suffice(domain, bounds.outputs, campaign.known))
+    monotone = campaign.known.monotone_in(domain.names, bounds.outputs)
+    return proving(bounds, campaign, corners_suffice(domain, monotone))
 
 
-def corners_suffice(domain: Domain, outputs: Sequence[str], known: Known) -> Mask:
-    """Outputs that are stated to be monotone in every input that has a width, shape (outputs,)."""
+def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
+    """Outputs that are monotone in every input that has a width, shape (outputs,).
+
+    Args:
+        domain: Inputs and levels.
+        monotone: Whether each output is so in each input, shape (outputs, inputs).
+    """
     lower, upper = domain.boxes
-    monotone = known.monotone_in(domain.names, outputs)
     return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
 
 
@@ -138,24 +143,18 @@ class Reduced:
 class Extended:
     """Extended transformation method: ends of monotone inputs, all points of the others.
 
+    Monotone are those that the caller names (`Known`), and others of which probes show it.
+
     Args:
-        monotone: Inputs in which the model rises or falls throughout. If not given, what the caller
-            knows of the model, and for the other inputs a verification at probes.
         outputs: Outputs whose bounds matter; all if none is named.
     """
 
-    monotone: tuple[str, ...] | None = None
     outputs: tuple[str, ...] = ()
 
     name = "extended"
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
-        if self.monotone is not None:
-            for name in self.monotone:
-                chosen("monotone input", name, domain.names)
-            refined = set(domain.names) - set(self.monotone)
-            return _transformed(campaign, domain, refined, self.name)
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
         known = campaign.known.monotone_in(domain.names, effects.outputs)
@@ -169,8 +168,8 @@ class Extended:
 class Signed:
     """Two corners per level where all effects have a sign, else the general method's points.
 
-    Signs are stated by the caller (`Known.signs`), verified by a range of the gradient, or seen at
-    probes. The bounds are guaranteed where all signs are stated or verified, else attained.
+    Signs are stated by the caller (`Known.signs`) or seen at probes. Where all are stated the bounds
+    are guaranteed, else attained.
 
     Args:
         outputs: Outputs whose bounds matter; all if none is named. The others are as the samples
@@ -186,19 +185,16 @@ class Signed:
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
         afford(_size(effects, domain), campaign, self.name)
-        design = Design.from_levels(domain, self._points(effects, domain))
-        return _verified(design, campaign, effects, self.name)
-
-    def _points(self, effects: Effects, domain: Domain) -> list[Array]:
-        """Corners that the signs name, times the general method's points of other inputs."""
-        pairs = zip(effects.signs, grids(domain, domain.names), strict=True)
-        return [_level_points(np.unique(signs, axis=0), grid) for signs, grid in pairs]
+        each = zip(effects.signs, grids(domain, domain.names), strict=True)
+        points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in each]
+        return _verified(Design.from_levels(domain, points), campaign, effects, self.name)
 
 
 def _verified(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
-    """Bounds from the samples of a design, proved where all signs are stated or verified."""
+    """Bounds from the samples of a design, proved where all signs are stated."""
     corners = design.bounds(campaign(design.points), method)
-    proved = np.isin(corners.outputs, np.array(effects.outputs)[effects.proved.all(axis=(0, 2))])
+    stated = campaign.known.stated(design.domain.names, corners.outputs) != 0
+    proved = corners_suffice(design.domain, stated) & np.isin(corners.outputs, effects.outputs)
     judged = proving(corners, campaign, proved)
     bounds = of_samples(design.domain, campaign.samples, method)
     return replace(
@@ -222,6 +218,7 @@ def _size(effects: Effects, domain: Domain) -> float:
 
 
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
+    """Both corners that each pattern of signs names, times all points of inputs without a sign."""
     rows: list[tuple[float, ...]] = []
     for pattern in np.concatenate([signs, -signs]):
         pairs = zip(pattern, grid, strict=True)

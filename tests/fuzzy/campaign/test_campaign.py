@@ -53,7 +53,7 @@ def test_shared_calls_and_arrays_give_the_same_with_fewer_calls():
     assert (together.calls, array.calls) == (15, 1)
 
 
-@pytest.mark.parametrize("method", [General(), Automatic(outputs=("y",))])
+@pytest.mark.parametrize("method", [General(), Automatic()])
 def test_the_bits_do_not_depend_on_who_runs_the_samples(method):
     one = bits(run(method=method))
     assert bits(run(method=method, workers=2)) == one
@@ -143,6 +143,6 @@ def test_a_function_of_arrays_that_reduces_them_is_run_by_points():
 
 def test_progress_never_falls_and_ends_at_one():
     shares = []
-    propagate(model, INPUTS, Automatic(outputs=("y",)), progress=shares.append)
+    propagate(model, INPUTS, Automatic(), progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0

@@ -19,7 +19,7 @@ if __name__ == "__main__":
     inputs = {"a": Triangular(0.0, 0.3, 1.0), "b": Triangular(-1.0, 0.0, 2.0)}
     workers, out = int(sys.argv[1]), sys.argv[2]
     parts = []
-    for plan in (General(), Optimisation(outputs=("y",))):
+    for plan in (General(), Optimisation()):
         found = propagate(model, inputs, plan, shared=("a",), workers=workers, store=sys.argv[3], identity={"run": out})
         parts += [found.samples.values.array.tobytes(), found.lower.tobytes(), found.upper.tobytes(), found.lower_at.tobytes()]
     with open(out, "wb") as file:

@@ -63,7 +63,7 @@ def judged(gain, *lacks):
     domain = Domain({"x": Interval(0, 1)}, (0.0,))
     campaign = Campaign(Call(lambda x: x * x, ("x",)))
     campaign(np.linspace(0, 1, 11)[:, None])
-    passes = _Passes(Automatic(tolerance=1e-3), campaign, domain, ("y",))
+    passes = _Passes(campaign, domain, ("y",))
     passes.gain = np.array([[gain]])
     passes.ends = {("y", 1.0): [(0, lack) for lack in lacks]}
     return passes.judged(spent=False)
