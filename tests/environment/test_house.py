@@ -9,8 +9,8 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 32_135,
-    "files of the packages": 229,
+    "lines of the packages": 32_064,
+    "files of the packages": 227,
     "places that raise": 340,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
