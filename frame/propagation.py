@@ -8,10 +8,9 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from alphacut.frame.boxes import ALPHA, UnitFlow, boxes
-from alphacut.frame.checks.admissible import require_admissible
+from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.checks.step_error import (
-    require_stable,
+    probes,
     step_error,
     with_step_error,
     with_stray,
@@ -28,10 +27,11 @@ from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
@@ -39,6 +39,8 @@ from alphacut.fuzzy.refused import RefusedError, chosen, require
 
 JUDGED = 4
 """Most inputs of a follower's envelope that a proof is made beside."""
+OTHER_UNITS = 500
+"""From so many times the structure's own value on, or that part of it, units differ."""
 
 
 class Method(Protocol):
@@ -79,9 +81,9 @@ def envelope(
         alpha: Levels, rising within [0, 1].
         method: A method such as `Proof()`, or its name, see `METHODS`; unless given `Auto()` for
             linear structures, and `ImprovedFollower()` for others.
-        integrator: Time stepping. Of linear structures an integrator or its name: exact (of auto,
+        integrator: Time stepping of linear structures, an integrator or its name: exact (of auto,
             proof and search unless given), midpoint (of all others), rk4. Of general Lagrangian
-            systems midpoint (unless given) or composition4.
+            systems it is midpoint.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters, instead of a length in SI units. It is where no output is a displacement
             and neither method nor tolerance is named.
@@ -91,8 +93,8 @@ def envelope(
 
     Raises:
         RefusedError: An unknown name or option, a value outside its range, a support that reaches
-            values without a meaning, an unstable step, or a motion that does not exist.
-        FailedError: A step did not converge, or a method cannot do what it is to do.
+            values without a meaning, or a motion that does not exist.
+        FailedError: A step is too long, or a method cannot do what it is to do.
     """
     if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
         allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
@@ -170,8 +172,42 @@ def _flow(
         integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
     flow = flow_of(model, cuts.names, *nodes, integrator)
     require_admissible(model, cuts)
-    require_stable(flow, cuts)
     return UnitFlow(flow, cuts, relative)
+
+
+def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
+    """Refuse supports that reach values without a meaning.
+
+    Raises:
+        RefusedError: A support is not finite, reaches what its parameter must not be, or is of
+            another size than the structure's own value, as kN from N; or the weight may buckle a
+            storey, the mass matrix of a linear structure is not positive definite at the modal
+            parameters or a corner, or nothing moves it.
+    """
+    for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
+        own, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
+        require(own.admits(low, high), key, shown, own.range or "finite")
+        near = abs(system.parameters.get(name, 0.0))
+        sizes = abs(low), abs(high)
+        alike = near == 0 or (min(sizes) < OTHER_UNITS * near and OTHER_UNITS * max(sizes) > near)
+        allowed = f"values of the size of {near:g}, the structure's own"
+        require(alike or not any(sizes), key, shown, allowed, "give both in SI units")
+    if isinstance(system, LagrangianSystem):
+        return
+    if isinstance(system, StoreyFrame):
+        ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
+        system.require_standing(dict(zip(cuts.names, ends, strict=True)))
+    moved = system.ground is not None and np.any(system.ground.acceleration)
+    for point in probes(cuts):
+        at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
+        try:
+            matrices = evaluate(system, cuts.names, point[None], derivatives=False)[0]
+            positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
+        except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
+            positive = False
+        require(positive, "mass", f"not positive definite at {at}", "a mass for every unknown")
+        moved = moved or matrices.q0.value.any() or matrices.v0.value.any()
+    require(moved, "q0, v0 and ground", "zero", "a start or a record that moves something")
 
 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:

@@ -80,7 +80,7 @@ class Envelope(Section):
     )
     alpha: Levels = Field(default=ALPHA, description="α-levels")
     method: EnvelopeMethod = Field(default="auto", description="method of the envelope")
-    integrator: Literal["midpoint", "rk4", "exact", "composition4"] | None = Field(
+    integrator: Literal["midpoint", "rk4", "exact"] | None = Field(
         default=None, description="time stepping; by the method if left out"
     )
     tolerance: Annotated[Tolerance, text(_tolerance)] | None = Field(

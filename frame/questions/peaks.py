@@ -19,7 +19,7 @@ import numpy as np
 
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.result import Ends, Nature
 
 ANY = "any of them"
@@ -119,8 +119,8 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     """
     require(bool(limits), "limits", None, "one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
-        require(name in outputs, "limits", name, ", ".join(outputs))
-        require(limit > 0, f"limit of {name}", limit, "a positive number")
+        chosen("limits", name, outputs)
+        real(f"limit of {name}", float(limit), positive=True)
 
 
 @dataclass(frozen=True, eq=False)

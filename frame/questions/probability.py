@@ -23,7 +23,6 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.result import Nature
 
 LIMITS = 201
 """Limits for which the probability is computed besides."""
@@ -40,7 +39,6 @@ class Probability:
     """Probability that a magnitude exceeds its limit within the duration, by level.
 
     Args:
-        alpha: Levels, shape (A,).
         lower: Least probability over the fuzzy points tried, shape (A,).
         upper: Greatest one, shape (A,).
         error: What peaks between nodes may add to either, estimated, shape (A,).
@@ -51,7 +49,6 @@ class Probability:
         nature: Always attained.
     """
 
-    alpha: Array
     lower: Array
     upper: Array
     error: Array
@@ -59,7 +56,6 @@ class Probability:
     limits: Array
     curve: Array
     evaluations: int
-    nature: Nature = Nature.ATTAINED
 
 
 def probabilities(
@@ -122,7 +118,7 @@ def probabilities(
     level = np.repeat(np.arange(len(tried)), [len(some) for some in tried])
     events = [*np.moveaxis(every, -1, 0)] + ([every.max(-1)] if len(limits) > 1 else [])
     return {
-        name: _probability(event, level, cuts.alpha, scale, spreads=bool(random))
+        name: _probability(event, level, scale, spreads=bool(random))
         for name, event, scale in zip((*limits, ANY), events, (*sizes, 1.0), strict=False)
     }
 
@@ -144,15 +140,12 @@ def _tried(cuts: Boxes, level: int, spread: int) -> Array:
     return np.asarray(cuts.to_physical(np.vstack([ends, inner])))
 
 
-def _probability(
-    event: Array, level: Array, alpha: Array, scale: float, *, spreads: bool
-) -> Probability:
+def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> Probability:
     """Probability that peaks pass 1.
 
     Args:
         event: Peaks over their limit: at least, at most, at most within steps; (3, points, draws).
         level: Level of each point.
-        alpha: Levels.
         scale: The limit.
         spreads: Whether there are random inputs.
     """
@@ -163,7 +156,6 @@ def _probability(
     above = [ends[:, 0] for ends in _bounds(more, level, np.ones(1))]
     shares = np.append(low[:, -1], high[:, -1])
     return Probability(
-        alpha,
         low[:, -1],
         high[:, -1],
         np.maximum(above[0] - lowest[:, -1], above[1] - high[:, -1]),

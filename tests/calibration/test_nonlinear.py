@@ -9,7 +9,7 @@ from alphacut.frame import ImprovedFollower, LagrangianFlow, LagrangianSystem, e
 from alphacut.frame.calculus.jet import cos
 from alphacut.fuzzy import Nature
 from tests.calibration.declared import Calibration, free_seed
-from tests.calibration.motions import Drawn, about, judged, reached
+from tests.calibration.motions import Drawn, Extrapolated, about, judged, reached
 
 TOLERANCE = 1e-3
 METHOD = ImprovedFollower(TOLERANCE, budget=1500)
@@ -68,7 +68,7 @@ def test_errors_cover_or_bounds_are_called_attained():
         drawn = Drawn(system, inputs, duration=4.0, step=0.02)
         bounds = envelope(system, inputs, method=METHOD, **drawn.motion)
         attained += bounds.nature is Nature.ATTAINED
-        fine = LagrangianFlow(system, tuple(inputs), 4.0, 0.02, "composition4")
+        fine = Extrapolated(LagrangianFlow(system, tuple(inputs), 4.0, 0.02))
         before = len(table.violations)
         ends = reached(fine, inputs, rng)
         judged(table, bounds, ends, kind, (kind, number, share), tolerance=TOLERANCE)

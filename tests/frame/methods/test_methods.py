@@ -207,7 +207,7 @@ def test_where_neighbouring_motions_part_bounds_are_attained_and_no_more():
         ({"method": "auto", "tolerance": 0.0}, "tolerance is 0.0; allowed: finite numbers greater than 0"),
         ({"method": frame.Auto(), "seed": 1}, "none beside a method that is no name"),
         ({"integrator": "euler"}, "integrator is euler; allowed: midpoint, rk4, exact"),
-        ({"integrator": "rk4", "step": 1.0}, "at most 0.1"),
+        ({"integrator": "rk4", "step": 1.0}, "smaller step"),
         ({"step": 0.07}, "duration is 4 s; allowed: 1 to .* whole steps of 0.07 s"),
         ({"alpha": (1.0, 0.0)}, "levels that rise within"),
         ({"inputs": {}}, "inputs is {}; allowed: a mapping"),

@@ -8,7 +8,7 @@ import pytest
 from alphacut.frame import ImprovedFollower, LagrangianFlow, envelope, pendulum
 from alphacut.fuzzy import Nature
 from tests.calibration.declared import free_seed
-from tests.calibration.motions import Drawn, about, reached
+from tests.calibration.motions import Drawn, Extrapolated, about, reached
 from tests.calibration.test_nonlinear import quartic
 
 
@@ -38,7 +38,7 @@ def test_motions_that_part_are_attained_or_their_errors_cover(drawing):
         if bounds.nature is Nature.ATTAINED:
             attained += 1
             continue
-        fine = LagrangianFlow(system, tuple(inputs), 8.0, 0.02, "composition4")
+        fine = Extrapolated(LagrangianFlow(system, tuple(inputs), 8.0, 0.02))
         lower, upper = reached(fine, inputs, rng)
         outside = np.maximum(upper - bounds.upper[0], bounds.lower[0] - lower)
         if (outside > bounds.error[0] + 1e-9).any():

@@ -17,6 +17,7 @@ from alphacut.frame import (
     StoreyFrame,
     pendulum,
 )
+from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.fuzzy.refused import RefusedError
 
 COLUMNS = StoreyFrame((2e4, 1e4), (3.0, 2.5), 25e9, 1e-4)
@@ -123,7 +124,7 @@ def test_motions_refuse_unknown_names_and_odd_durations():
             "step is -0.1; allowed: finite numbers greater than 0",
         ),
         (lambda: LagrangianFlow(pendulum(), ("x",), 1.0, 0.1), "parameter is x; allowed: m, l"),
-        (lambda: LagrangianFlow(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
+        (lambda: flow_of(pendulum(), ("l",), 1.0, 0.1, "euler"), "integrator is euler"),
         (lambda: pendulum(length=-1.0), "length is -1.0; allowed: finite numbers greater"),
         (lambda: Accelerogram(0.0, np.ones(3)), "accelerogram is 3 samples every 0 s"),
     ):
