@@ -9,9 +9,9 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 32_064,
-    "files of the packages": 227,
-    "places that raise": 340,
+    "lines of the packages": 31_966,
+    "files of the packages": 226,
+    "places that raise": 337,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
 TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
