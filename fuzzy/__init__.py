@@ -8,7 +8,7 @@ from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
-from alphacut.fuzzy.propagation import propagate
+from alphacut.fuzzy.propagation import propagate, width_shares
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import levels
@@ -21,7 +21,6 @@ from alphacut.fuzzy.sets.numbers import (
     Trapezoidal,
     Triangular,
 )
-from alphacut.fuzzy.width_contributions import width_shares
 
 __all__ = [
     "Automatic", "Bounds", "Crisp", "Ellipsoidal", "Extended", "FailedError", "FuzzyNumber",

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
-from alphacut.fuzzy.refused import require
-
 Progress = Callable[[float], None]
 _WAIT = 1.0  # seconds before a bar appears
 _EVERY = 0.2  # seconds between its moves
@@ -29,12 +27,7 @@ def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
     Args:
         progress: The caller's function; None (or True) for a bar, if there is a terminal to show
             it; False for nothing.
-
-    Raises:
-        RefusedError: It is neither.
     """
-    plain = progress is None or isinstance(progress, bool) or callable(progress)
-    require(plain, "progress", progress, "a function of the share done, False for none")
     if callable(progress) or progress is False or not sys.stderr.isatty():
         yield progress if callable(progress) else None
         return

@@ -1,15 +1,18 @@
-"""From a function and its fuzzy inputs to its fuzzy outputs."""
+"""From a function and its fuzzy inputs to its fuzzy outputs, and what drives their width."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Literal
 
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.store import Identity, Store, model_key
@@ -21,9 +24,9 @@ from alphacut.fuzzy.plans.design import Method
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.result import Bounds, Nature
-from alphacut.fuzzy.sets.boxes import Domain, levels
+from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.interaction import Interaction
-from alphacut.fuzzy.sets.numbers import FuzzyNumber
+from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
 
 BUDGET = 10_000
 """Evaluations of the model that a call may take unless it says more."""
@@ -105,8 +108,6 @@ def propagate(
         units=_units(units or {}, bounds.outputs),
         evaluations=len(campaign),
         samples=campaign.samples,
-        calls=campaign.calls,
-        reused=campaign.reused,
         budget=budget,
         seconds=perf_counter() - start,
     )
@@ -143,3 +144,58 @@ def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
         chosen("unit of", name, sorted(names))
     own = tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
     return own if units else ()
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """Effect of each input, or group of inputs, on the width of a fuzzy result (Figs. 34, 35).
+
+    Args:
+        names: Inputs or groups.
+        width: Width with all inputs fuzzy, shape (…, outputs).
+        lost: Width lost when one is fixed, shape (names, …, outputs). What is lost to all need not
+            add up to the width: effects overlap.
+    """
+
+    names: tuple[str, ...]
+    width: Array
+    lost: Array
+
+    @property
+    def share(self) -> Array:
+        """Width lost over width, shape (names, …, outputs); 0 where there is no width.
+
+        A negative share says that the bounds are wrong by that much at least: a narrower input
+        cannot widen the true answer.
+        """
+        share: Array = np.zeros_like(self.lost)
+        return np.divide(self.lost, self.width, out=share, where=self.width > 0)
+
+
+def width_shares(
+    propagation: Callable[[Mapping[str, FuzzyNumber]], Bounds | tuple[Array, Array]],
+    inputs: Mapping[str, FuzzyNumber | float],
+    *,
+    groups: Mapping[str, Sequence[str]] | None = None,
+) -> Shares:
+    """Run a propagation with all inputs fuzzy and again with each fixed.
+
+    Args:
+        propagation: From fuzzy inputs to bounds, as `lambda inputs: propagate(function, inputs)`,
+            or to lower and upper ends, two arrays of one shape (…, outputs).
+        inputs: The fuzzy inputs.
+        groups: Names of inputs that are fixed together, by the name of their group; each input by
+            itself if not given.
+
+    Raises:
+        RefusedError: A group names no input.
+    """
+    numbers = fuzzy_inputs(inputs)
+    members = groups or {name: (name,) for name in numbers}
+    for name in (name for group in members.values() for name in group):
+        chosen("input of a group", name, numbers)
+    fixed = [{x: Crisp(numbers[x].modal) for x in group} for group in members.values()]
+    runs = [propagation({**numbers, **crisp}) for crisp in ({}, *fixed)]
+    ends = [(one.lower, one.upper) if isinstance(one, Bounds) else one for one in runs]
+    whole, *narrower = (np.asarray(upper) - lower for lower, upper in ends)
+    return Shares(tuple(members), whole, np.array([whole - width for width in narrower]))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, chosen, require
 from alphacut.fuzzy.sets.claimed import Claimed
-from alphacut.fuzzy.sets.numbers import rising
-from alphacut.fuzzy.sets.stepwise import Stepwise, outer_steps
+from alphacut.fuzzy.sets.numbers import Stepwise, outer_steps, rising
 
 if TYPE_CHECKING:
     import xarray
 
-    from alphacut.fuzzy.campaign.values import Samples
+    from alphacut.fuzzy.campaign.call import Samples
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 ROUND_OFF = 1e-9
@@ -108,8 +107,6 @@ class Bounds:
         outer: Proved ends outside others; None for none.
         notes: Remarks of the method, one sentence each.
         budget: Evaluations that were allowed; 0 for no limit.
-        calls: Calls of the model, each for the samples that share a set-up.
-        reused: Evaluations that were taken from a store.
         samples: Points and values that the bounds were taken from; None where none are kept.
 
     Raises:
@@ -138,8 +135,6 @@ class Bounds:
     outer: Ends | None = None
     notes: tuple[str, ...] = ()
     budget: int = 0
-    calls: int = 0
-    reused: int = 0
     samples: Samples | None = None
 
     def __post_init__(self) -> None:
@@ -152,21 +147,21 @@ class Bounds:
         middle = () if self.time is None else (len(self.time),)
         shape = (len(self.alpha), *middle, len(self.outputs))
         places = (*shape, len(self.inputs))
-        pairs = [pair for pair in (self.inner, self.outer) if pair is not None]
-        for name, array, expected in (
-            *((name, getattr(self, name), shape) for name in ("lower", "upper", "error")),
-            *((name, getattr(self, name), places) for name in ("lower_at", "upper_at")),
-            *((f"inner, outer: {end}", getattr(p, end), shape) for p in pairs for end in p._fields),
+        ends = [end for pair in (self.inner, self.outer) for end in pair or ()]
+        each = [words for words in (self.natures, self.units) if words]
+        for name, own, expected in (
+            *((name, getattr(self, name).shape, shape) for name in ("lower", "upper", "error")),
+            *((name, getattr(self, name).shape, places) for name in ("lower_at", "upper_at")),
+            *(("inner and outer", end.shape, shape) for end in ends),
+            *(("natures, units", (len(words),), shape[-1:]) for words in each),
         ):
-            require(array.shape == expected, f"shape of {name}", array.shape, str(expected))
-        each = {len(self.natures), len(self.units)} <= {0, len(self.outputs)}
-        require(each, "natures and units", (self.natures, self.units), "one an output")
+            require(own == expected, f"shape of {name}", own, str(expected))
 
     def _check_values(self) -> None:
-        finite = (np.isfinite(self.lower) & np.isfinite(self.upper)).all()
-        require(finite, "lower and upper", "not finite", "finite ends")
-        plain = ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed)).all()
-        require(plain, "error", "negative or NaN", "0 or more, or NaN where guaranteed")
+        finite = np.isfinite(self.lower) & np.isfinite(self.upper)
+        plain = finite & ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed))
+        allowed = "finite ends, errors of 0 or more, or NaN where guaranteed"
+        require(plain.all(), "lower, upper and error", "not finite, or negative", allowed)
 
     def _check_proof(self) -> None:
         """Refuse bounds that contradict each other by more than their error and rounding."""
@@ -254,35 +249,6 @@ class Bounds:
         column = self.column(output)
         return self.natures[column] if self.natures else self.nature
 
-    @property
-    def minimum(self) -> Array:
-        """Least lower end over time, shape (A, m)."""
-        return self.lower if self.time is None else self.lower.min(axis=1)
-
-    @property
-    def maximum(self) -> Array:
-        """Greatest upper end over time, shape (A, m)."""
-        return self.upper if self.time is None else self.upper.max(axis=1)
-
-    def select(self, *outputs: str) -> Self:
-        """The same of some outputs, in their order."""
-        columns = [self.column(name) for name in outputs]
-        natures = tuple(map(self.nature_of, outputs))
-        return replace(
-            self,
-            outputs=outputs,
-            units=tuple(self.units[k] for k in columns if self.units),
-            natures=natures,
-            nature=Nature.weakest(natures),
-            lower=self.lower[..., columns],
-            upper=self.upper[..., columns],
-            error=self.error[..., columns],
-            lower_at=self.lower_at[..., columns, :],
-            upper_at=self.upper_at[..., columns, :],
-            inner=_of(self.inner, columns),
-            outer=_of(self.outer, columns),
-        )
-
     def __str__(self) -> str:
         """Nature and cost; bounds of the first outputs, a line for each level; notes."""
         count = max(1, _ROWS // len(self.alpha))
@@ -312,12 +278,13 @@ class Bounds:
 
     def _lines(self, column: int) -> Iterator[str]:
         """A line for each level of an output, with the extremes over time where there is one."""
-        low, high, error = self.minimum[:, column], self.maximum[:, column], self.error[..., column]
+        low, high, error = (x[..., column] for x in (self.lower, self.upper, self.error))
+        if self.time is not None:
+            low, high, error = low.min(axis=1), high.max(axis=1), error.max(axis=1)
         nature = self.nature_of(self.outputs[column])
         differs = f", {nature}" if nature != self.nature else ""
         words = "gap to attained" if nature is Nature.GUARANTEED else "error"
-        worst = error if self.time is None else error.max(axis=1)
-        for alpha, least, most, miss in zip(self.alpha, low, high, worst, strict=True):
+        for alpha, least, most, miss in zip(self.alpha, low, high, error, strict=True):
             both = rounded(least, "lower", nature, 6), rounded(most, "upper", nature, 6)
             ends = both if both[0] <= both[1] else (least, most)  # attained, nearly one number
             head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
@@ -341,8 +308,3 @@ class Bounds:
 def _digits(value: float) -> str:
     """A number with six digits; empty where it is not known."""
     return "" if np.isnan(value) else f"{value + 0.0:.6g}"
-
-
-def _of(pair: Ends | None, columns: list[int]) -> Ends | None:
-    """The ends of some outputs."""
-    return pair and Ends(pair.lower[..., columns], pair.upper[..., columns])

@@ -16,7 +16,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Method as Plan
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds as Cuts
-from alphacut.fuzzy.sets.stepwise import outer_steps
+from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document, as_json
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants

@@ -18,7 +18,7 @@ from alphacut.frame.questions.peaks import peaks
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.width_contributions import Shares, width_shares
+from alphacut.fuzzy.propagation import Shares, width_shares
 from alphacut.io.files import Document, say
 from alphacut.io.provenance import NESTED
 from alphacut.stages.envelope import EnvelopeTask
@@ -73,10 +73,13 @@ def of_cell(campaign: Campaign) -> Shares:
     """
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
     quick = replace(campaign, modulus=modulus)
-    return width_shares(
-        lambda inputs: quick.cuts(inputs, Reduced(), progress=False).select(*OUTPUTS),
-        campaign.inputs,
-    )
+
+    def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
+        of = quick.cuts(inputs, Reduced(), progress=False)
+        columns = [of.column(name) for name in OUTPUTS]
+        return of.lower[:, columns], of.upper[:, columns]
+
+    return width_shares(bounds, campaign.inputs)
 
 
 def of_peaks(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:

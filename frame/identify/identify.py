@@ -23,8 +23,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
-from alphacut.fuzzy.sets.numbers import Cut
-from alphacut.fuzzy.sets.stepwise import outer_steps
+from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
 

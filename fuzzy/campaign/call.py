@@ -1,19 +1,79 @@
-"""Calls of a user's function, in the workers: points, points that share a set-up, arrays."""
+"""Calls of a user's function, in the workers, and the named outputs that they give."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from math import prod
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.campaign.values import Layout, flatten
-from alphacut.fuzzy.refused import chosen, require
+from alphacut.fuzzy.refused import FailedError, chosen, require
 
 Function = Callable[..., object]
+Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
+Layout = tuple[tuple[str, tuple[int, ...]], ...]
 _BATCH = 1024  # points per call of a vectorised function
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """Outputs at many points.
+
+    Args:
+        layout: Name and shape of each output, in column order; a number has the shape ().
+        array: One row a point, one column an entry of every output, shape (n, columns).
+    """
+
+    layout: Layout
+    array: Array
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Name of each column: `E`, or `s11[0]`, `s11[1]`, … of an output that is an array."""
+        return tuple(
+            name + "".join(f"[{i}]" for i in index)
+            for name, shape in self.layout
+            for index in np.ndindex(shape)
+        )
+
+    def output(self, name: str) -> Array:
+        """One output at all points, shape (n, …)."""
+        names, shapes = zip(*self.layout, strict=True)
+        chosen("output", name, names)
+        ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
+        place = names.index(name)
+        return np.split(self.array, ends, axis=1)[place].reshape(-1, *shapes[place])
+
+    def column(self, name: str) -> int:
+        """Index of a column."""
+        chosen("output", name, self._places)
+        return self._places[name]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: column for column, name in enumerate(self.columns)}
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points at which a model was evaluated, and its outputs there.
+
+    Args:
+        points: Shape (n, inputs).
+        values: Outputs at the points.
+    """
+
+    points: Array
+    values: Values
+
+
+class SpentError(FailedError):
+    """The next evaluations would pass the budget; none of them is run."""
 
 
 class Sample(NamedTuple):
@@ -99,10 +159,8 @@ class Call:
         outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
         named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
         arrays = {name: np.atleast_1d(np.asarray(value, float)) for name, value in named.items()}
-        for name, array in arrays.items():
-            allowed = f"arrays of the length {len(points)}, that of the points"
-            require(len(array) == len(points), f"output {name}", len(array), allowed)
-        return [{name: array[row] for name, array in arrays.items()} for row in range(len(points))]
+        rows = zip(*arrays.values(), strict=True)
+        return [dict(zip(arrays, row, strict=True)) for row in rows]
 
 
 def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
@@ -117,3 +175,32 @@ def _outcome(output: Any) -> Outcome:
         return Sample(*flatten(output))
     except (TypeError, ValueError) as error:
         return Failure(f"{type(error).__name__}: {error}")
+
+
+def flatten(output: Output) -> tuple[Layout, Array]:
+    """One sample's outputs as a layout and a row of numbers.
+
+    Args:
+        output: A number (named `y`), an array (`y[0]`, …) or a mapping of names to either.
+
+    Raises:
+        RefusedError: There is no number, one that is not finite, or two of the same name.
+    """
+    named = output if isinstance(output, Mapping) else {"y": output}
+    arrays = {str(name): _numbers(str(name), value) for name, value in named.items()}
+    layout = tuple((name, array.shape) for name, array in arrays.items())
+    columns = Values(layout, np.zeros((0, 0))).columns
+    apart = bool(columns) and len(set(columns)) == len(columns)
+    require(apart, "outputs", columns, "one number or more, each with a name of its own")
+    return layout, np.concatenate([array.ravel() for array in arrays.values()])
+
+
+def _numbers(name: str, value: ArrayLike | None) -> Array:
+    """Finite real numbers of an output, which may have no unit and no mask."""
+    array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
+    plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
+    real_numbers = plain and not hasattr(value, "units") and np.isfinite(array).all()
+    shown = " ".join(repr(value).split())[:80]
+    allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
+    require(real_numbers, f"output {name}", shown, allowed)
+    return np.asarray(array, float)

@@ -10,9 +10,18 @@ from time import perf_counter
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.campaign.call import Call, Failure, Outcome, Sample, named_point
+from alphacut.fuzzy.campaign.call import (
+    Call,
+    Failure,
+    Layout,
+    Outcome,
+    Sample,
+    Samples,
+    SpentError,
+    Values,
+    named_point,
+)
 from alphacut.fuzzy.campaign.store import Store, point_key
-from alphacut.fuzzy.campaign.values import Layout, Samples, SpentError, Values
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.refused import FailedError, real
@@ -21,7 +30,6 @@ _SHOWN = 3  # failed samples that a message quotes
 _LONG = 300  # letters of an error that a message quotes
 _PAUSE = 0.05  # seconds between two transactions at least
 _SHARE = 10  # a transaction that took t is not followed by another within 10 t
-_GATHERED = 1000  # samples of a transaction at most
 
 
 class CampaignError(FailedError):
@@ -64,8 +72,6 @@ class Campaign:
         skip: Whether samples that fail are left out (NaN) instead of ending the campaign.
 
     Attributes:
-        reused: Samples taken from the store.
-        calls: Calls of the function.
         failed: Samples left out.
         layout: Names and shapes of the outputs, as the first sample had them.
 
@@ -81,8 +87,6 @@ class Campaign:
     store: Store | None = None
     model: bytes = b""
     skip: bool = False
-    reused: int = 0
-    calls: int = 0
     failed: int = 0
     layout: Layout = ()
     _rows: dict[bytes, Array] = field(default_factory=dict)  # outputs by the bytes of the point
@@ -186,7 +190,6 @@ class _Batch:
         self._take_stored()
         try:
             for rows, outcomes in completed(campaign.call, self._tasks(), campaign.executor):
-                campaign.calls += 1
                 for row, outcome in zip(rows, outcomes, strict=True):
                     self._record(row, outcome)
                 self._write()
@@ -206,7 +209,6 @@ class _Batch:
             sample = campaign.store.get(campaign.model, self._key(row))
             if sample is not None:
                 self.outcomes[row] = campaign.in_order(sample)
-                campaign.reused += 1
 
     def _tasks(self) -> Iterator[Task]:
         """Calls to be made, without samples that are stored."""
@@ -223,7 +225,7 @@ class _Batch:
         """Write what is gathered: now, or when the last write is long enough ago to cost little."""
         start, store = perf_counter(), self.campaign.store
         due = start - self._written > max(_PAUSE, _SHARE * self._cost)
-        if store and self._gathered and (now or due or len(self._gathered) >= _GATHERED):
+        if store and self._gathered and (now or due):
             store.put(self.campaign.model, self._gathered)
             self._gathered = {}
             self._written = perf_counter()

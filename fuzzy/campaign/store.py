@@ -22,9 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.campaign.call import Sample
-from alphacut.fuzzy.campaign.values import Layout
-from alphacut.fuzzy.refused import FailedError, RefusedError, require
+from alphacut.fuzzy.campaign.call import Layout, Sample
+from alphacut.fuzzy.refused import FailedError, require
 
 Identity = Mapping[str, object]
 _PATIENCE = 60.0  # seconds to wait for another campaign's write
@@ -91,15 +90,14 @@ class Store:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._rows: dict[tuple[bytes, str], Row] = {}
+        cure = "move it away, or name another path"
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             start = self.path.open("rb").read(16) if self.path.exists() else b""
         except OSError as error:
-            allowed = "a file that may be written"
-            raise RefusedError("store", self.path, allowed, str(error)) from None
+            start, cure = b"unknown", str(error)
         own = start in (b"", b"SQLite format 3\0")
-        cure = "move it away, or name another path"
-        require(own, "store", self.path, "a file of samples", cure)
+        require(own, "store", self.path, "a file of samples that may be written", cure)
         self._connection = self._opened()
 
     def _opened(self) -> sqlite3.Connection:
@@ -110,7 +108,10 @@ class Store:
                 _prepare(connection)
                 damaged = connection.execute("pragma quick_check").fetchone() != ("ok",)
             except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-                damaged = _is_damage(error)
+                name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
+                if any(word in name for word in _TROUBLE):  # locks, space or rights: no damage
+                    raise
+                damaged = True
         damaged |= not self._read(connection, "asc")
         return self._mended(connection) if damaged else connection
 
@@ -188,14 +189,6 @@ class Store:
 def _prepare(connection: sqlite3.Connection) -> None:
     connection.execute("pragma synchronous = full")
     connection.execute(_TABLE)
-
-
-def _is_damage(error: Exception) -> bool:
-    """True if an error tells of damage; one of locks, space or rights is raised."""
-    name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
-    if any(word in name for word in _TROUBLE):
-        raise error
-    return True
 
 
 def model_key(identity: Identity) -> bytes:

@@ -14,7 +14,7 @@ from alphacut.fuzzy.knowledge.observations import Limits, Observations, Values
 from alphacut.fuzzy.knowledge.order_statistics import rank_cuts
 from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
-from alphacut.fuzzy.sets.stepwise import Stepwise
+from alphacut.fuzzy.sets.numbers import Stepwise
 
 CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
 

@@ -16,8 +16,7 @@ import numpy as np
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
-from alphacut.fuzzy.sets.numbers import FuzzyNumber
-from alphacut.fuzzy.sets.stepwise import Stepwise
+from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise
 
 
 def jointly(

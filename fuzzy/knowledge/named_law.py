@@ -16,7 +16,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.observations import Observations
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.sets.claimed import Claim, Claimed
-from alphacut.fuzzy.sets.stepwise import Stepwise
+from alphacut.fuzzy.sets.numbers import Stepwise
 
 Law = Literal["normal", "log-normal"]
 LEVELS = np.unique(
@@ -42,34 +42,26 @@ def law_cuts(
         RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
             censored without an end; or the mean of a log-normal law is meant.
     """
-    logarithmic = law == "log-normal"
-    normal = not (logarithmic and mean)
-    require(normal, "law of a mean", law, "normal", "give bounds=(lower, upper) in place of a law")
-    positive = not logarithmic or (data.lower > 0).all()
-    require(positive, "least value", data.lower[0], "positive ones with a log-normal law")
+    logarithmic, finite = law == "log-normal", np.isfinite([data.lower, data.upper]).all()
+    cure = "give bounds=(lower, upper) in place of a law, or measure more"
+    require(not (logarithmic and mean), "law of a mean", law, "normal", cure)
+    positive = not logarithmic or data.lower[0] > 0
+    require(positive, "least value", data.lower[0], "positive ones with a log-normal law", cure)
+    unlike = not data.exact or data.lower[0] < data.lower[-1]
+    values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
+    enough = data.count > 1 and finite and unlike
+    require(enough, f"values of a {law} law", values, "two or more, finite, unlike", cure)
     about = data.mapped(np.log) if logarithmic else data
-    _require_scatter(about, law)
     lower, upper = _student(about, 0.5 if mean else quantile)
     with np.errstate(over="ignore"):
         lower, upper = (np.exp(lower), np.exp(upper)) if logarithmic else (lower, upper)
     return _within(lower, upper, data.bounds)
 
 
-def _require_scatter(data: Observations, law: str) -> None:
-    """Refuse values that do not tell the scatter of a law."""
-    finite = np.isfinite(data.lower).all() and np.isfinite(data.upper).all()
-    unlike = not data.exact or data.lower[0] < data.lower[-1]
-    cure = "leave the law out, give bounds=, or measure more"
-    values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
-    enough = data.count > 1 and finite and unlike
-    require(enough, f"values of a {law} law", values, "two or more, finite, unlike", cure)
-
-
 def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
     """Ends mean + factor · scatter over the levels, worst over the values' intervals."""
     below, above = _factors(data.count, quantile)
-    scatter = _scatter(data)
-    least, most = scatter
+    least, most = _scatter(data)
     lower = data.lower.mean() + below * np.where(below < 0, most, least)
     upper = data.upper.mean() + above * np.where(above > 0, most, least)
     return lower, upper

@@ -20,7 +20,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.knowledge.observations import Observations
 from alphacut.fuzzy.refused import require
-from alphacut.fuzzy.sets.stepwise import Stepwise
+from alphacut.fuzzy.sets.numbers import Stepwise
 
 
 @dataclass(frozen=True, eq=False)

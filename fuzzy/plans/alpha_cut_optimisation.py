@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.campaign.values import SpentError
 from alphacut.fuzzy.plans.design import of_samples
 from alphacut.fuzzy.refused import FailedError, real
 from alphacut.fuzzy.result import Bounds

@@ -16,8 +16,8 @@ from itertools import product
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.campaign.values import SpentError
 from alphacut.fuzzy.plans.alpha_cut_optimisation import LevelSearch, Optimisation, attained, cuts
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.refused import real

@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.campaign.call import Samples, Values
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.campaign.values import Samples, Values
 from alphacut.fuzzy.knowledge.known import contradiction, negligible
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Ends, Nature

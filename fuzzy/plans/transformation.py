@@ -168,8 +168,8 @@ class Extended:
 class Signed:
     """Two corners per level where all effects have a sign, else the general method's points.
 
-    Signs are stated by the caller (`Known.signs`) or seen at probes. Where all are stated the bounds
-    are guaranteed, else attained.
+    Signs are stated by the caller (`Known.signs`) or seen at probes. Where all are stated, the
+    bounds are guaranteed, else attained.
 
     Args:
         outputs: Outputs whose bounds matter; all if none is named. The others are as the samples

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import chosen, real, require
 from alphacut.fuzzy.sets.claimed import from_level
-from alphacut.fuzzy.sets.interaction import Interaction, require_inputs
+from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, rising
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
@@ -63,7 +63,9 @@ class Domain:
         object.__setattr__(self, "alpha", alpha)
         object.__setattr__(self, "inputs", decided)
         object.__setattr__(self, "interactions", tuple(self.interactions))
-        require_inputs(self.interactions, self.names)
+        for interaction in self.interactions:
+            for name in interaction.names:
+                chosen(f"input of {type(interaction).__name__}", name, self.names)
 
     @property
     def names(self) -> tuple[str, ...]:

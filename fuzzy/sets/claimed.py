@@ -8,8 +8,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, level
-from alphacut.fuzzy.sets.stepwise import Stepwise
+from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, Stepwise, level
 
 
 @dataclass(frozen=True)

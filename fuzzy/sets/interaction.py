@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import chosen, real, require
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 
@@ -127,10 +127,3 @@ def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Arra
     line: Array = point + shares * (anchor - point)
     line[-1] = anchor
     return np.asarray(line[np.argmax(slack(line) >= 0)])
-
-
-def require_inputs(interactions: Sequence[Interaction], inputs: Sequence[str]) -> None:
-    """Refuse interactions that name what is no input."""
-    for interaction in interactions:
-        for name in interaction.names:
-            chosen(f"input of {type(interaction).__name__}", name, inputs)

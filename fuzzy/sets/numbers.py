@@ -198,11 +198,35 @@ class Trapezoidal(_Corners):
 
 
 @dataclass(frozen=True)
-class PiecewiseLinear(FuzzyNumber):
+class _Nested(FuzzyNumber):
+    """Base of numbers from nested cuts at some levels."""
+
+    alpha: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    to_one: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        levels = rising(self.alpha)
+        low, high = (tuple(map(float, row)) for row in (self.lower, self.upper))
+        whole = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
+        alike = len(levels) == len(low) == len(high)
+        allowed = f"levels that rise from 0 {'to' if self.to_one else 'up to'} 1, one for each end"
+        require(whole and alike, "alpha", (levels, len(low), len(high)), allowed)
+        ends = np.array([*low, *high[::-1]])
+        ordered = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
+        require(ordered, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
+        for name, row in zip(("alpha", "lower", "upper"), (levels, low, high), strict=True):
+            object.__setattr__(self, name, row)
+
+
+@dataclass(frozen=True)
+class PiecewiseLinear(_Nested):
     """Fuzzy number from nested α-cuts, linear between them.
 
     Args:
-        alpha: Levels, rising from 0 to 1, at least two.
+        alpha: Levels, rising from 0 to 1.
         lower: Lower ends of the cuts, not falling with α.
         upper: Upper ends of the cuts, not rising with α.
 
@@ -211,16 +235,7 @@ class PiecewiseLinear(FuzzyNumber):
             intervals.
     """
 
-    alpha: tuple[float, ...]
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        rows = nested(self.alpha, self.lower, self.upper)
-        for name, row in zip(("alpha", "lower", "upper"), rows, strict=True):
-            object.__setattr__(self, name, row)
-        whole = self.alpha[-1] == 1 and len(self.alpha) > 1
-        require(whole, "alpha", self.alpha, "levels that rise from 0 to 1")
+    to_one = True
 
     @property
     def cuts(self) -> Cuts:
@@ -228,11 +243,12 @@ class PiecewiseLinear(FuzzyNumber):
         return Cuts(self.alpha, self.lower, self.upper)
 
 
-def nested(alpha: Iterable[float], lower: ArrayLike, upper: ArrayLike) -> Cuts:
-    """Cuts as tuples of numbers.
+@dataclass(frozen=True)
+class Stepwise(_Nested):
+    """Fuzzy number by nested cuts, each of which holds from its level up to the next one.
 
     Args:
-        alpha: Levels, rising from 0, at most 1.
+        alpha: Levels from which the cuts hold, rising from 0, at most 1.
         lower: Lower ends, not falling.
         upper: Upper ends, not rising.
 
@@ -240,11 +256,38 @@ def nested(alpha: Iterable[float], lower: ArrayLike, upper: ArrayLike) -> Cuts:
         RefusedError: Lengths differ, levels do not rise from 0 within [0, 1], or cuts are not
             finite, nested intervals.
     """
-    levels, low, high = rising(alpha), np.asarray(lower, float), np.asarray(upper, float)
-    alike = levels[0] == 0 and len(levels) == len(low) == len(high)
-    shown = (levels, len(low), len(high))
-    require(alike, "alpha", shown, "levels that rise from 0 within [0, 1], one an end")
-    ends = np.concatenate([low, high[::-1]])
-    ordered = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
-    require(ordered, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
-    return Cuts(levels, tuple(map(float, low)), tuple(map(float, high)))
+
+    @cached_property
+    def cuts(self) -> Cuts:
+        """The cuts at every level and at the floating-point number just below the next one."""
+        ends = [*(np.nextafter(level, 0.0) for level in self.alpha[1:]), 1.0]
+        rows = [
+            (at, k)
+            for k, (start, end) in enumerate(zip(self.alpha, ends, strict=True))
+            for at in dict.fromkeys((start, float(end)))
+        ]
+        return Cuts(
+            tuple(at for at, _ in rows),
+            tuple(self.lower[k] for _, k in rows),
+            tuple(self.upper[k] for _, k in rows),
+        )
+
+    def cut(self, alpha: float) -> Cut:
+        """The cut that holds at `alpha` in [0, 1]."""
+        at = bisect_right(self.alpha, level(alpha)) - 1
+        return Cut(self.lower[at], self.upper[at])
+
+
+def outer_steps(
+    alpha: Sequence[float] | Array, lower: Sequence[float] | Array, upper: Sequence[float] | Array
+) -> Stepwise:
+    """Steps around nested cuts known at some levels: between two levels the wider cut holds.
+
+    Args:
+        alpha: Levels, rising; the first cut holds from 0 on. One that rounding has lifted above a
+            decimal, as 0.1 + 0.2, counts as that decimal.
+        lower: Lower ends.
+        upper: Upper ends.
+    """
+    levels = (0.0, *(min(float(level), round(float(level), 12)) for level in alpha[1:]))
+    return Stepwise(levels, tuple(lower), tuple(upper))

@@ -134,7 +134,7 @@ def polished(flow, start, low, high, bound):
     return np.array(path)
 
 
-def judged(table, found, ends, quantity, case, *, tolerance=0.0, level=0):
+def judged(table, found, ends, quantity, case, *, tolerance=0.0, level=0, outputs=slice(None)):
     """Adds the bounds of an envelope by what its nature promises; attained ones promise nothing.
 
     Args:
@@ -145,15 +145,17 @@ def judged(table, found, ends, quantity, case, *, tolerance=0.0, level=0):
         case: What tells this case from others.
         tolerance: Error asked for, as a share of each output's peak.
         level: Index of the cut.
+        outputs: Columns that are meant.
     """
-    low, high = ends
+    low, high = (end[:, outputs] for end in ends)
+    lower, upper, errors = (x[level][:, outputs] for x in (found.lower, found.upper, found.error))
     size = np.broadcast_to(np.maximum(np.abs(low), np.abs(high)).max(0), low.shape)
     if found.nature is Nature.GUARANTEED:
-        proved = found.lower[level].ravel(), found.upper[level].ravel()
+        proved = lower.ravel(), upper.ravel()
         own = low.ravel(), high.ravel()
         table.guaranteed(quantity, proved, own, size=size.ravel(), case=case)
     elif found.nature is Nature.ESTIMATED:
-        for true in (found.lower[level] - low, high - found.upper[level]):
-            least, error = 0.1 * tolerance * size, found.error[level]
+        for true in (lower - low, high - upper):
+            least, error = 0.1 * tolerance * size, errors
             true = np.maximum(true, 0)
             table.estimated(quantity, error, true, size=size, least=least, case=case)

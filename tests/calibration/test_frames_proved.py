@@ -20,6 +20,6 @@ def test_no_exact_motion_leaves_proved_bounds(inputs):
         found = envelope(drawn.system, drawn.inputs, method=method, **drawn.motion)
         ends = reached(exact_flow(drawn), drawn.inputs, rng)
         for k, output in enumerate(found.outputs):
-            one = [end[:, [k]] for end in ends]
-            judged(table, found.select(output), one, output.rstrip("1234"), (number, output))
+            quantity = output.rstrip("1234")
+            judged(table, found, ends, quantity, (number, output), outputs=[k])
     table.judge()

@@ -26,7 +26,7 @@ def test_no_exact_motion_leaves_the_dual_bounds():
         assert found.nature is Nature.GUARANTEED
         ends = reached(exact_flow(drawn), drawn.inputs, rng)
         for k, output in enumerate(found.outputs):
-            one = [end[:, [k]] for end in ends]
-            judged(table, found.select(output), one, output.rstrip("1234567"), (number, output))
+            quantity = output.rstrip("1234567")
+            judged(table, found, ends, quantity, (number, output), outputs=[k])
     print(f"{refused} of 6 refused")
     table.judge()

@@ -77,12 +77,10 @@ def test_bounds_may_miss_each_other_by_rounding_and_no_more(far, refused):
         replace(found, inner=beyond)
 
 
-def test_an_output_and_its_extremes_over_time_are_read_by_name():
+def test_an_output_is_read_by_name():
     found = bounds(time=np.array([0.0, 1.0]))
-    assert found.minimum.tolist() == [[1], [4]]
-    assert found.maximum.tolist() == [[16], [4]]
     assert found.bounds("y").lower.shape == (2, 2)
-    assert found.select("y").nature_of("y") is Nature.ATTAINED
+    assert found.nature_of("y") is Nature.ATTAINED
     with pytest.raises(RefusedError) as refused:
         found.bounds("z")
     assert (refused.value.value, refused.value.allowed) == ("z", "y")

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from alphacut.fuzzy import Crisp, Interval, PiecewiseLinear, Trapezoidal, Triangular
-from alphacut.fuzzy.sets.stepwise import outer_steps
+from alphacut.fuzzy.sets.numbers import outer_steps
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 NUMBERS = [
