@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, model_validator
 
 from alphacut.case.material import (
     Cell,
@@ -18,7 +18,7 @@ from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
 from alphacut.case.structure import Frame, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.questions.decision import Decision
 from alphacut.questions.probability import Probability
 from alphacut.questions.question import Question
@@ -26,7 +26,7 @@ from alphacut.questions.tolerances import Tolerances
 
 Stage = Literal["microstructure", "modulus", "envelope"]
 QUESTIONS: tuple[type[Question], ...] = (Probability, Decision, Tolerances)
-"""Questions that a case may put to its motion."""
+"""Questions that a case may put to its motion, each a section as well."""
 
 
 class Content(Section):
@@ -47,11 +47,14 @@ class Content(Section):
     study: tuple[Study, ...] = ()
     envelope: Envelope | None = None
     identify: Identify | None = None
+    probability: Probability | None = None
+    decision: Decision | None = None
+    tolerances: Tolerances | None = None
 
     @property
     def questions(self) -> dict[str, Question]:
         """Sections of questions to the motion, by their keys."""
-        every = {question.key: getattr(self, question.key, None) for question in QUESTIONS}
+        every = {question.key: getattr(self, question.key) for question in QUESTIONS}
         return {key: section for key, section in every.items() if section is not None}
 
     @property
@@ -71,10 +74,8 @@ class Content(Section):
         Raises:
             RefusedError: There is none.
         """
-        there = self.radius is not None and self.round is not None
-        require(there, "radius", None, "sections [radius] and [cell]")
-        assert self.radius is not None
-        assert self.round is not None
+        if self.radius is None or self.round is None:
+            raise RefusedError("radius", None, "sections [radius] and [cell]")
         return self.radius, self.round
 
     @property
@@ -92,15 +93,19 @@ class Content(Section):
             "modulus": ("cell",) if known else ("radius", "cell"),
             "envelope": ("envelope",),
         }
-        for stage, section in ((x, y) for x in self.stages for y in needs[x]):
-            there = getattr(self, section) is not None
-            require(there, section, None, f"[{section}], which stage {stage} needs")
+        method = self.modulus.method
+        methods = (method,) if self.round is None else self.round.methods
         one = "microstructure" not in self.stages or self.radius is None
-        require(one, "radius", "beside stage microstructure", "one of them")
-        if self.round is not None:
-            methods = self.round.methods
-            allowed, method = ", ".join(methods), self.modulus.method
-            require(method in methods, "modulus.method", method, f"{allowed} for this cell")
+        for holds, key, value, allowed in (
+            *(
+                (getattr(self, x) is not None, x, None, f"[{x}], which stage {stage} needs")
+                for stage in self.stages
+                for x in needs[stage]
+            ),
+            (one, "radius", "beside stage microstructure", "one of them"),
+            (method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell"),
+        ):
+            require(holds, key, value, allowed)
         return self
 
     @model_validator(mode="after")
@@ -109,12 +114,10 @@ class Content(Section):
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return self
-        both = self.frame is not None and self.pendulum is not None
-        value, allowed = "beside [pendulum]" if both else None, "one of [frame] and [pendulum]"
-        require(structure is not None and not both, "frame", value, allowed)
-        assert structure is not None
+        if structure is None or None not in (self.frame, self.pendulum):
+            value = None if structure is None else "beside [pendulum]"
+            raise RefusedError("frame", value, "one of [frame] and [pendulum]")
         whole = self.frame is None or self.frame.is_whole or "modulus" in self.stages
-        require(whole, "frame.modulus", None, "a modulus, or stage modulus")
         own = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         studies = {"envelope": own} | {f"study[{k}]": x for k, x in enumerate(self.study)}
         for key, study in studies.items():
@@ -123,16 +126,18 @@ class Content(Section):
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
         names = [study.name for study in self.study]
-        for place, name in enumerate(names):
-            require(name not in names[:place], f"study[{place}].name", name, "a name of its own")
+        framed = self.identify is None or self.frame is not None
+        for holds, key, value, allowed in (
+            (whole, "frame.modulus", None, "a modulus, or stage modulus"),
+            (framed, "identify", "without a frame", "beside [frame]"),
+            *(
+                (name not in names[:place], f"study[{place}].name", name, "a name of its own")
+                for place, name in enumerate(names)
+            ),
+        ):
+            require(holds, key, value, allowed)
         for section in self.questions.values():
             section.check(structure)
         if self.identify is not None:
-            require(self.frame is not None, "identify", "without a frame", "beside [frame]")
             structure.inputs(self.identify.learn, "identify.learn")
         return self
-
-
-_FIELDS: dict[str, Any] = {one.key: (one | None, None) for one in QUESTIONS}
-CONTENT: type[Content] = create_model("CaseFile", __base__=Content, **_FIELDS)
-"""The content of a case with a section for each question."""

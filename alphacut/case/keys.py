@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
-from alphacut.case.content import CONTENT
+from alphacut.case.content import Content
 from alphacut.case.types import Quantity, Section
 
 Models = list[type[Section]]
@@ -18,14 +18,14 @@ Models = list[type[Section]]
 @cache
 def every_key() -> dict[str, FieldInfo]:
     """All keys by their full names, sections left out."""
-    return {name: info for name, info, models in _walk("", CONTENT) if not models}
+    return {name: info for name, info, models in _walk("", Content) if not models}
 
 
 @cache
 def sections() -> dict[str, Models]:
     """The models of every section by its name; that of an image and of a round cell have one."""
-    every: dict[str, Models] = {"": [CONTENT]}
-    return every | {name: models for name, _, models in _walk("", CONTENT) if models}
+    every: dict[str, Models] = {"": [Content]}
+    return every | {name: models for name, _, models in _walk("", Content) if models}
 
 
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, Models]]:
@@ -60,7 +60,7 @@ def allowed(info: FieldInfo) -> str:
 
 def json_schema() -> str:
     """The JSON Schema of a case file, for editors."""
-    schema = CONTENT.model_json_schema(by_alias=True)
+    schema = Content.model_json_schema(by_alias=True)
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
 

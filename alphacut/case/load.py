@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from alphacut.case.content import CONTENT, Content
+from alphacut.case.content import Content
 from alphacut.case.keys import every_key, sections
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.problem import BadInput, Problem, nearest, suggestion
@@ -74,7 +74,7 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     table = _parsed(path, text)
     changed = apply_changes(table, changes)
     try:
-        content = CONTENT.model_validate(table, context={"folder": path.parent})
+        content = Content.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
         lines = lines_of_keys(text)
         problems = [_located(p, path, lines, changed) for p in _problems(error)]
@@ -85,13 +85,11 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 def _parsed(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
-    except RecursionError:
-        raise BadInput(Problem(str(path), "has a value that is nested too deeply")) from None
-    except tomllib.TOMLDecodeError as error:
+    except (RecursionError, tomllib.TOMLDecodeError) as error:
         where = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        lines = text.splitlines()
-        line = int(where[1]) if where else max(1, len(lines))
-        shown = lines[line - 1].strip() if len(lines) >= line else ""
+        lines = [] if isinstance(error, RecursionError) else text.splitlines()
+        line = int(where[1]) if where else len(lines)
+        shown = lines[line - 1].strip() if len(lines) >= line > 0 else ""
         what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
         raise BadInput(Problem(shown or "the file", what, file=str(path), line=line)) from None
 
@@ -135,15 +133,15 @@ def _problem(key: str, detail: ErrorDetails) -> Problem:
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
         return replace(Problem.of(cause), key=cause.key or key)
+    what, value, cure = "", _written(detail["input"]), ""
+    allowed = str(cause or KINDS.get(detail["type"], detail["msg"]))
     if detail["type"] == "missing":
         about = every_key().get(re.sub(r"\[\d+\]", "", key))
-        return Problem(key, "is missing", allowed=about.description or "" if about else "a section")
-    value, words = _written(detail["input"]), KINDS.get(detail["type"], detail["msg"])
+        what, value, allowed = "is missing", "", (about and about.description) or "a section"
     if detail["type"] == "literal_error":
-        words = str(detail["ctx"]["expected"]).replace("'", '"')
-        cure = suggestion(str(detail["input"]), re.findall(r'"([^"]+)"', words))
-        return Problem(key, value=value, allowed=words, cure=cure)
-    return Problem(key, value=value, allowed=str(cause or words))
+        allowed = str(detail["ctx"]["expected"]).replace("'", '"')
+        cure = suggestion(str(detail["input"]), re.findall(r'"([^"]+)"', allowed))
+    return Problem(key, what, value, allowed, cure)
 
 
 def _key(place: tuple[int | str, ...]) -> str:
@@ -251,9 +249,7 @@ def _value(text: str) -> object:
     """Value of a change: TOML where it is TOML, names with commas as an array, else text."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
-    except RecursionError:
-        raise RefusedError("--set", text, "a value", "it is nested too deeply") from None
-    except tomllib.TOMLDecodeError:
+    except (RecursionError, tomllib.TOMLDecodeError):
         pass
     if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):
         return [_value(part.strip()) for part in text.split(",")]

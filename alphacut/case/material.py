@@ -176,13 +176,12 @@ class RoundCell(Section):
     def _one_material(self) -> Self:
         """Refuses a shape or a material that is none, or a material that is none of spheres."""
         _outline(self.particles)
-        ratio = self.inclusion_poisson is not None
-        allowed = "a number beside Young's modulus, none beside a stiffness"
+        ratio, isotropic = self.inclusion_poisson is not None, self.stiffness is None
         value = "there" if ratio else "missing"
-        require((self.stiffness is None) == ratio, "cell.inclusion_poisson", value, allowed)
-        plane = self.stiffness is not None and self.particles == "spheres"
-        allowed = "Young's modulus of spheres"
-        require(not plane, "cell.inclusion_modulus", "a plane stiffness", allowed)
+        allowed = "a number beside Young's modulus, none beside a stiffness"
+        require(isotropic == ratio, "cell.inclusion_poisson", value, allowed)
+        solid = isotropic or self.particles != "spheres"
+        require(solid, "cell.inclusion_modulus", "a plane stiffness", "Young's modulus of spheres")
         return self
 
 
@@ -211,16 +210,17 @@ class ImageCell(Section):
     @model_validator(mode="after")
     def _parted(self) -> Self:
         """Refuses phases that nothing or too much tells apart."""
-        both, none = self.threshold and self.labels, not self.threshold and not self.labels
-        value = "beside cell.labels" if both else None
-        allowed = "one of cell.threshold and cell.labels"
-        require(not both and not none, "cell.threshold", value, allowed)
+        one, sides = bool(self.threshold) != bool(self.labels), len(self.pixel)
+        value = "beside cell.labels" if self.threshold else None
         count = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
         fits = len(self.modulus) == count and len(self.poisson) in (1, count)
-        value = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
-        require(fits, "cell.modulus", value, f"one for each of {count} phases")
-        sides, allowed = len(self.pixel), "a side, or a width and a height"
-        require(sides <= 2, "cell.pixel", sides, allowed)
+        values = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
+        for check in (
+            (one, "cell.threshold", value, "one of cell.threshold and cell.labels"),
+            (fits, "cell.modulus", values, f"one for each of {count} phases"),
+            (sides <= 2, "cell.pixel", sides, "a side, or a width and a height"),
+        ):
+            require(*check)
         return self
 
 

@@ -16,7 +16,7 @@ from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.measured import accelerogram
 from alphacut.io.problem import suggestion
 
@@ -76,17 +76,16 @@ class Structure:
         Raises:
             RefusedError: The name stands for nothing, or for nothing fuzzy.
         """
+        keys = [of for of, short in INPUTS.items() if re.fullmatch(rf"{short}\d*", name)]
+        cure = f"{keys[0] if keys and self.frame else name} is one number"
+        allowed = "inputs that are fuzzy"
         try:
             members = self.frame.group(name) if self.frame else (name,)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
-            allowed = ", ".join(self.numbers)
+            fuzzy, allowed = (), ", ".join(self.numbers)
             cure = suggestion(INPUTS.get(name, name), self.numbers)
-            raise RefusedError(key, name, allowed, cure) from None
-        if not fuzzy:
-            keys = [of for of, short in INPUTS.items() if re.fullmatch(rf"{short}\d*", name)]
-            cure = f"{keys[0] if keys and self.frame else name} is one number"
-            raise RefusedError(key, name, "inputs that are fuzzy", cure)
+        require(bool(fuzzy), key, name, allowed, cure)
         return fuzzy
 
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
@@ -253,14 +252,15 @@ class Frame(Section):
     @model_validator(mode="after")
     def _complete(self) -> Self:
         """Refuses a frame without damping or motion, or that is none."""
-        if self.names("dampers") != (self.damper_placement is not None):
-            raise RefusedError("frame.damper_placement", None, "both dampers and damper_placement")
-        if not any(map(self.names, DAMPING)):
-            raise RefusedError("frame.dampers", None, " or ".join(DAMPING), '"0 %" for none')
-        starts = (*self.displacements, *self.velocities)
-        if self.accelerogram is None and not any(any(x.support) for x in starts):
-            cure = "nothing moves the frame"
-            raise RefusedError("frame.displacements", None, "a start, or an accelerogram", cure)
+        placed = self.names("dampers") == (self.damper_placement is not None)
+        starts = any(any(x.support) for x in (*self.displacements, *self.velocities))
+        moves = starts or self.accelerogram is not None
+        for holds, key, allowed, cure in (
+            (placed, "damper_placement", "both dampers and damper_placement", ""),
+            (any(map(self.names, DAMPING)), "dampers", " or ".join(DAMPING), '"0 %" for none'),
+            (moves, "displacements", "a start, or an accelerogram", "nothing moves the frame"),
+        ):
+            require(holds, f"frame.{key}", None, allowed, cure)
         self.structure()
         return self
 

@@ -22,7 +22,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.units import QUANTITIES
 
@@ -79,13 +79,14 @@ class Quantity:
         Raises:
             RefusedError: It is no such quantity, or out of range.
         """
+        cure = ""
         try:
             number = self._parsed(value)
+            ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
+            inside = all(self.holds(end) for end in ends)
         except ValueError as error:
-            raise RefusedError("", value, self.allowed, str(error)) from None
-        ends = [*number.cut(0.0)] if isinstance(number, FuzzyNumber) else [number]
-        if not all(self.holds(float(end)) for end in ends):
-            raise RefusedError("", value, self.allowed)
+            inside, cure = False, str(error)
+        require(inside, "", value, self.allowed, cure)
         return number
 
     def holds(self, value: float) -> bool:
@@ -93,11 +94,10 @@ class Quantity:
         return self.above < value < self.below and self.least <= value <= self.most
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
-        if self.whole:
-            if isinstance(value, bool) or not isinstance(value, int):
-                raise ValueError("this is no whole number")
+        if self.whole and isinstance(value, int) and not isinstance(value, bool):
             return value
-        if isinstance(value, str) and not self.si and "%" not in value and "[" not in value:
+        bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
+        if bare or self.whole:
             raise ValueError("a number stands without quotes")
         return quantity.fuzzy(value, self.si) if self.fuzzy else quantity.number(value, self.si)
 

@@ -6,7 +6,7 @@ import argparse
 from typing import TextIO
 
 from alphacut.commands.options import Command, add_common, add_run, answer, opened, read
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of, read_dataset
 from alphacut.io.units import between
@@ -84,13 +84,9 @@ def envelope(options: argparse.Namespace, out: TextIO) -> int:
 def identify(options: argparse.Namespace, out: TextIO) -> int:
     """Identifies and reports; status 0 also where the measurement refutes the frame."""
     content = read(options).content
-    section, frame, motion = content.identify, content.frame, content.envelope
-    whole = section is not None and frame is not None and motion is not None
-    require(whole, "identify", None, "sections [identify], [frame] and [envelope]")
-    assert section is not None
-    assert frame is not None
-    assert motion is not None
-    document, _ = learned(section, frame.structure(), motion.alpha)
+    if content.identify is None or content.frame is None or content.envelope is None:
+        raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
+    document, _ = learned(content.identify, content.frame.structure(), content.envelope.alpha)
     answer(options, document, out, run_text({"update": document}))
     return 0
 

@@ -15,10 +15,10 @@ from alphacut.figures import envelope, follower, frame, modulus, radius
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
+from alphacut.fuzzy.progress_bar import showing
 from alphacut.io.files import Document, as_json, write_text
-from alphacut.io.progress import progress
+from alphacut.io.netcdf import document_of
 from alphacut.io.provenance import NESTED, fingerprint, version_of
-from alphacut.stages import microstructure
 from alphacut.stages.cell import modal_cell
 from alphacut.stages.results import Results
 
@@ -106,8 +106,9 @@ def drawn(
         names, whole = _draw(results, folder, executor, quiet=quiet)
         if whole:
             write_text(folder / KEPT, as_json({"fingerprint": key, "figures": names}))
-    particles = microstructure.pictures(folder) if results.microstructure is not None else []
-    return [*(str(path.relative_to(folder)) for path in particles), *names]
+    data = results.microstructure
+    particles = [] if data is None else document_of(data)["figures"]
+    return [*(name for name in particles if (folder / name).is_file()), *names]
 
 
 def _kept(folder: Path) -> Document:
@@ -125,7 +126,7 @@ def _draw(
     mesh = _mesh(results, folder, executor)
     parts = [submitted(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
-    with progress("figures", quiet=quiet) as tick:
+    with showing(not quiet) as tick:
         for count, part in enumerate(parts, start=1):
             names += part.result()
             if tick:

@@ -65,14 +65,12 @@ def _even_step(path: Path, time: Array, rows: list[int]) -> float:
 def _peer(path: Path) -> Accelerogram:
     """A file of PEER's data base, in g; its head ends with NPTS and DT."""
     match = PEER.search(text_of(path))
-    allowed = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers"
+    count, step, text = match.groups() if match else ("1", "", "")
     try:
-        count, step, text = match.groups() if match else ("", "", "")
-        values = np.array(text.split(), float)
-        whole = match is not None and len(values) == int(count)
-        require(whole, path.name, f"{len(values)} numbers", allowed)
+        values = np.array(text.split(), float).reshape(int(count))
         return Accelerogram(float(step), values * float(factor("g", "m/s^2")))
     except ValueError as error:
+        allowed = "a head with UNITS OF G and NPTS= 4000, DT= .0050 SEC, and as many numbers"
         raise RefusedError(path.name, "no record", allowed, str(error)) from None
 
 

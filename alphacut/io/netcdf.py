@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import Document, whole_file
+from alphacut.io.files import Document, as_json, whole_file
 from alphacut.io.provenance import FORMAT, door
 
 if TYPE_CHECKING:
@@ -62,6 +62,13 @@ def document_of(data: xarray.Dataset) -> Document:
     """Numbers that a dataset states as JSON."""
     document: Document = json.loads(data.attrs["document"])
     return document
+
+
+def dataset_of(document: Document) -> xarray.Dataset:
+    """A dataset that holds a document and nothing else."""
+    import xarray
+
+    return xarray.Dataset(attrs={"document": as_json(document)})
 
 
 def fingerprint_of(path: Path) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from decimal import Decimal
 
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
@@ -17,20 +18,14 @@ NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")
 SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
-SHAPES = {1: "crisp", 2: "an interval", 3: "a triangle", 4: "a trapezoid"}
+SHAPES: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
 LONGEST = 1000
 """Characters of a quantity; no longer text is read."""
 
 
 def decimal(text: str) -> Decimal:
-    """A plain finite decimal number; a typographic minus is taken as one.
-
-    Raises:
-        ValueError: It is none.
-    """
-    if re.fullmatch(NUMBER, text.strip()) is None:
-        raise ValueError(f'"{text.strip()}" is no number')
-    return Decimal(text.strip().replace("\u2212", "-"))
+    """A decimal number; a typographic minus is taken as one."""
+    return Decimal(text.replace("\u2212", "-"))
 
 
 def one(text: str, si: str) -> Decimal:
@@ -65,13 +60,11 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
     Raises:
         ValueError: It is no quantity, its unit is wrong, or it is too large or small.
     """
-    if isinstance(value, bool) or not isinstance(value, str | int | float | list):
-        raise ValueError("this is no quantity")
     if isinstance(value, list):
         value = "[" + ", ".join(map(str, value)) + "]"
-    text = str(value).strip()
-    if len(text) > LONGEST:
-        raise ValueError(f"a quantity of {len(text)} characters is too long")
+    text, kind = str(value).strip(), isinstance(value, str | int | float)
+    if isinstance(value, bool) or not kind or len(text) > LONGEST:
+        raise ValueError("this is no quantity" if len(text) <= LONGEST else "this is too long")
     if match := LIST.fullmatch(text):
         items = [item.strip() for item in match[1].split(",")]
         values = tuple(one(f"{item} {match[2]}" if match[2] else item, si) for item in items)
@@ -108,12 +101,6 @@ def fuzzy(value: object, si: str) -> FuzzyNumber:
         ValueError: As of `numbers`, more than four values, or values that do not rise.
     """
     values = numbers(value, si)
-    if len(values) not in SHAPES:
-        raise ValueError(f"{len(values)} values stand where one to four are needed")
-    if list(values) != sorted(values):
-        raise ValueError(f"the values of {SHAPES[len(values)]} rise")
-    if len(values) == 1:
-        return Crisp(values[0])
-    if len(values) == 2:
-        return Interval(*values)
-    return Triangular(*values) if len(values) == 3 else Trapezoidal(*values)
+    if len(values) > len(SHAPES) or list(values) != sorted(values):
+        raise ValueError(f"{len(values)} values stand where one to four that rise are needed")
+    return SHAPES[len(values) - 1](*values)

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.fuzzy import FuzzyNumber
-from alphacut.fuzzy.refused import require
-from alphacut.io.files import as_json
-from alphacut.io.netcdf import document_of
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.netcdf import dataset_of, document_of
 from alphacut.questions.question import Motion, Question
 from alphacut.stages import (
     cell,
@@ -76,8 +75,8 @@ class Chain:
     def particles(self) -> xarray.Dataset:
         """The particles and their radius map."""
         section = self.content.microstructure
-        require(section is not None, "microstructure", None, "a section [microstructure]")
-        assert section is not None
+        if section is None:
+            raise RefusedError("microstructure", None, "a section [microstructure]")
         spheres = self.content.round is not None and self.content.round.particles == "spheres"
         return self.store.take(microstructure.stage(section, spheres, self.figures))
 
@@ -102,9 +101,8 @@ class Chain:
         """The structure with a modulus in Pa, None for its own."""
         content = self.content
         section = content.frame or content.pendulum
-        whole = section is not None and content.envelope is not None
-        require(whole, "envelope", None, "a structure and a section [envelope]")
-        assert section is not None
+        if section is None or content.envelope is None:
+            raise RefusedError("envelope", None, "a structure and a section [envelope]")
         young = number is not None or content.frame is None or content.frame.is_whole
         require(young, "frame.modulus", None, "a modulus, or --modulus FILE.nc")
         return section.structure(number)
@@ -142,9 +140,6 @@ class Chain:
 def answered(
     section: Question, structure: Structure, task: EnvelopeTask, work: Work
 ) -> xarray.Dataset:
-    """The answer to a question about the motion of [envelope], as JSON among the attributes."""
-    import xarray
-
+    """The answer to a question about the motion of [envelope], as a document."""
     times = (task.section.alpha, task.duration, task.section.step)
-    motion = Motion(structure, task.fuzzy, *times, work.tick)
-    return xarray.Dataset(attrs={"document": as_json(section.answer(motion))})
+    return dataset_of(section.answer(Motion(structure, task.fuzzy, *times, work.tick)))

@@ -40,9 +40,8 @@ def dataset(section: Section, spheres: bool, figures: bool, work: Work) -> xarra
     """
     with pool(work.workers) as executor:
         map_of = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
-    if work.folder is not None:
-        write(map_of, work.folder, figures=figures)
-    facts = {"document": as_json(summary(map_of)), "radius": fragment(map_of)}
+    names = [] if work.folder is None else write(map_of, work.folder, figures=figures)
+    facts = {"document": as_json(summary(map_of) | {"figures": names}), "radius": fragment(map_of)}
     return to_dataset(map_of).assign_attrs(facts)
 
 
@@ -51,29 +50,15 @@ def radius_of(dataset: xarray.Dataset) -> RadiusMap:
     return RadiusMap.model_validate(tomllib.loads(str(dataset.attrs["radius"]))["radius"])
 
 
-PICTURES = {
-    *("03-04_two_point", "05-08_neighbours", "06-07_neighbour_statistics", "09_correlation"),
-    *("10_cells", "11_radii", "12_areas", "13_pbox", "radius_map", "image_circles"),
-}
-"""Stems of the figures of this stage."""
-
-
-def pictures(folder: Path) -> list[Path]:
-    """Figures of this stage in a folder of results."""
-    every = sorted(folder.glob("figures/*.*"))
-    return [path for path in every if path.stem in PICTURES and path.suffix in (".png", ".svg")]
-
-
-def write(map_of: Microstructure, folder: Path, *, figures: bool) -> None:
-    """Writes the fragment of a case, the circles of an image, and figures."""
+def write(map_of: Microstructure, folder: Path, *, figures: bool) -> list[str]:
+    """Writes the fragment of a case, the circles of an image, and figures; names of the figures."""
     from alphacut.stochastic.figures.all import draw
 
-    for old in pictures(folder):
-        old.unlink()
     drawn = draw(map_of, folder / "figures") if figures else {}
     write_text(folder / "radius.toml", fragment(map_of))
     if "image_circles" in drawn:
         write_text(folder / "circles.csv", _circles(map_of))
+    return [path.relative_to(folder).as_posix() for paths in drawn.values() for path in paths]
 
 
 def _circles(map_of: Microstructure) -> str:

@@ -14,7 +14,7 @@ from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of
 from alphacut.io.units import STANDARD_GRAVITY
-from alphacut.stages import envelope, modulus, shares
+from alphacut.stages import envelope, modulus
 from alphacut.stages.envelope import EnvelopeTask
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class Results:
         if self.learned is not None:
             numbers["update"] = self.learned
         if self.shares is not None:
-            numbers["shares"] = shares.document(self.shares)
+            numbers["shares"] = document_of(self.shares)
         return {**numbers, **self.answers}
 
 

@@ -20,6 +20,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.propagation import Shares, width_shares
 from alphacut.io.files import Document, say
+from alphacut.io.netcdf import dataset_of
 from alphacut.io.provenance import NESTED
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import OUTPUTS, Campaign
@@ -45,25 +46,27 @@ def stage(
 def dataset(
     campaign: Campaign | None, structure: Structure | None, task: EnvelopeTask | None, work: Work
 ) -> xarray.Dataset:
-    """Shares of every input in the width of E, ν and peaks, where there are two inputs or more."""
-    import xarray
+    """Shares of each input in the widths of E, ν and peaks, where there are two inputs or more.
 
-    variables: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {}
+    They are of the lowest level, in a document: by result, then by input.
+    """
+    each: Document = {}
     if campaign is not None and len(campaign.inputs) > 1:
         cell = of_cell(campaign)
-        for column, name in enumerate(("modulus_share", "poisson_share")):
-            variables[name] = (("cell_input", "alpha"), cell.share[..., column])
-        coordinates |= {"cell_input": list(cell.names), "alpha": list(campaign.modulus.alpha)}
+        each = {x: _by_input(cell, cell.share[:, 0, k]) for k, x in enumerate(("E", "ν"))}
     if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
         try:
             peak = of_peaks(structure.frame, structure, task)
         except ModalError as error:
             say(f"no shares of the width of peaks: {error}")
         else:
-            variables["peak_share"] = (("input", "output"), peak.share)
-            coordinates |= {"input": list(peak.names), "output": list(structure.outputs)}
-    return xarray.Dataset(variables, coordinates)
+            for column, name in enumerate(structure.outputs):
+                each[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
+    return dataset_of(each)
+
+
+def _by_input(shares: Shares, values: Array) -> dict[str, float]:
+    return dict(zip(shares.names, map(float, values), strict=True))
 
 
 def of_cell(campaign: Campaign) -> Shares:
@@ -110,21 +113,3 @@ def thinned(duration: float, step: float) -> float:
     """Multiple of the step that leaves a hundred nodes or some more."""
     steps = round(duration / step)
     return step * max(k for k in range(1, max(1, steps // 100) + 1) if steps % k == 0)
-
-
-def document(data: xarray.Dataset) -> Document:
-    """Shares of the inputs in E and ν at the lowest level, and in each peak."""
-    each: dict[str, xarray.DataArray] = {}
-    for quantity, variable in (("E", "modulus_share"), ("ν", "poisson_share")):
-        if variable in data:
-            each[quantity] = data[variable].isel(alpha=0)
-    if "peak_share" in data:
-        outputs = map(str, data["output"].values)
-        each |= {f"the peak of {x}": data["peak_share"].sel(output=x) for x in outputs}
-    return {name: _by_input(shares) for name, shares in each.items()}
-
-
-def _by_input(shares: xarray.DataArray) -> dict[str, float]:
-    """Shares by the names on their one axis."""
-    names = map(str, shares[shares.dims[0]].values)
-    return dict(zip(names, map(float, shares.values), strict=True))

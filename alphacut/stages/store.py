@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from alphacut.fuzzy.progress_bar import Progress, showing
+from alphacut.io.files import rank
 from alphacut.io.netcdf import fingerprint_of, read_dataset, write_dataset
-from alphacut.io.progress import Tick, progress
 from alphacut.io.provenance import attributes, fingerprint
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ class Work:
     folder: Path | None = None
     fresh: bool = False
     workers: int = 1
-    tick: Tick | None = None
+    tick: Progress | None = None
 
 
 @dataclass(frozen=True)
@@ -77,12 +78,17 @@ class Store:
     made: list[str] = field(default_factory=list)
     taken: list[str] = field(default_factory=list)
 
+    @property
+    def shown(self) -> bool:
+        """True where progress is shown, by the first rank alone."""
+        return not self.quiet and rank() == 0
+
     def take(self, stage: Stage) -> xarray.Dataset:
         """The dataset of a stage: from its file where that is up to date, else computed."""
         if not self._current(stage):
             if self.folder is not None:
                 self.folder.mkdir(parents=True, exist_ok=True)
-            with progress(stage.name, quiet=self.quiet) as tick:
+            with showing(self.shown) as tick:
                 data = stage.compute(Work(self.folder, self.fresh, self.workers, tick))
             if self.folder is None:
                 return data
@@ -102,7 +108,7 @@ class Store:
             work = Work(self.folder, self.fresh)
             stale = [stage for stage in stages if not self._current(stage)]
             under_way = {executor.submit(stage.compute, work): stage for stage in stale}
-            with progress("stages", quiet=self.quiet) as tick:
+            with showing(self.shown) as tick:
                 for done, future in enumerate(as_completed(under_way), start=1):
                     self._put(under_way[future], future.result())
                     if tick:

@@ -134,7 +134,9 @@ def test_a_fourth_question_touches_one_file_and_one_table(tmp_path):
     table = tmp_path / "alphacut" / "case" / "content.py"
     text, name = table.read_text(encoding="utf-8"), "from alphacut.questions.tolerances import"
     text = text.replace(name, f"from alphacut.questions.mean import Mean\n{name}")
-    table.write_text(text.replace("(Probability, ", "(Probability, Mean, "), encoding="utf-8")
+    text = text.replace("(Probability, ", "(Probability, Mean, ")
+    text = text.replace("    decision: D", "    mean: Mean | None = None\n    decision: D")
+    table.write_text(text, encoding="utf-8")
     case = tmp_path / "case.toml"
     case.write_text(f'{one_case.TEXT}[mean]\nlimits = ["q2 <= 1 m"]\n', encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
