@@ -9,9 +9,9 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 31_845,
-    "files of the packages": 223,
-    "places that raise": 330,
+    "lines of the packages": 31_762,
+    "files of the packages": 222,
+    "places that raise": 310,
 }
 ANY = 13  # public functions with Any; most pass on what FEniCSx does not type
 TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
