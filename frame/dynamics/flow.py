@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet, concatenate
+from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
@@ -83,7 +83,7 @@ class Flow(ABC):
     @property
     def exact(self) -> bool:
         """True if trajectories have no error but rounding."""
-        return False
+        return self.method == Exact.name
 
     @abstractmethod
     def finer(self) -> tuple[Flow, int]:
@@ -166,11 +166,6 @@ class LinearFlow(Flow):
         """Name of the time stepping."""
         return self.integrator.name
 
-    @property
-    def exact(self) -> bool:
-        """True if trajectories have no error but rounding."""
-        return isinstance(self.integrator, Exact)
-
     def finer(self) -> tuple[LinearFlow, int]:
         """Exact trajectories at nodes a part of a step apart, and how many parts."""
         turn = float(frequencies(self.system)[-1]) * self.step
@@ -186,7 +181,6 @@ class LinearFlow(Flow):
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         ground = self.system.ground
         h, steps = self.step, len(self.time) - 1
-        start = concatenate([matrices.q0, matrices.v0], -2)
         if ground is None:
             step_map, load = self.integrator.step_map(matrices, h), None
         elif self.exact:
@@ -194,4 +188,4 @@ class LinearFlow(Flow):
         else:
             step_map = self.integrator.step_map(matrices, h)
             load = linear_load(ground, h, steps)
-        return trajectory(step_map, start, rows, load=load, count=steps + 1)
+        return trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)

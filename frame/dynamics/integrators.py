@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, inf, log2
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,25 +31,6 @@ class StepMap:
 
     transfer: Jet
     load: Jet
-
-
-class Integrator(Protocol):
-    """A one-step method for linear structures."""
-
-    @property
-    def name(self) -> str:
-        """Name on the command line and in results."""
-
-    @property
-    def order(self) -> float:
-        """Order of the error in the step; infinite when exact."""
-
-    @property
-    def stability_limit(self) -> float:
-        """Largest stable ω h of an undamped oscillation; infinite when unconditional."""
-
-    def step_map(self, matrices: Matrices, step: float) -> StepMap:
-        """The map of one step of length `step` in s; the load is linear within the step."""
 
 
 @dataclass(frozen=True)
@@ -146,4 +127,5 @@ def split(extended: Jet) -> StepMap:
     return StepMap(extended[..., :-2, :-2], concatenate([old - rise, rise], -1))
 
 
+Integrator = Midpoint | RungeKutta4 | Exact
 INTEGRATORS: dict[str, Integrator] = {m.name: m for m in (Midpoint(), RungeKutta4(), Exact())}

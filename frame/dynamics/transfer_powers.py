@@ -23,9 +23,8 @@ def exact_response(
     flow = state_matrix(matrices)
     parts = parts_of(float(np.abs(np.linalg.eigvals(flow.value)).max()), step)
     rule = load_rule(ground, step, steps, parts)
-    kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
-    samples = len(flow.value)
-    term = Jet.constant(np.broadcast_to(kick, (samples, *kick.shape)), flow.directions)
+    kick = matrices.kick
+    term = Jet.constant(np.broadcast_to(kick, (len(flow.value), *kick.shape)), flow.directions)
     series, short = [term], step / parts
     for k in range(1, TERMS):
         term = flow @ term * (short / k)

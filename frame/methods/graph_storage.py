@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,11 +15,10 @@ Places = tuple[Array, ...]
 """Indices of nodes, outputs and sides, one of each for a place."""
 
 
-@dataclass(eq=False)
 class Storage:
     """All graphs computed so far; arrays over places have shape (T, m, 2), (−output, output) last.
 
-    Args:
+    Attributes:
         flow: Computes graphs.
         points: Their unit coordinates, shape (G, d).
         top: The best value at each place.
@@ -30,17 +28,9 @@ class Storage:
         steepest: Largest slope of any graph along a coordinate, shape (m,).
     """
 
-    flow: UnitFlow
-    points: Array = field(init=False)
-    top: Array = field(init=False)
-    best: Index = field(init=False)
-    first: Array = field(init=False)
-    second: Array = field(init=False)
-    steepest: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        d, shape = len(self.flow.boxes.names), (len(self.flow.time), len(self.flow.outputs), 2)
-        self.points, self.steepest = np.empty((0, d)), np.zeros(shape[1])
+    def __init__(self, flow: UnitFlow) -> None:
+        d, shape = len(flow.boxes.names), (len(flow.time), len(flow.outputs), 2)
+        self.flow, self.points, self.steepest = flow, np.empty((0, d)), np.zeros(shape[1])
         self.top, self.best = np.full(shape, -np.inf), np.zeros(shape, np.int64)
         self.first, self.second = np.zeros((*shape, d)), np.zeros((*shape, d, d))
 

@@ -214,13 +214,13 @@ def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool
     """
     matrices, rows = evaluate(flow.system, flow.names, boxes.centre[None], derivatives=False)
     rate, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
-    state = np.abs(Y @ np.vstack([matrices.q0.value[0], matrices.v0.value[0]]))
+    state = np.abs(Y @ matrices.start.value[0])
     ground = flow.system.ground
     if ground is not None:
         record = np.abs(ground.acceleration)
         # bound of |R(t; λ)|
         push = np.minimum(record.sum() * ground.step, record.max() / np.maximum(-rate.real, 1e-300))
-        state += np.abs(Y[:, len(matrices.rigid) :] @ matrices.rigid) * push[:, None]
+        state += np.abs(Y @ matrices.kick) * push[:, None]
     upper = np.flatnonzero(rate.imag >= 0)
     size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]
     if energy:

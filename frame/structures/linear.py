@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet, variables
+from alphacut.frame.calculus.jet import Array, Jet, concatenate, variables
 from alphacut.frame.structures.quantities import Parameter
 from alphacut.fuzzy.refused import require
 
@@ -23,7 +23,7 @@ class Matrices:
         stiffness: K, shape (S, n, n), in N/m.
         q0: Initial displacement, shape (S, n, 1), in m.
         v0: Initial velocity, shape (S, n, 1), in m/s.
-        pattern: ι, how the unknowns move rigidly with the ground, shape (n, 1); ones when None.
+        rigid: ι, how the unknowns move rigidly with the ground, shape (n, 1).
     """
 
     mass: Jet
@@ -31,12 +31,17 @@ class Matrices:
     stiffness: Jet
     q0: Jet
     v0: Jet
-    pattern: Array | None = None
+    rigid: Array
 
     @property
-    def rigid(self) -> Array:
-        """ι, shape (n, 1)."""
-        return np.ones((self.mass.value.shape[-1], 1)) if self.pattern is None else self.pattern
+    def start(self) -> Jet:
+        """Initial state [q; v], shape (S, 2n, 1)."""
+        return concatenate([self.q0, self.v0], -2)
+
+    @property
+    def kick(self) -> Array:
+        """What a unit impulse of the ground's acceleration does to the state, shape (2n, 1)."""
+        return np.concatenate([np.zeros_like(self.rigid), -self.rigid])
 
 
 @dataclass(frozen=True, eq=False)

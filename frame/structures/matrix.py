@@ -148,11 +148,11 @@ class MatrixStructure:
 
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
         q0, v0 = (like.like(np.tile(x[None, :, None], (samples, 1, 1))) for x in start)
-        pattern = None if self.pattern is None else np.asarray(self.pattern, float)[:, None]
+        rigid = np.ones(n) if self.pattern is None else np.asarray(self.pattern, float)
         mass, damping, stiffness = (total(getattr(self, kind)) for kind in KINDS)
         if self.ratios:
             damping = damping + ratio_damping(mass, stiffness, lifted(self.ratios[0]))
-        return Matrices(mass, damping, stiffness, q0, v0, pattern)
+        return Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""

@@ -76,15 +76,13 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
             "a mode does not oscillate: modal intervening variables need damping below critical in"
             " every mode; use graph-follower"
         )
-    start = concatenate([matrices.q0, matrices.v0], -2)
-    kick = np.concatenate([np.zeros_like(matrices.rigid), -matrices.rigid])
     seen = rows @ X[..., some]  # V = (S, m, n)
 
     def through(excitation: Jet | Array) -> Jet:
         share = (Y @ excitation)[..., some, 0][..., None, :]
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
-    return Modes(values, through(start), through(kick), len(kick) // 2)
+    return Modes(values, through(matrices.start), through(matrices.kick), len(matrices.rigid))
 
 
 def require_single(matrices: Matrices, chosen: Array) -> None:
@@ -116,21 +114,16 @@ def oscillating(rate: Array) -> Array:
     return rate.imag > 1e-9 * np.abs(rate)
 
 
-def ordered_eigenvectors(A: Array) -> tuple[Array, Array]:
-    """Eigenvalues (S, 2n), upper, real, lower, each by |λ|, and vectors (S, 2n, 2n)."""
-    values, X = np.linalg.eig(A)
-    group = np.where(oscillating(values), 0, np.where(oscillating(values.conj()), 2, 1))
-    order = np.lexsort((np.abs(values), group), axis=-1)
-    return np.take_along_axis(values, order, -1), np.take_along_axis(X, order[:, None, :], -1)
-
-
 def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
     """Eigenvalues (upper, real, lower, by |λ|), right and left vectors, V = (S, 2n, 2n).
 
     With X(p) = X(p0) Z(p), Z(p0) = I and diag Z = I, second-order perturbation in the eigenbasis
     gives all derivatives.
     """
-    values, X = ordered_eigenvectors(A.value)
+    values, X = np.linalg.eig(A.value)
+    group = np.where(oscillating(values), 0, np.where(oscillating(values.conj()), 2, 1))
+    order = np.lexsort((np.abs(values), group), axis=-1)
+    values, X = np.take_along_axis(values, order, -1), np.take_along_axis(X, order[:, None, :], -1)
     Y = np.linalg.inv(X)
     gap = values[:, None, :] - values[:, :, None]
     size = values.shape[-1]

@@ -218,7 +218,7 @@ class StoreyFrame:
         if self.ratios:
             damping = damping + ratio_damping(mass, stiffness, p["zeta"])
         q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
-        return Matrices(mass, damping, stiffness, q0, v0)
+        return Matrices(mass, damping, stiffness, q0, v0, np.ones((self.floors, 1)))
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
