@@ -40,7 +40,7 @@ class Matrices:
 
     @property
     def kick(self) -> Array:
-        """What a unit impulse of the ground's acceleration does to the state, shape (2n, 1)."""
+        """Jump of the state at a unit impulse of the ground's acceleration, shape (2n, 1)."""
         return np.concatenate([np.zeros_like(self.rigid), -self.rigid])
 
 

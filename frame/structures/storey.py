@@ -20,7 +20,7 @@ from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import ratio_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, chosen, real, require
+from alphacut.fuzzy.refused import chosen, real, require
 
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
@@ -134,8 +134,7 @@ class StoreyFrame:
         if len(self.stiffness):
             columns = self.columns if len(self.columns) else None
             beside = [k for k, x in {**made, "columns": columns}.items() if x is not None]
-            if beside:
-                raise RefusedError(", ".join(beside), "there", "either stiffness or what makes it")
+            require(not beside, ", ".join(beside), "there", "either stiffness or what makes it")
             made = {}
         if not len(self.stiffness) or self.gravity:
             made["lengths"] = self.lengths if len(self.lengths) else None
@@ -212,9 +211,7 @@ class StoreyFrame:
                 damping = damping + p[name][:, None, None] * part
         stiffness = elastic
         if self.gravity:
-            soft = self.softening(p)
-            _require_standing(links.value, soft.value)
-            stiffness = elastic - soft.map(chain)
+            stiffness = elastic - self.softening(p).map(chain)
         if self.ratios:
             damping = damping + ratio_damping(mass, stiffness, p["zeta"])
         q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
@@ -222,21 +219,18 @@ class StoreyFrame:
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
-        kinds = [self.quantity(output) for output in self.outputs]
-        names = {kind for kind, _ in kinds}
-        links = self.springs(p) if "shear" in names else None
-        forces = self._accelerations(p) if "a" in names else None
-        like, places = next(iter(p.values())), np.eye(self.floors)
-        drifts = places - np.eye(self.floors, k=-1)
-        rows = []
+        kinds, links, n = [self.quantity(x) for x in self.outputs], self.springs(p), self.floors
+        one, rows = links.like(np.ones_like(links.value)), []
+        forces = one
+        if "a" in dict(kinds):  # absolute accelerations: forces over masses
+            at, inertia = self.matrices(p), -1.0 * self._of_floors("m{}", p) ** -1
+            forces = inertia[..., None] * concatenate([at.stiffness, at.damping], -1)
         for kind, z in kinds:
-            if kind == "a" and forces is not None:
-                rows.append(forces[:, z : z + 1])
-                continue
-            part = (drifts if kind in ("drift", "shear") else places)[z]
-            row = np.roll(np.append(part, 0 * part), self.floors * (kind == "v"))
-            size = links[:, z] if kind == "shear" and links else like.like(np.ones_like(like.value))
-            rows.append(size[:, None, None] * row[None])
+            row = np.eye(2 * n)[z + n * (kind == "v")]
+            if kind in ("drift", "shear") and z:
+                row[z - 1] = -1.0
+            size = links if kind == "shear" else one
+            rows.append(forces[:, z : z + 1] if kind == "a" else size[:, z, None, None] * row)
         return concatenate(rows, -2)
 
     def quantity(self, name: str) -> tuple[str, int]:
@@ -247,14 +241,15 @@ class StoreyFrame:
         """
         pattern = r"(q|v|a|drift|shear)([1-9]\d*)"
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
-        if not match or int(match[2]) > self.floors:
-            kinds = "q, v, a, drift or shear with a floor"
-            raise RefusedError("output", name, f"{kinds} from 1 to {self.floors}, base_shear")
-        return match[1], int(match[2]) - 1
+        kind, z = (match[1], int(match[2])) if match else ("", 0)
+        allowed = f"q, v, a, drift or shear with a floor from 1 to {self.floors}, base_shear"
+        require(0 < z <= self.floors, "output", name, allowed)
+        return kind, z - 1
 
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
         """Refuse weights that buckle a storey somewhere in a box.
 
+        A chain's stiffness is positive definite where k_z − P_z / l_z of each storey is positive.
         k_z l_z / P_z is least where stiffness is low and mass high; with k_z of columns it falls
         with heights.
 
@@ -272,18 +267,18 @@ class StoreyFrame:
             name: Jet.constant(np.array([high if name[0] in falling else low]), 0)
             for name, (low, high) in worst.items()
         }
-        _require_standing(self.springs(p).value, self.softening(p).value)
+        for z, (k, soft) in enumerate(
+            zip(self.springs(p).value[0], self.softening(p).value[0], strict=True), start=1
+        ):
+            allowed = f"more than weight over height, {soft:.5g} N/m"
+            cure = "else it buckles: take stiffer storeys, lighter floors or narrower supports"
+            key = f"stiffness of storey {z} under P-Delta"
+            require(k > soft, key, f"{k:.5g} N/m", allowed, cure)
 
     def _of_floors(self, pattern: str, p: Mapping[str, Jet]) -> Jet:
         """Parameters of all floors, V = (S, n)."""
         columns = [p[pattern.format(z + 1)][:, None] for z in range(self.floors)]
         return concatenate(columns, -1)
-
-    def _accelerations(self, p: Mapping[str, Jet]) -> Jet:
-        """Rows of the floors' absolute accelerations, V = (S, n, 2n): forces over masses."""
-        at = self.matrices(p)
-        inertia = -1.0 * self._of_floors("m{}", p) ** -1
-        return inertia[..., None] * concatenate([at.stiffness, at.damping], -1)
 
 
 def chain(links: Array) -> Array:
@@ -309,17 +304,3 @@ def _named(
     if single and len(values) == 1:
         return {pattern.format(""): float(values[0])}
     return {pattern.format(z): float(x) for z, x in enumerate(values, start=1)}
-
-
-def _require_standing(stiff: Array, soft: Array) -> None:
-    """Refuse parameter sets (S,) at which the weight buckles a storey, from k and P/l, (S, n).
-
-    A chain's stiffness is positive definite where that of each storey is positive.
-    """
-    for at, z in np.argwhere(~(stiff > soft)):
-        raise RefusedError(
-            f"stiffness of storey {z + 1} under P-Delta",
-            f"{stiff[at, z]:.5g} N/m",
-            f"more than weight over height, {soft[at, z]:.5g} N/m",
-            "else it buckles: take stiffer storeys, lighter floors or narrower supports",
-        )
