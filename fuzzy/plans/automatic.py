@@ -175,5 +175,4 @@ class _Passes:
 
     def _span(self) -> Array:
         """Range of each output over all samples, shape (columns,)."""
-        values = self.campaign.samples.values.array
-        return np.asarray(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
+        return np.asarray(np.ptp(self.campaign.samples.values.array, axis=0))

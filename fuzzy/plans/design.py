@@ -53,7 +53,7 @@ class Design:
         """Retransformation: attained extremes of each level's samples and of every level above.
 
         Args:
-            values: Outputs at `points`; NaN where a sample failed and was skipped.
+            values: Outputs at `points`.
             method: Name of the method.
         """
         lowest, highest = self._extremes(values.array), self._extremes(-values.array)
@@ -74,14 +74,13 @@ class Design:
     def _extremes(self, values: Array) -> Rows:
         """Rows of the least values, shape (levels, outputs)."""
         columns = np.arange(values.shape[1])
-        usable = np.where(np.isnan(values), np.inf, values)
         best: list[Rows] = []
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
-            both = [*([rows[usable[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
-            if not both or np.isinf(usable[both[0], columns]).any():
-                raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
+            both = [*([rows[values[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
+            if not both:
+                raise FailedError(f"no sample lies in the cut at α = {alpha:g}")
             least = np.array(both)
-            best.append(least[usable[least, columns].argmin(axis=0), columns])
+            best.append(least[values[least, columns].argmin(axis=0), columns])
         return np.array(best[::-1])
 
 
