@@ -9,7 +9,7 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 31_706,
+    "lines of the packages": 31_642,
     "files of the packages": 222,
     "places that raise": 310,
 }
