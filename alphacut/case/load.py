@@ -7,7 +7,6 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -52,11 +51,6 @@ class Case:
         """The file's name without its ending: results go to results/NAME."""
         return self.path.stem
 
-    @property
-    def stages(self) -> tuple[str, ...]:
-        """The stages that a run computes."""
-        return self.content.stages
-
 
 def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     """Reads a case file.
@@ -82,7 +76,7 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     return Case(path, text, content, tuple(changes))
 
 
-def _parsed(path: Path, text: str) -> dict[str, Any]:
+def _parsed(path: Path, text: str) -> dict[str, object]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except (RecursionError, tomllib.TOMLDecodeError) as error:
@@ -197,7 +191,7 @@ def _opened(rest: str) -> str:
     return next((quotes for quotes in ('"""', "'''") if rest.count(quotes) % 2), "")
 
 
-def apply_changes(table: dict[str, Any], changes: Sequence[str]) -> tuple[str, ...]:
+def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
     """Puts every change into the table of a case; returns the keys' full names.
 
     Raises:
@@ -216,7 +210,7 @@ def apply_changes(table: dict[str, Any], changes: Sequence[str]) -> tuple[str, .
     return tuple(names)
 
 
-def _full_name(name: str, table: dict[str, Any]) -> str:
+def _full_name(name: str, table: dict[str, object]) -> str:
     """The one key of a name: of several, the one that the case has already."""
     known = [key for key in every_key() if not key.startswith("study.")]
     full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
@@ -228,7 +222,7 @@ def _full_name(name: str, table: dict[str, Any]) -> str:
     return full[0]
 
 
-def _has(table: dict[str, Any], key: str) -> bool:
+def _has(table: object, key: str) -> bool:
     for name in key.split("."):
         if not isinstance(table, dict) or name not in table:
             return False
@@ -236,13 +230,12 @@ def _has(table: dict[str, Any], key: str) -> bool:
     return True
 
 
-def _put(table: dict[str, Any], key: str, value: object) -> None:
+def _put(table: object, key: str, value: object) -> None:
     *outer, last = key.split(".")
     for name in outer:
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
-            return
-    table[last] = value
+        table = table.setdefault(name, {}) if isinstance(table, dict) else None
+    if isinstance(table, dict):
+        table[last] = value
 
 
 def _value(text: str) -> object:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self
@@ -42,10 +41,6 @@ NAMES = {"q0": "displacements", "v0": "velocities", "output": "outputs"}
 DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
 STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
-INPUTS = {"modulus": "E", "second_moment": "I", "masses": "m", "lengths": "l", "columns": "c"}
-INPUTS |= {"stiffness": "k", "dampers": "d", "displacements": "q0", "velocities": "v0"}
-INPUTS |= {"damping_ratio": "zeta"}
-"""Input that each key of a frame is, as `fuzzy` names it."""
 
 
 @dataclass(frozen=True)
@@ -76,15 +71,13 @@ class Structure:
         Raises:
             RefusedError: The name stands for nothing, or for nothing fuzzy.
         """
-        keys = [of for of, short in INPUTS.items() if re.fullmatch(rf"{short}\d*", name)]
-        cure = f"{keys[0] if keys and self.frame else name} is one number"
-        allowed = "inputs that are fuzzy"
+        allowed, cure = "inputs that are fuzzy", f"{name} is one number"
         try:
             members = self.frame.group(name) if self.frame else (name,)
             fuzzy = tuple(member for member in members if self.numbers[member].support.width > 0)
         except (ValueError, KeyError):
             fuzzy, allowed = (), ", ".join(self.numbers)
-            cure = suggestion(INPUTS.get(name, name), self.numbers)
+            cure = suggestion(name, self.numbers)
         require(bool(fuzzy), key, name, allowed, cure)
         return fuzzy
 

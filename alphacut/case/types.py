@@ -24,7 +24,7 @@ from pydantic_core import CoreSchema, core_schema
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
-from alphacut.io.units import QUANTITIES
+from alphacut.io.quantity import QUANTITIES
 
 
 class Section(BaseModel):
@@ -118,7 +118,7 @@ class Quantity:
         return {"anyOf": kinds, "description": self.allowed}
 
 
-def text(read: Callable[[Any, ValidationInfo], object]) -> PlainValidator:
+def text(read: Callable[[object, ValidationInfo], object]) -> PlainValidator:
     """A key whose text a function reads, from the text and the context of the case."""
     return PlainValidator(read, json_schema_input_type=str)
 

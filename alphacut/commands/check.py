@@ -16,7 +16,7 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.problem import BadInput
-from alphacut.io.units import engineering
+from alphacut.io.quantity import engineering
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
 

@@ -9,7 +9,7 @@ from alphacut.commands.options import Command, add_common, add_run, answer, open
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of, read_dataset
-from alphacut.io.units import between
+from alphacut.io.quantity import between
 from alphacut.report.results import ISOTROPIC, fibre_label, nature_of, width_text
 from alphacut.report.tables import run_text, tables, text_table
 from alphacut.stages.chain import Chain

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import require
 from alphacut.io.files import whole_file
 from alphacut.rve.cell import LOADS, Cell
 
@@ -22,15 +21,6 @@ if TYPE_CHECKING:
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
 COMPONENTS = ("11", "22", "12")
-
-
-def check_ending(path: Path) -> None:
-    """Refuses a name of another format than VTK's.
-
-    Raises:
-        RefusedError: It is one.
-    """
-    require(path.suffix == ".vtu", "--export", str(path), "names that end in .vtu")
 
 
 def write_mesh(mesh: meshio.Mesh, path: Path) -> None:

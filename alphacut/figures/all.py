@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.content import QUESTIONS
-from alphacut.figures import envelope, follower, frame, modulus, radius
+from alphacut.figures import envelope, follower, frame, material
 from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
@@ -47,17 +47,17 @@ def _material(results: Results) -> Iterator[Drawing]:
     """Map of radii, which the stage microstructure draws itself; modulus, image, stress."""
     map_of = results.content.radius
     if map_of is not None and results.microstructure is None:
-        yield "fig13-p-box", partial(radius.p_box, map_of)
+        yield "fig13-p-box", partial(material.p_box, map_of)
     if map_of is not None:
-        yield "fig14-cone", partial(radius.cone, map_of)
+        yield "fig14-cone", partial(material.cone, map_of)
     if (data := results.modulus) is not None:
-        yield "fig16-stress-curves", partial(modulus.stress_curves, data)
-        yield "fig17-mean-stress", partial(modulus.mean_stress, data)
-        yield "fig18-modulus", partial(modulus.fuzzy_modulus, data, results.content.frame)
+        yield "fig16-stress-curves", partial(material.stress_curves, data)
+        yield "fig17-mean-stress", partial(material.mean_stress, data)
+        yield "fig18-modulus", partial(material.fuzzy_modulus, data, results.content.frame)
         if results.is_paper:
-            yield "fig19-membership", partial(modulus.membership, data)
+            yield "fig19-membership", partial(material.membership, data)
     if results.image is not None:
-        yield "image", partial(modulus.image, results.image)
+        yield "image", partial(material.image, results.image)
 
 
 def _structure(results: Results) -> Iterator[Drawing]:

@@ -14,7 +14,7 @@ from alphacut.figures import style as look
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
-from alphacut.io.units import engineering
+from alphacut.io.quantity import engineering
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.results import Results
 
@@ -28,9 +28,8 @@ def drawings(
     task: EnvelopeTask, dataset: xarray.Dataset
 ) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Name and function of each figure of a study."""
-    outputs = [task.output] if task.output else [str(name) for name in dataset["output"].values]
-    for index, output in enumerate(outputs):
-        number = f"fig{task.figures[index]}-" if index < len(task.figures) else ""
+    for output in task.figures or map(str, dataset["output"].values):
+        number = f"fig{task.figures[output]}-" if output in task.figures else ""
         yield f"{number}envelope-{task.name}-{output}", partial(envelope, dataset, output, task)
 
 

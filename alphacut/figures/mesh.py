@@ -13,6 +13,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from alphacut.case.material import Mesh
 from alphacut.export.fields import prism_mesh, write_mesh
 from alphacut.fuzzy.refused import FailedError
@@ -25,18 +27,8 @@ if TYPE_CHECKING:
 MATRIX, PARTICLE = "#f0a860", "#b79ad9"  # orange and lilac, as in the paper
 PIXELS = (1000, 1100)
 FLATTENED = 0.6  # scale of the θ-axis in the picture
-# end, middle, end
-EDGES = [
-    [0, 6, 1],
-    [1, 7, 2],
-    [2, 8, 0],
-    [3, 9, 4],
-    [4, 10, 5],
-    [5, 11, 3],
-    [0, 12, 3],
-    [1, 13, 4],
-    [2, 14, 5],
-]
+EDGES = np.column_stack([[0, 1, 2, 3, 4, 5, 0, 1, 2], range(6, 15), [1, 2, 0, 4, 5, 3, 3, 4, 5]])
+"""Nodes of a wedge's edges: an end, the middle, the other end."""
 
 
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
@@ -89,7 +81,6 @@ def mesh(file: str, picture: str) -> None:
 
 def edges(part: UnstructuredGrid) -> PolyData:
     """Edges of quadratic wedges in VTK's order, each as two straight pieces."""
-    import numpy as np
     import pyvista
 
     wedges = part.cells.reshape(-1, 16)[:, 1:]

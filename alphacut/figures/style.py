@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import whole_file
-from alphacut.io.units import MINUS, axis_prefix
+from alphacut.io.quantity import MINUS, axis_prefix
 from alphacut.stochastic.figures import style as look
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from alphacut.frame import Accelerogram
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.units import factor
+from alphacut.io.quantity import factor
 from alphacut.stochastic.particles.csv_columns import fields, number, text_of
 
 HEAD = re.compile(r"(time|t)\s*[\[(](.+)[\])]|(acceleration|acc|a)\s*[\[(](.+)[\])]", re.IGNORECASE)

@@ -1,7 +1,7 @@
-"""Quantities as engineers write them: "80 GPa", "[75, 80, 85] GPa", "20 t ± 5 %".
+"""Quantities at the border: "80 GPa", "[75, 80, 85] GPa", "20 t ± 5 %" become SI, and SI text.
 
 One number is crisp, two are an interval, three a triangle (lower, modal, upper), four a trapezoid;
-a spread "± 5 %" is an interval.
+a spread "± 5 %" is an interval. Units are Pint's, exactly, by way of decimals.
 """
 
 from __future__ import annotations
@@ -10,10 +10,47 @@ import math
 import re
 from collections.abc import Callable
 from decimal import Decimal
+from functools import cache
+from typing import TYPE_CHECKING
 
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.units import GREATEST, LEAST, factor
+from alphacut.fuzzy.result import Nature, rounded
 
+if TYPE_CHECKING:
+    import pint
+
+QUANTITIES = {
+    "": ("number without a unit", "0.3"),
+    "Pa": ("stress or modulus", "80 GPa"),
+    "m": ("length", "2.5 m"),
+    "m^4": ("second moment of area", "1e-6 m^4"),
+    "kg": ("mass", "20 t"),
+    "s": ("time", "30 s"),
+    "m/s": ("velocity", "-0.5 m/s"),
+    "m/s^2": ("acceleration", "9.81 m/s^2"),
+    "N*s/m": ("damping coefficient", "50 N s/m"),
+    "N*m*s": ("rotational damping coefficient", "0.1 N m s"),
+    "N/m": ("stiffness", "30 kN/m"),
+    "N": ("force", "0.02 N"),
+    "1/s": ("rate", "0.05 1/s"),
+    "rad": ("angle", "1.5 rad"),
+    "rad/s": ("angular velocity", "0.1 rad/s"),
+}
+"""Name of the quantity of each SI unit, and a value as a user writes it."""
+STANDARD_GRAVITY = Decimal("9.80665")
+"""In m/s², by the third General Conference on Weights and Measures, 1901."""
+OWN = {
+    "": {"": Decimal(1), "%": Decimal("0.01")},
+    "m/s^2": {"g": STANDARD_GRAVITY, "gal": Decimal("0.01"), "Gal": Decimal("0.01")},
+}
+"""Units that Pint takes for something else: g is no gram here, and Gal no gallon."""
+REFUSED = r"[%‰]|\b(per ?cent|per ?mille|pp[mb]|pixel|px|point|dot|pt|tons?)\b"
+"""Units of print and shares, which Pint takes for numbers or lengths, and tons of several kinds."""
+LEAST, GREATEST = 1e-36, 1e18
+"""Magnitudes in SI beyond which a quantity other than 0 is a slip."""
+PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n"}
+MINUS = "\u2212"
+PREFIXED = ("m", "m/s", "m/s^2", "N", "N/m", "Pa", "s", "rad", "W", "J")
 NUMBER = r"[-+\u2212]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")
@@ -21,6 +58,35 @@ SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
 SHAPES: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
 LONGEST = 1000
 """Characters of a quantity; no longer text is read."""
+
+
+@cache
+def registry() -> pint.UnitRegistry:
+    """The one registry of units; decimals, so that 250 cm and 2.5 m become the same float."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
+@cache
+def factor(unit: str, si: str) -> Decimal:
+    """Size of one `unit` in `si`.
+
+    Raises:
+        ValueError: The unit is unknown, or measures something else.
+    """
+    if unit in OWN.get(si, {}):
+        return OWN[si][unit]
+    if not unit:
+        raise ValueError(f"the unit is missing, such as {QUANTITIES[si][1]}")
+    if not si or re.search(REFUSED, unit):
+        raise ValueError(f'the unit "{unit}" is wrong')
+    spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
+    try:
+        one = registry().Quantity(Decimal(1), registry().parse_units(spelt))
+        return Decimal(one.to(si).magnitude)
+    except Exception:  # Pint's parser raises whatever Python's does
+        raise ValueError(f'the unit "{unit}" is no unit of {QUANTITIES[si][0]}') from None
 
 
 def decimal(text: str) -> Decimal:
@@ -104,3 +170,43 @@ def fuzzy(value: object, si: str) -> FuzzyNumber:
     if len(values) > len(SHAPES) or list(values) != sorted(values):
         raise ValueError(f"{len(values)} values stand where one to four that rise are needed")
     return SHAPES[len(values) - 1](*values)
+
+
+def engineering(value: float, si: str, *, digits: int = 4) -> str:
+    """A value in `si` for people, with a prefix: ``−3.590 MN``."""
+    short = f"{value:.{digits}g}"
+    if si not in PREFIXED or not 1e-12 <= abs(float(short)) < 1e12:
+        plain = f"{float(short):.0f}" if 1e4 <= abs(value) < 1e7 else short
+        return f"{plain} {si}".strip().replace("-", MINUS)
+    exponent = _exponent(abs(float(short)))
+    scaled = float(short) / 10.0**exponent
+    places = max(digits, len(f"{abs(scaled):.0f}"))
+    number = f"{scaled:#.{places}g}".rstrip(".")
+    return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
+
+
+def _exponent(largest: float) -> int:
+    return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
+
+
+def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
+    """Both ends of a range with so many digits, or more where those would cross."""
+    crisp = high - low <= 1e-9 * abs(high)
+    lower = low if crisp else rounded(low, "lower", nature, digits)
+    upper = low if crisp else rounded(high, "upper", nature, digits)
+    if lower > upper:  # inwards past each other
+        return ends(low, high, nature, digits + 1)
+    words = (f"{end:#.{digits}g}".rstrip(".").replace("-", MINUS) for end in (lower, upper))
+    return next(words), next(words)
+
+
+def between(low: float, high: float, nature: Nature, digits: int = 4) -> str:
+    """A range rounded as its nature allows; one number where both ends are the same."""
+    return " … ".join(dict.fromkeys(ends(low, high, nature, digits)))
+
+
+def axis_prefix(largest: float, si: str) -> tuple[float, str]:
+    """Factor and unit for an axis whose values reach `largest`."""
+    if si not in PREFIXED or not math.isfinite(largest) or largest <= 0 or 0.1 <= largest < 1000:
+        return 1.0, si
+    return 10.0 ** -_exponent(largest), f"{PREFIXES[_exponent(largest)]}{si}"

@@ -12,7 +12,7 @@ from alphacut.frame import Auto, envelope
 from alphacut.frame.questions.peaks import ANY, Passing, passing, peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
-from alphacut.io.units import engineering
+from alphacut.io.quantity import engineering
 from alphacut.questions.question import Motion, Question, Row, in_words
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.units import axis_prefix, between, engineering
+from alphacut.io.quantity import axis_prefix, between, engineering
 from alphacut.questions.question import Motion, Question, Row, in_words
 
 if TYPE_CHECKING:

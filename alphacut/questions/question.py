@@ -21,7 +21,7 @@ from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.files import Document
-from alphacut.io.units import engineering
+from alphacut.io.quantity import engineering
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

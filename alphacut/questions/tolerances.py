@@ -15,7 +15,7 @@ from alphacut.frame.questions.tolerances import tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
-from alphacut.io.units import engineering
+from alphacut.io.quantity import engineering
 from alphacut.questions.decision import PRECISION
 from alphacut.questions.question import Motion, Question, Row
 

@@ -8,13 +8,11 @@ from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.units import STANDARD_GRAVITY, axis_prefix, between
+from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, between
 
 Row = tuple[str, ...]
 Table = tuple[Row, list[Row]]
 """Titles of the columns, and the rows."""
-AVERAGES = {"cylinders": "eq. 16", "axes": "eq. 16", "isotropic": "isotropic", "spheres": "spheres"}
-"""Averages of the stiffness that E and ν are of."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
 ANSWERS = ("question", "answer", "nature")
@@ -59,8 +57,7 @@ def material(summary: Document) -> Table:
         if part is None:
             continue
         young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
-        nature, mean = nature_of(part["nature"]), AVERAGES.get(str(part.get("average")), "")
-        name = f"E, GPa ({mean})" if mean else "E, GPa"
+        nature, name = nature_of(part["nature"]), f"E, GPa ({part['average']})"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
         ends = cut(young, -1, nature), cut(young, 0, nature, error)
         rows.append((name, *ends, str(nature), error_text(error, nature)))
@@ -103,7 +100,7 @@ def motion(summary: Document) -> Table:
         where = f" ({name})" if len(studies) > 1 else ""
         for output, peak in study["peak"].items():
             each = scales(output, peak, summary.get("structure", {}))
-            for label, factor in each if study.get("drawn") in (None, "", output) else ():
+            for label, factor in each if output in (study.get("drawn") or [output]) else ():
                 nature, error = nature_of(study["nature"]), max(peak.get("error", [0.0]))
                 cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
                 for k in levels[len(cuts) :]:

@@ -13,12 +13,13 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.netcdf import read_dataset
-from alphacut.io.units import ends, engineering
+from alphacut.io.quantity import ends, engineering
 from alphacut.report.results import (
     Row,
     Table,
     answers,
     drivers,
+    filled,
     material,
     motion,
     nature_of,
@@ -98,29 +99,21 @@ def _number(value: float) -> str:
 
 
 def modulus(part: Document) -> Table:
-    """α-cuts of E and ν, with the error of E."""
-    error, nature = sum(part["error"].values()), nature_of(part["nature"])
+    """α-cuts of E, and of ν with the error of E where these are known."""
+    cuts, nature = part.get("cuts", part), nature_of(part["nature"])
+    poisson, error = part.get("nu_cuts"), sum(part.get("error", {}).values())
     rows: list[Row] = [
         (
             f"{alpha:g}",
-            *ends_of(part["E_GPa"], level, nature),
-            *ends_of(part["nu_cuts"], level, nature),
-            f"{error * part['E_GPa']['upper'][level]:.2g}",
+            *ends_of(cuts["E_GPa"], level, nature),
+            *(ends_of(poisson, level, nature) if poisson else ("", "")),
+            f"{error * cuts['E_GPa']['upper'][level]:.2g}" if error else "",
             str(nature),
         )
-        for level, alpha in enumerate(part["alpha"])
-    ]
-    return ("α", "E from [GPa]", "E to [GPa]", "ν from", "ν to", "± E [GPa]", "nature"), rows
-
-
-def image(part: Document) -> Table:
-    """Proved α-cuts of E of an image."""
-    cuts, nature = part["cuts"], nature_of(part["nature"])
-    rows: list[Row] = [
-        (f"{alpha:g}", *ends_of(cuts["E_GPa"], level, nature), str(nature))
         for level, alpha in enumerate(cuts["alpha"])
     ]
-    return ("α", "E from [GPa]", "E to [GPa]", "nature"), rows
+    head = ("α", "E from [GPa]", "E to [GPa]", "ν from", "ν to", "± E [GPa]", "nature")
+    return filled(head, rows)
 
 
 def update(part: Document) -> Table:
@@ -169,7 +162,7 @@ def shares(part: Document) -> Table:
 MAKERS = {
     "radius_map": ("microstructure", radius_map),
     "modulus": ("modulus", modulus),
-    "image": ("image", image),
+    "image": ("image", modulus),
     "update": ("update", update),
     "peaks": ("envelopes", peaks),
     "shares": ("shares", shares),

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -34,38 +34,23 @@ SPHERES = 1e-5
 """Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
 
 
-class CellModel(Protocol):
-    """A model of the cell as the front door needs it."""
-
-    def solve(
-        self, radius_map: Radii, matrix: Any, inclusions: Sequence[Any]
-    ) -> Sequence[Homogenised]:
-        """One result for each inclusion material; mesh and assembly are shared."""
+Solve = Callable[..., Sequence[Homogenised]]
+"""A model of the cell: from radius map, matrix and inclusions to one result for each of these."""
+AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
+"""Averages of a plane stiffness in words."""
 
 
-@dataclass(frozen=True)
-class Averaged:
-    """A model whose E and ν are those of the isotropic average of the plane stiffness.
-
-    Args:
-        model: Makes the whole plane stiffness.
-    """
-
-    model: CellModel
-
-    def solve(self, radius_map: Radii, matrix: Any, inclusions: Sequence[Any]) -> list[Homogenised]:
-        """One result for each inclusion material."""
-        results = self.model.solve(radius_map, matrix, inclusions)
-        return [result.averaged("isotropic") for result in results]
+def averaged(model: Solve, *cell: object) -> list[Homogenised]:
+    """Results whose E and ν are those of the isotropic average of the plane stiffness."""
+    return [result.averaged("isotropic") for result in model(*cell)]
 
 
 def meaning(cell: RoundCell, modulus: ModulusSection) -> str:
-    """Average that E and ν are of: cylinders (eq. 16), isotropic or spheres."""
-    plane_average = modulus.average == "isotropic" and cell.particles != "spheres"
-    return "isotropic" if plane_average else cell.particles
+    """Average that E and ν are of: eq. 16, isotropic or spheres."""
+    return "spheres" if cell.particles == "spheres" else AVERAGES[modulus.average]
 
 
-def model_of(cell: RoundCell, mesh: Mesh, modulus: ModulusSection, **elements: object) -> CellModel:
+def model_of(cell: RoundCell, mesh: Mesh, modulus: ModulusSection, **elements: object) -> Solve:
     """The model that the sections of a case name.
 
     Args:
@@ -82,26 +67,26 @@ def model_of(cell: RoundCell, mesh: Mesh, modulus: ModulusSection, **elements: o
         model = _model(cell, mesh, modulus, {"stiffness": averages, **elements})
     except ImportError as error:
         raise RefusedError("modulus.method", modulus.method, "series", missing(error)) from None
-    return Averaged(model) if averages else model
+    return partial(averaged, model) if averages else model
 
 
 def _model(
     cell: RoundCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
-) -> CellModel:
+) -> Solve:
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
-        return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11))
+        return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11)).solve
     if cell.square and method in ("auto", "series"):
         own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
-        return SeriesModel(accuracy=own)
+        return SeriesModel(accuracy=own).solve
     outline = cell.outline or circle
     if method in ("auto", "slices"):
         from alphacut.rve.slices.model import SlicesModel
 
-        return SlicesModel(mesh_size=mesh.size, outline=outline)
+        return SlicesModel(mesh_size=mesh.size, outline=outline).solve
     from alphacut.rve.prism.model import PrismModel
 
-    return PrismModel(mesh.size, mesh.layers, outline=outline, **elements)
+    return PrismModel(mesh.size, mesh.layers, outline=outline, **elements).solve
 
 
 def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
@@ -125,10 +110,10 @@ def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
     return Cell(matrix, inclusion, map_of, cell.outline or circle)
 
 
-def solve(radius: RadiusMap, cell: RoundCell, model: CellModel) -> Homogenised:
+def solve(radius: RadiusMap, cell: RoundCell, model: Solve) -> Homogenised:
     """The cell's result at the modal values of its inputs."""
     modal = modal_cell(radius, cell)
-    return model.solve(modal.radius, modal.matrix, [modal.inclusion])[0]
+    return model(modal.radius, modal.matrix, [modal.inclusion])[0]
 
 
 def references(radius: RadiusMap, cell: RoundCell) -> Document:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -35,16 +35,14 @@ class EnvelopeTask:
         fuzzy: Fuzzy inputs as the user names them: E, m, m1 …
         duration: Length of the simulation, in s.
         section: Levels, method, step.
-        figures: Figure of the paper for each output drawn; empty for none.
-        output: The one output drawn; empty for all.
+        figures: Outputs that are drawn, each with its number in the paper; empty for all.
     """
 
     name: str
     fuzzy: tuple[str, ...]
     duration: float
     section: Envelope
-    figures: tuple[str, ...] = ()
-    output: str = ""
+    figures: Mapping[str, str] = field(default_factory=dict)
 
     def tolerance(self, structure: Structure) -> Tolerance:
         """Error that is allowed, in the unit of some output or as a share.
@@ -104,15 +102,9 @@ def with_peaks(result: frame.Envelope) -> xarray.Dataset:
 def tasks(section: Envelope, studies: Sequence[Study]) -> tuple[EnvelopeTask, ...]:
     """The envelopes of a case: its studies, or the one of [envelope]."""
     several = tuple(
-        EnvelopeTask(s.name, s.fuzzy, s.duration, section, tuple(s.figures.values()), _only(s))
-        for s in studies
+        EnvelopeTask(one.name, one.fuzzy, one.duration, section, one.figures) for one in studies
     )
     return several or (EnvelopeTask("all", section.fuzzy, section.duration, section),)
-
-
-def _only(study: Study) -> str:
-    """The output that a study draws alone; empty where it draws several."""
-    return next(iter(study.figures)) if len(study.figures) == 1 else ""
 
 
 def stage(structure: Structure, task: EnvelopeTask) -> Stage:

@@ -23,7 +23,7 @@ from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
 from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_phases
-from alphacut.stages.cell import GPA
+from alphacut.stages.cell import AVERAGES, GPA
 from alphacut.stages.store import Stage, Work
 from alphacut.stochastic.segmentation import segmented
 
@@ -110,7 +110,7 @@ def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) 
         "E_GPa": _pair(top.modulus),
         "nu": {"lower": top.poisson[0], "upper": top.poisson[1]},
         "G_T_GPa": _pair(top.bounds.shear(average)),
-        "average": average,
+        "average": AVERAGES[average],
         "nature": NATURE,
         "cuts": {
             "alpha": alpha,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from alphacut.io.files import Document, as_json
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
-from alphacut.stages.cell import GPA, CellModel, inputs_of, meaning, model_of, parts
+from alphacut.stages.cell import GPA, Solve, inputs_of, meaning, model_of, parts, solve
 from alphacut.stages.store import Stage, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
 
@@ -65,7 +65,7 @@ class CellTask:
         crisp: Inputs that are not fuzzy, by name, in SI.
     """
 
-    model: CellModel
+    model: Solve
     radius: RadiusMap
     cell: RoundCell
     crisp: Mapping[str, float]
@@ -74,7 +74,7 @@ class CellTask:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
         every = [parts({**self.crisp, **point}, self.radius, self.cell) for point in points]
         radius, matrix, _ = every[0]
-        results = self.model.solve(radius, matrix, [inclusion for *_, inclusion in every])
+        results = self.model(radius, matrix, [inclusion for *_, inclusion in every])
         return [self._outputs(result) for result in results]
 
     def _outputs(self, result: Homogenised) -> dict[str, float | Array]:
@@ -123,7 +123,7 @@ class Campaign:
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
         return fuzzy or {material: numbers[material]}
 
-    def model(self, *, estimate: bool = False) -> CellModel:
+    def model(self, *, estimate: bool = False) -> Solve:
         """The model of the cell; it may declare its errors at an extra cost."""
         support = None
         if self.cell.stiffness is None:
@@ -131,12 +131,6 @@ class Campaign:
             support = (ends.lower, ends.upper)
         own = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
         return model_of(self.cell, self.mesh, self.modulus, **own)
-
-    def task(self, model: CellModel) -> CellTask:
-        """The function of the fuzzy inputs."""
-        numbers = inputs_of(self.radius, self.cell)
-        crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
-        return CellTask(model, self.radius, self.cell, crisp)
 
     @property
     def identity(self) -> Document:
@@ -149,11 +143,14 @@ class Campaign:
         sections = [modulus, options, crisp, repr(self.radius.theta), stiffness]
         return {"sections": sections, "source": source}
 
-    def cuts(self, inputs: Mapping[str, FuzzyNumber], plan: Plan, **options: Any) -> Cuts:
-        """The α-cuts of all outputs; inputs that are left out are crisp."""
+    @property
+    def propagation(self) -> Callable[..., Cuts]:
+        """The function from fuzzy inputs and a plan to the α-cuts of all outputs."""
+        numbers = inputs_of(self.radius, self.cell)
+        crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
+        task = CellTask(self.model(), self.radius, self.cell, crisp)
         shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
-        task, alpha = self.task(self.model()), self.modulus.alpha
-        return propagate(task, inputs, plan, alpha=alpha, shared=shared, **options)
+        return partial(propagate, task, alpha=self.modulus.alpha, shared=shared)
 
     def run(self, work: Work) -> xarray.Dataset:
         """The α-cuts with all samples; a store beside them goes on after an interruption."""
@@ -161,7 +158,7 @@ class Campaign:
         if store is not None and work.fresh:
             for old in store.parent.glob("samples.db*"):
                 old.unlink()
-        result = self.cuts(
+        result = self.propagation(
             self.inputs,
             PLANS[self.modulus.plan],
             workers=work.workers,
@@ -184,11 +181,8 @@ class Campaign:
         if not self.cell.square or self.modulus.method == "prism":
             return Known()
         of = {name: number.support for name, number in self.cell.phases.items()}
-        matrix, inclusion, poisson = (
-            of["matrix_modulus"],
-            of["inclusion_modulus"],
-            of["matrix_poisson"],
-        )
+        matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]
+        poisson = of["matrix_poisson"]
         stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
         same = poisson == of["inclusion_poisson"] and not poisson.width and poisson.lower >= 0
         if not same or not (stiffer or softer):
@@ -204,9 +198,7 @@ class Campaign:
         errors = {name: error for name, error in _largest(result, "error").items() if error}
         if errors or self.modulus.method != "prism":
             return errors
-        modal = {name: x.modal for name, x in inputs_of(self.radius, self.cell).items()}
-        radius, matrix, inclusion = parts(modal, self.radius, self.cell)
-        return dict(self.model(estimate=True).solve(radius, matrix, [inclusion])[0].error)
+        return dict(solve(self.radius, self.cell, self.model(estimate=True)).error)
 
 
 def stage(campaign: Campaign) -> Stage:

@@ -13,7 +13,7 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of
-from alphacut.io.units import STANDARD_GRAVITY
+from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.stages import envelope, modulus
 from alphacut.stages.envelope import EnvelopeTask
 
@@ -83,7 +83,7 @@ class Results:
         of = {task.name: task for task in self.tasks}
         if self.envelopes:
             numbers["envelopes"] = {
-                name: envelope.document(data, of[name].fuzzy) | {"drawn": of[name].output}
+                name: envelope.document(data, of[name].fuzzy) | {"drawn": list(of[name].figures)}
                 for name, data in self.envelopes.items()
             }
         if self.learned is not None:

@@ -75,10 +75,10 @@ def of_cell(campaign: Campaign) -> Shares:
     They are by the series where it has a formula.
     """
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
-    quick = replace(campaign, modulus=modulus)
+    propagation = replace(campaign, modulus=modulus).propagation
 
     def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        of = quick.cuts(inputs, Reduced(), progress=False)
+        of = propagation(inputs, Reduced(), progress=False)
         columns = [of.column(name) for name in OUTPUTS]
         return of.lower[:, columns], of.upper[:, columns]
 

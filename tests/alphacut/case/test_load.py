@@ -33,7 +33,7 @@ def test_a_shipped_case_is_read(path):
     case = load(path)
     assert case.name == path.stem
     assert case.content.title
-    assert case.content.envelope or "envelope" not in case.stages
+    assert case.content.envelope or "envelope" not in case.content.stages
 
 
 def test_sections_hold_objects_in_si(tmp_path):

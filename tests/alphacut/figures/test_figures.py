@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, modulus, style
+from alphacut.figures import envelope, material, style
 from alphacut.report.page import caption
 from tests.alphacut.one_case import run
 
@@ -74,7 +74,7 @@ def test_samples_have_the_membership_of_their_least_input():
         {"point": (("sample", "input"), points), "E_at": (("alpha", "bound", "input"), places)},
         {"alpha": [0.0, 1.0]},
     )
-    assert modulus.levels_of_samples(data).tolist() == [1, 0, 0]
+    assert material.levels_of_samples(data).tolist() == [1, 0, 0]
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
         {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]},
     )
     with style.style():
-        picture, cuts = modulus.image(data).axes
+        picture, cuts = material.image(data).axes
     assert picture.images[0].get_array().shape == (4, 4)
     ends = np.concatenate([line.get_xdata() for line in cuts.lines])
     assert (ends.min(), ends.max()) == pytest.approx((20, 30))

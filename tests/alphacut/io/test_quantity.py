@@ -3,8 +3,7 @@
 import pytest
 
 from alphacut.fuzzy import Crisp, Interval, Trapezoidal, Triangular
-from alphacut.io.quantity import fuzzy, number
-from alphacut.io.units import engineering
+from alphacut.io.quantity import engineering, fuzzy, number
 
 RIGHT = [
     ("80 GPa", "Pa", Crisp(80e9)),
