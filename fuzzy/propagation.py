@@ -15,7 +15,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Function
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.store import Identity, Store, model_key
-from alphacut.fuzzy.campaign.workers import running
+from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Known
 from alphacut.fuzzy.plans.automatic import Automatic
@@ -88,11 +88,14 @@ def propagate(
     method = method or Automatic()
     runs = hasattr(method, "run") and not isinstance(method, type)
     require(runs, "method", repr(method), "an object such as General() or Signed()")
+    holds = executor is None or (isinstance(executor, Executor) and workers == 1)
+    allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
+    require(holds, "executor", executor, allowed)
     call = Call(function, domain.names, tuple(shared), vectorised)
     key = b"" if store is None else model_key(identity or {})
     with (
         showing(progress) as tell,
-        running(executor, workers) as each,
+        nullcontext(executor) if executor else pool(workers) as each,
         nullcontext(store) if isinstance(store, Store | None) else Store(store) as shelf,
     ):
         campaign = Campaign(call, known or Known(), budget, each, tell, shelf, key)

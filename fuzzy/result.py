@@ -215,7 +215,7 @@ class Bounds:
     @property
     def claim(self) -> JointClaim:
         """Claim of the cuts, and which inputs are opinions."""
-        return JointClaim.of(self.inputs).resting_on(self.nature)
+        return JointClaim.of(self.inputs, self.nature)
 
     def number(self, output: str = "y") -> Stepwise | Claimed:
         """One output as a fuzzy number: between two levels the wider α-cut holds.

@@ -119,12 +119,9 @@ def to_dataset(result: Microstructure) -> xarray.Dataset:
         "pbox_upper": np.interp(radius, low, share),
         "fitted": np.interp(radius, fit.map((box.a2[1], box.a4[1]))(theta), share),
     }
-    attributes = {"a1": fit.a1, "a2": list(box.a2), "a3": fit.a3, "a4": list(box.a4)}
-    attributes |= {"band": result.band, "seed": result.study.seed}
     dataset = xarray.Dataset(
         {name: ("r_n", values, {"units": "1"}) for name, values in columns.items()},
         {"r_n": radius},
-        attributes,
     )
     name = "reduced radius: radius over half the side of a square or cube as large as the cell"
     dataset["r_n"].attrs = {"units": "1", "long_name": name}

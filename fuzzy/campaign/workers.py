@@ -7,14 +7,14 @@ import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from itertools import islice
 from time import perf_counter, sleep
 from typing import ParamSpec, TypeVar
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Outcome
-from alphacut.fuzzy.refused import FailedError, real, require
+from alphacut.fuzzy.refused import FailedError, real
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -47,18 +47,6 @@ def pool(workers: int) -> Iterator[Executor | None]:
             except BaseException:  # nobody waits for what they do any more
                 executor.shutdown(kill_workers=True)  # type: ignore[call-arg]
                 raise
-
-
-def running(executor: Executor | None, workers: int) -> AbstractContextManager[Executor | None]:
-    """The caller's executor, which stays open, or a pool of `workers` processes.
-
-    Raises:
-        RefusedError: There is an executor that is none, or one beside workers.
-    """
-    holds = executor is None or (isinstance(executor, Executor) and workers == 1)
-    allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
-    require(holds, "executor", executor, allowed)
-    return nullcontext(executor) if executor else pool(workers)
 
 
 def _processes(workers: int) -> Executor:

@@ -56,19 +56,13 @@ def from_data(
     if law is not None:
         chosen("law", law, get_args(Law))
     data = Observations.of(values, bounds)
-    number, decided = _cuts(data, claim, quantile, law)
-    return Claimed(number, Claim(claim, _conditions(data, law, bounds)), decided)
-
-
-def _cuts(
-    data: Observations, claim: str, quantile: float | None, law: Law | None
-) -> tuple[Stepwise, float]:
-    """The cuts, and the least level that the values decide."""
     if law is not None:
-        return law_cuts(data, law, quantile, mean=claim == "mean")
-    if claim == "mean":
-        return mean_cuts(data), 0.0
-    return rank_cuts(data, quantile)
+        number, decided = law_cuts(data, law, quantile, mean=claim == "mean")
+    elif claim == "mean":
+        number, decided = mean_cuts(data), 0.0
+    else:
+        number, decided = rank_cuts(data, quantile)
+    return Claimed(number, Claim(claim, _conditions(data, law, bounds)), decided)
 
 
 def _quantile(claim: str) -> float | None:

@@ -97,8 +97,8 @@ class JointClaim:
     opinions: tuple[str, ...]
 
     @classmethod
-    def of(cls, inputs: Mapping[str, FuzzyNumber]) -> JointClaim:
-        """The claim of a result by its inputs."""
+    def of(cls, inputs: Mapping[str, FuzzyNumber], nature: str = "guaranteed") -> JointClaim:
+        """The claim of a result by its inputs and the nature of its bounds."""
         claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
         opinions = tuple(
             name
@@ -114,13 +114,9 @@ class JointClaim:
         rule, where = next(rules, None), "their cuts" if len(opinions) > 1 else "its cut"
         held = [f"{', '.join(opinions)} in {where} at α (opinions)"] if opinions else []
         words = [rule.words] if rule and rule.words else []
+        if rule and nature != "guaranteed":
+            held.append(f"if the true range stays inside the {nature} bounds, which is not proved")
         return cls(rule, (*conditions, *words, *held), opinions)
-
-    def resting_on(self, nature: str) -> JointClaim:
-        """The claim of a result of a nature."""
-        lack = f"if the true range stays inside the {nature} bounds, which is not proved"
-        more = () if nature == "guaranteed" or self.rule is None else (lack,)
-        return replace(self, conditions=(*self.conditions, *more))
 
     @property
     def claim(self) -> Claim | None:
@@ -130,11 +126,8 @@ class JointClaim:
     def __str__(self) -> str:
         """The claim in one sentence; empty where nothing is fuzzy."""
         if self.rule is None:
-            return (
-                f"{', '.join(self.opinions)}: opinions, so that no level has a probability"
-                if self.opinions
-                else ""
-            )
+            names = ", ".join(self.opinions)
+            return names and f"{names}: opinions, so that no level has a probability"
         names = ", ".join(self.rule.names)
         subject = (
             self.rule.means if self.rule.named else f"result of the {self.rule.means} of {names}"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.refused import chosen, real, require
-from alphacut.fuzzy.sets.claimed import from_level
+from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, rising
 
@@ -48,8 +48,8 @@ class Domain:
         interactions: Constraints between the inputs.
 
     Raises:
-        RefusedError: There is no input, the levels are none, do not rise, or leave [0, 1], or an
-            interaction names no input.
+        RefusedError: There is no input, the levels are none, do not rise, or leave [0, 1], an
+            interaction names no input, or the values behind a number do not decide its cuts.
     """
 
     inputs: Mapping[str, FuzzyNumber]
@@ -59,9 +59,12 @@ class Domain:
     def __post_init__(self) -> None:
         alpha = rising(self.alpha)
         inputs = fuzzy_inputs(self.inputs)
-        decided = {name: from_level(number, alpha[0]) for name, number in inputs.items()}
+        for name, number in inputs.items():
+            if isinstance(number, Claimed):
+                number.cut(alpha[0])  # refused where the values do not decide it
+                inputs[name] = replace(number, decided=0.0)
         object.__setattr__(self, "alpha", alpha)
-        object.__setattr__(self, "inputs", decided)
+        object.__setattr__(self, "inputs", inputs)
         object.__setattr__(self, "interactions", tuple(self.interactions))
         for interaction in self.interactions:
             for name in interaction.names:

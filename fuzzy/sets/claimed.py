@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -57,12 +57,8 @@ class Joint:
     @property
     def words(self) -> str:
         """The rule in words."""
-        m = len(self.names)
-        if m == 1:
-            return ""
-        return (
-            f"{m} independent sources" if self.independent else f"{m} sources of unknown dependence"
-        )
+        of = "independent sources" if self.independent else "sources of unknown dependence"
+        return f"{len(self.names)} {of}" if len(self.names) > 1 else ""
 
 
 @dataclass(frozen=True)
@@ -117,15 +113,3 @@ class Claimed(FuzzyNumber):
         return f"{type(self).__name__}({self.claim.about}: {ends})"
 
     __repr__ = __str__
-
-
-def from_level(number: FuzzyNumber, alpha: float) -> FuzzyNumber:
-    """The number for use from a level on: what the values do not decide lies below.
-
-    Raises:
-        RefusedError: The values do not decide the cut at `alpha`.
-    """
-    if not isinstance(number, Claimed):
-        return number
-    number.cut(alpha)
-    return replace(number, decided=0.0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.stochastic.figures.style import BLUE, GREEN, GREY, INK, LIGHT, ORANGE, PALE, beside
+from alphacut.stochastic.figures.style import GREEN, GREY, INK, LIGHT, ORANGE, PALE, beside
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+CORNER = 120  # discs in the corner of a section that is drawn
 EQUAL = "{} equal discs of the same area fraction, not those of the section"
 
 
@@ -35,7 +36,7 @@ def _view(axes: Axes, low: Array, high: Array) -> None:
     axes.grid(visible=False)
 
 
-def plot_discs(axes: Axes, discs: Particles, colour: str = BLUE, view: Array | None = None) -> None:
+def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array | None = None) -> None:
     """Particles in their rectangle, or in its corner `view` (m), with their images, in mm."""
     view = discs.size if view is None else view
     centres = np.concatenate([discs.centres + shift for shift in _shifts(discs)])
@@ -65,15 +66,10 @@ def _shifts(discs: Particles) -> list[Array]:
     return [discs.size * (i, j) for i in tiles for j in tiles]
 
 
-def corner(discs: Particles, number: int = 120) -> Array:
-    """Width and height, in m, of a corner of the section that holds about `number` discs."""
-    return np.asarray(discs.size * min(1.0, float(np.sqrt(number / len(discs)))))
-
-
 def draw_cells(diagram: Apollonius) -> Figure:
     """Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
     discs = diagram.discs
-    view = corner(discs)
+    view = discs.size * min(1.0, float(np.sqrt(CORNER / len(discs))))
     width, height = 1e3 * discs.size
     whole = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
     whole = whole if (view == discs.size).all() else f"a corner of {whole}"

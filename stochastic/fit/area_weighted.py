@@ -47,6 +47,13 @@ class AreaWeighted:
         """Σ of the weights up to each value, shape (n,)."""
         return np.asarray(np.minimum(np.cumsum(self.weights), 1.0))
 
+    @cached_property
+    def steps(self) -> tuple[Array, Array, Array]:
+        """Distinct values, and the distribution function before and at each, shape (k,) each."""
+        step = np.append(np.diff(self.values) > 0, True)
+        at = self.cumulated[step]
+        return self.values[step], np.append(0.0, at[:-1]), at
+
     def cdf(self, radius: ArrayLike) -> Array:
         """Share of area with r_n ≤ radius, any shape."""
         place = np.searchsorted(self.values, radius, side="right")

@@ -48,9 +48,7 @@ class PBox:
 
     def excess(self, sample: AreaWeighted) -> float:
         """Half width of the band with which the sample would lie within the p-box."""
-        step = np.append(np.diff(sample.values) > 0, True)
-        before = np.concatenate([[0.0], sample.cumulated[step][:-1]])
-        values, after = sample.values[step], sample.cumulated[step]
+        values, before, after = sample.steps
         law = self.fit.distribution
         grid = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
         low, high = self.bounds(grid)
@@ -109,9 +107,7 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
 
 def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
     """Ends of a sample's band: share, value, and whether a greatest radius must reach it."""
-    step = np.append(np.diff(sample.values) > 0, True)
-    values, after = sample.values[step], sample.cumulated[step]
-    before = np.concatenate([[0.0], after[:-1]])
+    values, before, after = sample.steps
     up, down = before + band < 1, after - band > 0
     return (
         np.concatenate([(before + band)[up], (after - band)[down]]),

@@ -33,7 +33,7 @@ class Packing:
     """Specification of a random packing.
 
     Args:
-        number: Number of particles, at least 1; more are drawn until the box holds the largest.
+        number: Number of particles; more are drawn until the box holds the largest.
         fraction: Share of the square or cube that they take, above 0 and below `Shape.densest`.
         radii: Law of the radii, by number.
         shape: Discs or spheres.
@@ -48,7 +48,6 @@ class Packing:
     shape: Shape = DISCS
 
     def __post_init__(self) -> None:
-        real(f"packing.{self.shape.particles}", self.number, whole=True, least=1)
         key = f"packing.{self.shape.cells}_fraction"
         real(key, self.fraction, positive=True, most=self.shape.densest)
 

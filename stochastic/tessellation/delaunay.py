@@ -63,10 +63,6 @@ def neighbours(discs: Particles) -> Neighbours:
 
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
     """Pairs of `values` of cells that share a wall, either way round, shape (2, m)."""
-    beyond = (
-        (diagram.neighbour > diagram.cell)
-        & np.isfinite(values[diagram.cell])
-        & np.isfinite(values[diagram.neighbour])
-    )
+    beyond = diagram.neighbour > diagram.cell
     pair = np.unique(np.stack([diagram.cell[beyond], diagram.neighbour[beyond]]), axis=1)
     return np.concatenate([values[pair], values[pair[::-1]]], axis=1)
