@@ -9,7 +9,7 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 31_533,
+    "lines of the packages": 31_489,
     "places that raise": 310,
 }
 ANY = 7  # public functions with Any; most pass on what FEniCSx does not type
