@@ -35,11 +35,6 @@ class Envelope(Bounds):
     between: Array | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return tuple(self.inputs)
-
     def to_dataset(self) -> xarray.Dataset:
         """The envelope as an xarray dataset with units; ready for NetCDF."""
         dataset = super().to_dataset()

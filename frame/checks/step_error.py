@@ -89,7 +89,7 @@ def _at_bounds(of: Envelope, flow: LinearFlow) -> Array:
 
     A structure may resonate between the corners, and the scheme at other parameters than the truth.
     """
-    at, d = np.stack([of.lower_at, of.upper_at]), len(of.parameters)
+    at, d = np.stack([of.lower_at, of.upper_at]), len(of.inputs)
     peaks = np.abs([of.lower, of.upper]).argmax(2)[:, :, None, :, None]
     highest = np.take_along_axis(at, peaks, 2).reshape(-1, d)
     others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))

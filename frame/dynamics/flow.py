@@ -14,7 +14,7 @@ from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate, frequencies
-from alphacut.fuzzy.refused import FailedError, RefusedError, chosen, real
+from alphacut.fuzzy.refused import FailedError, RefusedError, chosen, real, require
 
 MOST_NODES = 10_000_000
 """Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
@@ -29,9 +29,8 @@ def nodes(duration: float, step: float) -> Array:
     """
     real("step", step, positive=True)
     count = round(real("duration", duration) / step)
-    if not 1 <= count <= MOST_NODES or abs(count * step - duration) > 1e-9 * duration:
-        allowed = f"1 to {MOST_NODES:,} whole steps of {step:g} s"
-        raise RefusedError("duration", f"{duration:g} s", allowed)
+    whole = 1 <= count <= MOST_NODES and abs(count * step - duration) <= 1e-9 * duration
+    require(whole, "duration", f"{duration:g} s", f"1 to {MOST_NODES:,} whole steps of {step:g} s")
     return np.arange(count + 1) * step
 
 

@@ -11,13 +11,12 @@ from scipy.special import chdtri
 from alphacut.fuzzy import FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import from_scatter
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.sets.claimed import Claimed
 from alphacut.fuzzy.sets.numbers import Cut
 
 NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
 ROUGH = 0.2  # deviation of the reference over its amplitude above which ratios have no law
-ROUGH_ALLOWED = f"values up to {ROUGH:g}"
 CHANCE = 1e-6  # probability below which values contradict their deviation
 
 
@@ -116,9 +115,9 @@ def measured_mode(
     values = np.asarray(frequencies, float)
     rows = {floor: np.asarray(row, float) for floor, row in (shapes or {}).items()}
     counts = [row.size for row in rows.values()]
-    if values.ndim != 1 or set(counts) - {values.size}:
-        allowed = f"{values.size} of each floor, as many as frequencies"
-        raise RefusedError(f"mode {mode}: amplitudes", counts, allowed)
+    as_many = values.ndim == 1 and not set(counts) - {values.size}
+    allowed = f"{values.size} of each floor, as many as frequencies"
+    require(as_many, f"mode {mode}: amplitudes", counts, allowed)
     spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
     number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
@@ -126,17 +125,16 @@ def measured_mode(
     means = {floor: abs(float(row.mean())) for floor, row in rows.items()}
     largest = max(means.values())
     reference = max(floor for floor, mean in means.items() if mean >= NEAR * largest)
-    if not rows[reference].all():
-        key = f"mode {mode}: an amplitude of floor {reference}, the reference,"
-        raise RefusedError(key, 0, "values other than 0")
     shape = {}
     for floor in [floor for floor in rows if floor != reference]:
         what = f"mode {mode}: amplitudes q{floor}/q{reference} of floor {floor}"
-        ratios = rows[floor] / rows[reference]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = rows[floor] / rows[reference]
         square = _scatter(ratios, shape_deviation and shape_deviation * largest / means[reference])
-        if square > ROUGH**2:
-            value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
-            raise RefusedError(f"{what}: scatter of floor {reference}", value, ROUGH_ALLOWED, cure)
+        value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
+        key = f"{what}: scatter of floor {reference}"
+        clear = bool(np.isfinite(ratios).all()) and square <= ROUGH**2
+        require(clear, key, value, f"values up to {ROUGH:g}", cure)
         # the reference scatters, too; the last factor is above the second order's
         share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
         both = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
@@ -159,15 +157,14 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
         RefusedError: Their scatter is unknown, or contradicts the deviation.
     """
     count = len(values)
-    if deviation is not None and not deviation > 0:
-        raise RefusedError(f"{what}: {key}", deviation, "positive values, such as 0.01, or none")
-    if deviation is None and np.allclose(values, values[0], 1e-12, 0.0):
-        value, cure = f"{count} times {values[0]:g}", f"set {key}, such as 0.01"
-        raise RefusedError(what, value, "values that scatter", cure)
     if deviation is None:
+        value, cure = f"{count} times {values[0]:g}", f"set {key}, such as 0.01"
+        scatters = not np.allclose(values, values[0], 1e-12, 0.0)
+        require(scatters, what, value, "values that scatter", cure)
         return from_data(values, "mean", law="normal")
+    real(f"{what}: {key}", deviation, positive=True)
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0
-    if (count - 1) * (scatter / deviation) ** 2 > chdtri(max(count - 1, 1), CHANCE):
-        value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
-        raise RefusedError(f"{what}: {key} times the mean", value, allowed, "leave it out")
+    explained = (count - 1) * (scatter / deviation) ** 2 <= chdtri(max(count - 1, 1), CHANCE)
+    value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
+    require(explained, f"{what}: {key} times the mean", value, allowed, "leave it out")
     return from_scatter(float(values.mean()), deviation, count)

@@ -18,9 +18,6 @@ Symbols = Sequence[Any]
 Named = Mapping[str, Any]
 Function = Callable[[Symbols, Symbols, Named], Any]
 SMOOTH = "arithmetic and the smooth sin, cos and exp of alphacut.frame.calculus.jet"
-ROUGH = {"Abs", "sign", "Max", "Min", "Heaviside", "DiracDelta", "Piecewise", "floor", "ceiling"}
-ROUGH |= {"Mod", "arg", "re", "im"}
-"""Functions of SymPy that have no second derivative everywhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +38,8 @@ class LagrangianSystem:
 
     Raises:
         RefusedError: L is not quadratic in v, so that momenta cannot be turned back into
-            velocities, some coordinate has no inertia, a function asks for what is not there or is
-            not smooth, or gives a list of another length.
+            velocities, some coordinate has no inertia, or a function asks for what is not there or
+            gives a list of another length. Functions that are not smooth are refused by a motion.
     """
 
     coordinates: int
@@ -151,9 +148,6 @@ def _expressions(
         made = [sympy.sympify(value) for value in values()]
     except (KeyError, IndexError, TypeError, AttributeError, sympy.SympifyError) as failure:
         raise RefusedError(name, repr(failure), allowed) from None
-    every = {type(part).__name__ for value in made for part in sympy.preorder_traversal(value)}
-    rough = sorted(every & ROUGH)
-    require(not rough, name, ", ".join(rough), allowed)
     fits = len(made) == count and all(isinstance(value, sympy.Expr) for value in made)
     require(fits, name, made, f"{count} by coordinate, {allowed}")
     return made

@@ -375,7 +375,9 @@ def test_amplitudes_whose_reference_is_mostly_noise_are_refused():
 
 
 def test_a_deviation_of_0_is_refused():
-    with pytest.raises(ValueError, match=r"shape_deviation is 0.0; allowed: positive"):
+    with pytest.raises(
+        ValueError, match=r"shape_deviation is 0.0; allowed: finite numbers greater"
+    ):
         measured_mode(1, [2.0, 2.01], {1: [0.5, 0.51], 2: [1, 1.02]}, shape_deviation=0.0)
 
 
