@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[Any]
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,21 +101,15 @@ class Jet:
         return self**-1 * other
 
     def __pow__(self, exponent: float) -> Jet:
-        x = self.value
         if exponent == 2:
             return self * self
-        return self.chain(
-            x**exponent,
-            exponent * x ** (exponent - 1),
-            exponent * (exponent - 1) * x ** (exponent - 2),
-        )
-
-    def chain(self, f: Array, df: Array, ddf: Array) -> Jet:
-        """The jet of f(self) from f, f' and f'' at the value, elementwise."""
-        if not len(self.second):
-            return Jet(f, df * self.first, df * self.second)
-        outer = self.first[:, None] * self.first[None, :]
-        return Jet(f, df * self.first, df * self.second + ddf * outer)
+        x, k = self.value, exponent
+        value, slope = x**k, k * x ** (k - 1)
+        second = slope * self.second
+        if len(second):
+            outer = self.first[:, None] * self.first[None, :]
+            second = second + k * (k - 1) * x ** (k - 2) * outer
+        return Jet(value, slope * self.first, second)
 
     def _lift(self, other: Jet | ArrayLike) -> Jet:
         return other if isinstance(other, Jet) else self.like(other)
@@ -188,32 +181,3 @@ def concatenate(parts: Sequence[Jet], axis: int) -> Jet:
             for part in ("value", "first", "second")
         )
     )
-
-
-def sin(x: T) -> T:
-    """Sine of a jet, an array or a symbol of SymPy."""
-    return _chained(x, "sin", lambda v: (np.sin(v), np.cos(v), -np.sin(v)))
-
-
-def cos(x: T) -> T:
-    """Cosine of a jet, an array or a symbol of SymPy."""
-    return _chained(x, "cos", lambda v: (np.cos(v), -np.sin(v), -np.cos(v)))
-
-
-def exp(x: T) -> T:
-    """Exponential of a jet, an array or a symbol of SymPy."""
-    return _chained(x, "exp", lambda v: (np.exp(v),) * 3)
-
-
-def _chained(x: T, name: str, of: Callable[[Array], tuple[Array, ...]]) -> T:
-    """A function of a jet by its value and two derivatives, of anything else by its name."""
-    if isinstance(x, Jet):
-        made: T = x.chain(*of(x.value))  # type: ignore[assignment]
-        return made
-    module: Any = np
-    if not isinstance(x, float | int | np.ndarray):
-        import sympy  # only for symbols
-
-        module = sympy
-    result: T = getattr(module, name)(x)
-    return result

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from alphacut.frame.calculus.jet import cos
 from alphacut.frame.structures.quantities import Output, Parameter
 from alphacut.fuzzy.refused import RefusedError, real, require
 
@@ -17,16 +16,16 @@ if TYPE_CHECKING:
 Symbols = Sequence[Any]
 Named = Mapping[str, Any]
 Function = Callable[[Symbols, Symbols, Named], Any]
-SMOOTH = "arithmetic and the smooth sin, cos and exp of alphacut.frame.calculus.jet"
+SMOOTH = "arithmetic and the smooth functions of SymPy"
 
 
 @dataclass(frozen=True, eq=False)
 class LagrangianSystem:
     """A system with n coordinates, given by plain Python functions of (q, v, p).
 
-    The functions must use arithmetic and `sin`, `cos`, `exp` of `alphacut.frame.calculus.jet` only:
-    they are called with symbols. Whole and fractional powers are arithmetic; other functions of
-    SymPy go where they are smooth (`sympy.tan`, `sympy.log`); those of `math` and NumPy do not.
+    The functions are called with symbols. They may use arithmetic, whole and fractional powers, and
+    the smooth functions of SymPy (`sympy.sin`, `cos`, `tan`, `exp`, `log`, `sqrt`); those of `math`
+    and NumPy do not go.
 
     Args:
         coordinates: Number of coordinates n.
@@ -173,6 +172,7 @@ def pendulum(
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         real(name, value, positive=True)
     real("damping", damping, least=0)
+    from sympy import cos
 
     def lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
         return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])

@@ -101,7 +101,7 @@ class MatrixStructure:
             value = value_of(factor, variables(values, names, names[:1]))
         except (KeyError, TypeError, AttributeError, ValueError) as failure:
             value = failure
-        allowed = "arithmetic, sin, cos, exp of alphacut.frame.calculus.jet, to one number, of "
+        allowed = "arithmetic to one number, of "
         number = isinstance(value, Jet | float | int | np.number)
         require(number, f"factor of {kind}", repr(value), allowed + ", ".join(names))
         return factor, self._symmetric(kind, array)

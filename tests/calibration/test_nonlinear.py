@@ -4,9 +4,9 @@ from itertools import product
 
 import numpy as np
 import pytest
+from sympy import cos
 
 from alphacut.frame import ImprovedFollower, LagrangianFlow, LagrangianSystem, envelope, pendulum
-from alphacut.frame.calculus.jet import cos
 from alphacut.fuzzy import Nature
 from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import Drawn, Extrapolated, about, judged, reached
