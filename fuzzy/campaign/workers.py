@@ -135,12 +135,13 @@ def _result(future: Future[T]) -> T:
     """Result of a batch; its calls raise nothing themselves."""
     try:
         return future.result()
-    except BrokenExecutor as error:
-        cure = "out of memory, or a crash in compiled code; what a store holds stays"
-        raise FailedError("a worker process died", cure) from error
     except Exception as error:
         what = f"the function or its outputs cannot be sent between processes: {error}"
-        raise FailedError(what, "take workers=1, or out of it what cannot be copied") from error
+        cure = "take workers=1, or out of it what cannot be copied"
+        if isinstance(error, BrokenExecutor):
+            what = "a worker process died"
+            cure = "out of memory, or a crash in compiled code; what a store holds stays"
+        raise FailedError(what, cure) from error
 
 
 def slots(executor: Executor) -> int:

@@ -79,9 +79,8 @@ class Ellipsoidal:
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
             real(f"correlation of {' and '.join(pair)}", value, least=-1, most=1)
-        require(len(self.names) > 1, "inputs of the ellipsoid", self.names, "two names or more")
-        definite = np.linalg.eigvalsh(self._matrix).min() > 0
-        allowed = "values that agree: their matrix is positive definite"
+        definite = len(self.names) > 1 and np.linalg.eigvalsh(self._matrix).min() > 0
+        allowed = "pairs of inputs with values that agree: their matrix is positive definite"
         require(definite, "correlation", dict(self.correlation), allowed)
 
     @property

@@ -9,7 +9,6 @@ overlap arises: the memory of the pushing fades.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,14 +81,15 @@ class Packing:
 
     def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:
         """Centres one by one where the packing is loose, else pushed apart; (n, d), in m."""
-        if self.fraction <= self.shape.sequential:
-            with suppress(FailedError):
-                return random_sequential(radii, box, generator)
-        return relaxed(radii, box, generator)
+        loose = self.fraction <= self.shape.sequential
+        placed = random_sequential(radii, box, generator) if loose else None
+        return relaxed(radii, box, generator) if placed is None else placed
 
 
-def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array:
+def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
     """Centres of particles without overlap in a periodic box, shape (n, d), in m.
+
+    None if a particle finds no place in `ROUNDS` proposals.
 
     Particles are added from the largest down, in blocks; each one that fails is proposed again at a
     new place, uniform in the box.
@@ -98,9 +98,6 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
         radii: shape (n,), in m.
         box: Sides of the box, shape (d,), in m.
         generator: Source of chance.
-
-    Raises:
-        FailedError: A particle finds no place in `ROUNDS` proposals.
     """
     order = np.argsort(-radii, kind="stable")
     falling = radii[order]
@@ -108,7 +105,10 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
     while len(centres) < len(order):
         block = slice(len(centres), min(len(order), max(64, int(1.5 * len(centres)))))
         standing = _Standing(centres, falling[: len(centres)], box)
-        centres = np.concatenate([centres, _added(standing, falling[block], generator)])
+        added = _added(standing, falling[block], generator)
+        if added is None:
+            return None
+        centres = np.concatenate([centres, added])
     placed = np.empty_like(centres)
     placed[order] = centres
     return placed
@@ -137,8 +137,8 @@ class _Standing:
         return hit
 
 
-def _added(standing: _Standing, radii: Array, generator: np.random.Generator) -> Array:
-    """Centres for more particles among those in place, shape (n, d)."""
+def _added(standing: _Standing, radii: Array, generator: np.random.Generator) -> Array | None:
+    """Centres for more particles among those in place, shape (n, d); None if one has no place."""
     box = standing.box
     new = np.full((len(radii), len(box)), np.nan)
     fresh = _Standing(new[:0], radii[:0], box)
@@ -154,11 +154,7 @@ def _added(standing: _Standing, radii: Array, generator: np.random.Generator) ->
         new[pending[chosen]] = proposal[chosen]
         done = ~np.isnan(new[:, 0])
         fresh = _Standing(new[done], radii[done], box)
-    raise FailedError(
-        f"random sequential addition has no place for {int(np.isnan(new[:, 0]).sum())} of"
-        f" {len(radii)} particles after {ROUNDS} proposals each",
-        "lower the fraction",
-    )
+    return None
 
 
 def _first_come(proposal: Array, radii: Array, box: Array) -> Mask:

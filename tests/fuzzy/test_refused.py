@@ -73,7 +73,7 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: Linear({"x": np.nan}, 1), "weight of x"),
         (lambda: Ellipsoidal({("x", "y"): 1.1}), "correlation of x and y"),
         (lambda: Ellipsoidal({("x", "y"): 1.0}), "correlation"),
-        (lambda: Ellipsoidal({}), "inputs of the ellipsoid"),
+        (lambda: Ellipsoidal({}), "correlation"),
         (
             lambda: Ellipsoidal({("a", "b"): 0.9, ("b", "c"): 0.9, ("a", "c"): -0.9}),
             "correlation",

