@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.export.fields import ORDER
+from alphacut.export.mesh import ORDER
 from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap

@@ -23,7 +23,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from alphacut.export.fields import ORDER
+from alphacut.export.mesh import ORDER
 from alphacut.rve import LOADS, Phase, PrismModel, effective_modulus
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate

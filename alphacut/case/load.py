@@ -139,13 +139,9 @@ def _problem(key: str, detail: ErrorDetails) -> Problem:
 
 
 def _key(place: tuple[int | str, ...]) -> str:
-    """Full name of a key, without Pydantic's tags of unions."""
-    key = ""
-    for before, part in zip(("", *place), place, strict=False):
-        if before == "cell" and part in ("round", "image"):
-            continue
-        key += f"[{part}]" if isinstance(part, int) else f".{part}"
-    return key.lstrip(".")
+    """Full name of a key, without the tags of unions, which stand in angle brackets."""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in place)
+    return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
 
 
 def _written(value: object) -> str:

@@ -5,12 +5,9 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, model_validator
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import Discriminator, Field, PlainValidator, Tag, model_validator
 
 from alphacut.case.types import (
     ALPHA,
@@ -79,31 +76,18 @@ class RadiusMap(Section):
         return self
 
 
-@dataclass(frozen=True)
-class ModulusOrStiffness(Quantity):
-    """Young's modulus, or three rows of the plane-strain stiffness (11, 22, 12 with 2 ε12)."""
+def _stiffness(rows: list[list[object]]) -> VoigtPhase:
+    """Material of three rows of its plane-strain stiffness, as texts."""
+    try:
+        return VoigtPhase(tuple(tuple(number(x, "Pa") for x in row) for row in rows))
+    except (TypeError, ValueError):
+        allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
+        raise RefusedError("", rows, allowed) from None
 
-    def read(self, value: object) -> object:
-        """The modulus as a fuzzy number in Pa, or the material of the stiffness.
 
-        Raises:
-            RefusedError: It is neither.
-        """
-        if not isinstance(value, list):
-            return super().read(value)
-        try:
-            return VoigtPhase(tuple(tuple(number(x, "Pa") for x in row) for row in value))
-        except (TypeError, ValueError):
-            allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
-            raise RefusedError("", value, allowed) from None
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        """The JSON Schema: text, or rows of text."""
-        text = super().__get_pydantic_json_schema__(schema, handler)
-        row = {"type": "array", "items": {"type": "string"}}
-        return {**text, "anyOf": [*text["anyOf"], {"type": "array", "items": row}]}
+Stiffness = Annotated[
+    VoigtPhase, PlainValidator(_stiffness, json_schema_input_type=list[list[str]])
+]
 
 
 def _outline(particles: str) -> Ellipse | None:
@@ -128,7 +112,8 @@ class RoundCell(Section):
     matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
     matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
     inclusion_modulus: Annotated[
-        FuzzyNumber | VoigtPhase, ModulusOrStiffness("Pa", above=0, fuzzy=True)
+        Annotated[Modulus, Tag("<modulus>")] | Annotated[Stiffness, Tag("<stiffness>")],
+        Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),
     ] = Field(
         description="Young's modulus of the particle, or three rows of its plane-strain stiffness"
         " (11, 22, 12 with 2 ε12)"
@@ -224,12 +209,9 @@ class ImageCell(Section):
         return self
 
 
-def _kind(table: Any) -> str:
-    return "image" if "image" in table else "round"
-
-
 Cell = Annotated[
-    Annotated[RoundCell, Tag("round")] | Annotated[ImageCell, Tag("image")], Discriminator(_kind)
+    Annotated[RoundCell, Tag("<round>")] | Annotated[ImageCell, Tag("<image>")],
+    Discriminator(lambda table: "<image>" if "image" in table else "<round>"),
 ]
 
 

@@ -90,7 +90,7 @@ def difference(first: Homogenised, second: Homogenised, tolerance: float) -> flo
 
 def export(radius: RadiusMap, phases: RoundCell, mesh: Mesh, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns counts."""
-    from alphacut.export.fields import cell_fields, write_mesh
+    from alphacut.export.mesh import cell_fields, write_mesh
 
     require(path.suffix == ".vtu", "--export", str(path), "names that end in .vtu")
     fields = cell_fields(cell.modal_cell(radius, phases), mesh.size, mesh.layers)

@@ -38,12 +38,6 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raises the complaint of argparse as a problem."""
-        choice = re.match(
-            r"argument COMMAND: invalid choice: '(.*?)' \(choose from (.*)\)", message
-        )
-        if choice:
-            known = [name.strip(" '") for name in choice[2].split(",")]
-            raise RefusedError("command", choice[1], ", ".join(known), suggestion(choice[1], known))
         raise BadInput(Problem(self.prog.removeprefix("alphacut "), f"{message}; see --help"))
 
     def refuse(self, word: str) -> NoReturn:

@@ -7,10 +7,11 @@ from typing import TextIO
 
 from alphacut.commands.options import Command, add_common, add_run, answer, opened, read
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of, read_dataset
 from alphacut.io.quantity import between
-from alphacut.report.results import ISOTROPIC, fibre_label, nature_of, width_text
+from alphacut.report.results import ISOTROPIC, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
 from alphacut.stages.chain import Chain
 from alphacut.stages.identify import learned
@@ -47,7 +48,7 @@ def image(document: Document) -> str:
 
 def summary(document: Document) -> str:
     """Constants of fibres on two levels, references, and what the α-cuts cost."""
-    nature, levels = nature_of(document["nature"]), (0, -1)
+    nature, levels = Nature(document["nature"]), (0, -1)
     fibres = [
         (fibre_label(key), *(between(of["lower"][k], of["upper"][k], nature, 5) for k in levels))
         for key, of in document["fibres"].items()

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.case.content import QUESTIONS
+from alphacut.export.mesh import draw_mesh
 from alphacut.figures import envelope, follower, frame, material
-from alphacut.figures.mesh import draw_mesh
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.fuzzy.progress_bar import showing

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import Document, as_json, whole_file
+from alphacut.io.files import Document, as_json
 from alphacut.io.provenance import FORMAT, door
 
 if TYPE_CHECKING:
@@ -33,12 +33,6 @@ def require_known(facts: Mapping[str, object], path: Path) -> None:
     cure = f"make it anew by {door('run', 'CASE.toml', '--fresh')}"
     allowed = f"files of format {FORMAT}"
     require(version == FORMAT, str(path), f"of format {version}", allowed, cure)
-
-
-def write_dataset(dataset: xarray.Dataset, path: Path | str, facts: Mapping[str, object]) -> None:
-    """Writes a NetCDF file with `facts` among its attributes, whole or not at all."""
-    with whole_file(path) as partial:
-        dataset.assign_attrs(facts).to_netcdf(partial)
 
 
 def read_dataset(path: Path | str, *, key: str = "file") -> xarray.Dataset:

@@ -25,7 +25,6 @@ from alphacut.report.results import (
     drivers,
     material,
     motion,
-    nature_of,
     natures,
     width_text,
 )
@@ -94,7 +93,7 @@ def plot(name: str, study: Document, folder: Path) -> Document:
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
     bands = {side: dataset[side] for side in ("lower", "upper")}
-    nature = nature_of(study["nature"])
+    nature = Nature(study["nature"])
     proved = nature is Nature.GUARANTEED  # its error is inside
     bands["error"] = dataset["lower"] * 0.0 if proved else dataset["error"]
     return {
@@ -180,7 +179,7 @@ class Page:
                 yield f"Linear elastic, with natural periods of {periods} s."
             for study, one in part.items():
                 yield f"{study}: {one['method']}, fuzzy {', '.join(one['fuzzy'])}"
-            for nature in dict.fromkeys(nature_of(study["nature"]) for study in part.values()):
+            for nature in dict.fromkeys(Nature(study["nature"]) for study in part.values()):
                 yield f"{str(nature).capitalize()}: {nature.sentence}"
         elif name == "shares":
             yield "Share of the width that is lost when an input is fixed at its modal value."

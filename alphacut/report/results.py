@@ -26,12 +26,6 @@ EXCEEDED = {
 GRAVITY = float(STANDARD_GRAVITY)
 
 
-def nature_of(text: object) -> Nature:
-    """The nature that a summary states; the weakest where its word is not known."""
-    first = str(text).replace(",", " ").split()[:1]
-    return next((nature for nature in Nature if [str(nature)] == first), Nature.ATTAINED)
-
-
 def whole(ends: Document, level: int, error: float, nature: Nature) -> tuple[float, float, float]:
     """Ends of a cut, and the error that they leave out; guaranteed ends contain it."""
     low, high = float(ends["lower"][level]), float(ends["upper"][level])
@@ -57,7 +51,7 @@ def material(summary: Document) -> Table:
         if part is None:
             continue
         young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
-        nature, name = nature_of(part["nature"]), f"E, GPa ({part['average']})"
+        nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
         ends = cut(young, -1, nature), cut(young, 0, nature, error)
         rows.append((name, *ends, str(nature), error_text(error, nature)))
@@ -101,7 +95,7 @@ def motion(summary: Document) -> Table:
         for output, peak in study["peak"].items():
             each = scales(output, peak, summary.get("structure", {}))
             for label, factor in each if output in (study.get("drawn") or [output]) else ():
-                nature, error = nature_of(study["nature"]), max(peak.get("error", [0.0]))
+                nature, error = Nature(study["nature"]), max(peak.get("error", [0.0]))
                 cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
                 for k in levels[len(cuts) :]:
                     low, high, _ = whole(peak, k, error, nature)
@@ -147,7 +141,7 @@ def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
 
 def natures(summary: Document) -> Iterator[str]:
     """A line on the nature of the peaks."""
-    each = {name: nature_of(one["nature"]) for name, one in summary.get("envelopes", {}).items()}
+    each = {name: Nature(one["nature"]) for name, one in summary.get("envelopes", {}).items()}
     words = [f"all {nature}" for nature in set(each.values())]
     if len(words) > 1:
         words = [f"{nature} ({name})" for name, nature in each.items()]

@@ -22,7 +22,6 @@ from alphacut.report.results import (
     filled,
     material,
     motion,
-    nature_of,
     natures,
     whole,
 )
@@ -100,7 +99,7 @@ def _number(value: float) -> str:
 
 def modulus(part: Document) -> Table:
     """α-cuts of E, and of ν with the error of E where these are known."""
-    cuts, nature = part.get("cuts", part), nature_of(part["nature"])
+    cuts, nature = part.get("cuts", part), Nature(part["nature"])
     poisson, error = part.get("nu_cuts"), sum(part.get("error", {}).values())
     rows: list[Row] = [
         (
@@ -138,7 +137,7 @@ def peaks(studies: Document) -> Table:
     """Peaks of all studies, an output and a level each, in SI."""
     rows: list[Row] = []
     for name, study in studies.items():
-        nature = nature_of(study["nature"])
+        nature = Nature(study["nature"])
         for output, peak in study["peak"].items():
             for level, alpha in enumerate(study["alpha"]):
                 error = peak["error"][level] if "error" in peak else 0.0
@@ -173,7 +172,7 @@ MAKERS = {
 def over_time(data: xarray.Dataset, output: str) -> Table:
     """Bounds of one output by time, those of each level beside each other with their error."""
     one, unit = data.sel(output=output), Output(output).unit
-    nature = nature_of(data.attrs["nature"])
+    nature = Nature(data.attrs["nature"])
     words = {"lower": f"{nature} lower", "upper": f"{nature} upper", "error": "error"}
     words["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
     columns = {"time [s]": [_number(time) for time in one["time"].values]}

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.io.files import rank
-from alphacut.io.netcdf import fingerprint_of, read_dataset, write_dataset
+from alphacut.io.files import rank, whole_file
+from alphacut.io.netcdf import fingerprint_of, read_dataset
 from alphacut.io.provenance import attributes, fingerprint
 
 if TYPE_CHECKING:
@@ -120,7 +120,8 @@ class Store:
 
     def _put(self, stage: Stage, dataset: xarray.Dataset) -> None:
         """Writes a stage's dataset, whole or not at all."""
-        write_dataset(dataset, self._file(stage), attributes(self.case_text, stage.key))
+        with whole_file(self._file(stage)) as partial:
+            dataset.assign_attrs(attributes(self.case_text, stage.key)).to_netcdf(partial)
         self.made.append(stage.key)
 
     def _current(self, stage: Stage) -> bool:

@@ -109,7 +109,7 @@ def test_a_modulus_goes_from_one_command_to_the_next(tmp_path, capfd):
 
 
 REFUSED = [
-    ("rnu case.toml", "did you mean run?"),
+    ("rnu case.toml", "invalid choice: 'rnu' (choose from"),
     ("run case.toml --quik", "option is --quik"),
     ("run case.toml more.toml", "option is more.toml"),
     ("run case.toml --workers 0", "a whole number 1 or more"),

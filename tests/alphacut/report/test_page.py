@@ -15,7 +15,6 @@ from alphacut.report.results import (
     answers,
     drivers,
     motion,
-    nature_of,
 )
 from alphacut.report.tables import run_text, write_tables
 
@@ -69,19 +68,6 @@ def test_a_name_that_leads_out_of_the_folder_is_refused(results, tmp_path, key, 
     copy = changed(results, tmp_path, **{key: {name: study}})
     with pytest.raises(RefusedError, match="damaged"):
         report(copy)
-
-
-@pytest.mark.parametrize(
-    ("text", "nature"),
-    [
-        ("guaranteed, at two corners, if the image repeats itself", Nature.GUARANTEED),
-        ("estimated", Nature.ESTIMATED),
-        ("inner: attained at the points tried", Nature.ATTAINED),
-        ("proved beyond doubt", Nature.ATTAINED),
-    ],
-)
-def test_an_unknown_word_is_never_a_stronger_nature(text, nature):
-    assert nature_of(text) is nature
 
 
 def peaks_of(**ends):
