@@ -60,7 +60,7 @@ def enclosed(
         Proved bounds above the values, shape (N,), and boxes looked at, each as often as there are
         problems that need it.
     """
-    tree = Tree.of(model, lower, upper, optima, gap)
+    tree = Tree(model, lower, upper, optima, gap)
     frontier, size, used = Frontier.whole(len(lower), tree.numbers), len(tree.numbers), 0
     while len(frontier) and used + len(frontier) <= budget * size:
         used += len(frontier)
@@ -70,16 +70,12 @@ def enclosed(
     return tree.proved(frontier), used  # what the budget left open keeps its own bound
 
 
-@dataclass(frozen=True, eq=False)
 class Tree:
     """Boxes of one domain and the problems that share them.
 
     A problem is an output at a node on a side: number node · 2 m + 2 output + (1 for upper bounds).
 
-    Args:
-        model: The modal model.
-        lower: Lower ends of the domain, shape (d,).
-        upper: Upper ends.
+    Attributes:
         optima: N problems with their best points, which improve.
         numbers: Their numbers, shape (N,).
         remainder: Of quadratic Taylor models over the domain.
@@ -90,28 +86,17 @@ class Tree:
         gap: What the bounds may lie above the best values by.
     """
 
-    model: ModalModel
-    lower: Array
-    upper: Array
-    optima: Optima
-    numbers: Array
-    remainder: Remainder
-    best: Array
-    point: Array
-    jets: Array
-    gap: float
-
-    @classmethod
-    def of(cls, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float) -> Tree:
-        """The tree with nothing but its root."""
-        m, d = len(model.outputs), len(lower)
-        numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
-        remainder, total = Remainder.of(model, lower, upper), 2 * m * len(model.time)
-        points, jets = np.zeros((total, d)), np.zeros((total, 1 + d + d * (d + 1) // 2))
-        of_all = remainder, np.zeros(total), points, jets
-        tree = cls(model, lower, upper, optima, numbers, *of_all, gap)
-        tree._renew(np.arange(len(numbers)))
-        return tree
+    def __init__(
+        self, model: ModalModel, lower: Array, upper: Array, optima: Optima, gap: float
+    ) -> None:
+        m, d, total = len(model.outputs), len(lower), 2 * len(model.outputs) * len(model.time)
+        self.model, self.lower, self.upper = model, lower, upper
+        self.optima, self.gap = optima, gap
+        self.numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
+        self.remainder = Remainder.of(model, lower, upper)
+        self.best, self.point = np.zeros(total), np.zeros((total, d))
+        self.jets = np.zeros((total, 1 + d + d * (d + 1) // 2))
+        self._renew(np.arange(len(self.numbers)))
 
     def examined(self, frontier: Frontier, workers: int) -> Frontier:
         """Boxes and items still open after one examination of all boxes of a frontier."""

@@ -23,7 +23,6 @@ REACH = 6.0
 MOST_STEPS = 40_000  # of a table
 
 
-@dataclass(frozen=True, eq=False)
 class LoadTable:
     """R(t_j; λ) = ∫ exp(λ (t_j − s)) a(s) ds of one mode near its λ in the middle of the box.
 
@@ -32,31 +31,20 @@ class LoadTable:
     earlier windows leave behind goes on as exp(λ (t_j − their end)). Far nodes have more between.
 
     Args:
+        ground: The record.
+        time: Nodes, shape (T,), in s.
         middle: λ in the middle of the box.
-        scale: Length that makes the coefficients of order one, in 1/s.
-        moment: Coefficients, shape (T, order).
-        ends: Last node of every window but the last, rising, shape (W − 1,).
-        time: Nodes, those between included, shape (T,), in s.
-        every: Steps from one of the caller's nodes to the next.
+        spread: What it strays by over the box at most, in 1/s.
+
+    Attributes:
         truncation: Bound of what the series leave out of R, as a share of ∫ |a(s)| exp(Re λ (t −
             s)) ds.
+
+    Raises:
+        ModalError: Phases change by thousands over the box within one step.
     """
 
-    middle: complex
-    scale: float
-    moment: Array
-    ends: Array
-    time: Array
-    every: int
-    truncation: float
-
-    @classmethod
-    def build(cls, ground: Accelerogram, time: Array, middle: complex, spread: float) -> LoadTable:
-        """The table of a mode whose eigenvalue strays from `middle` by at most `spread`, in 1/s.
-
-        Raises:
-            ModalError: Phases change by thousands over the box within one step.
-        """
+    def __init__(self, ground: Accelerogram, time: Array, middle: complex, spread: float) -> None:
         every = max(1, ceil(spread * (time[1] - time[0]) / REACH))
         if every > max(4, MOST_STEPS // len(time)):
             raise ModalError(
@@ -68,9 +56,9 @@ class LoadTable:
         length = min(steps, max(1, int(REACH / max(spread, 1e-12) / h)))
         phase = spread * length * h
         order = max(6, ceil(2.72 * phase + 18))
-        moment = _moments(ground, middle, h, (steps, length), spread, order)
-        ends, left = np.arange(length, steps, length), left_out(phase, order)
-        return cls(middle, 1 / (length * h), moment, ends, time, every, left)
+        self.middle, self.scale, self.time, self.every = middle, 1 / (length * h), time, every
+        self.moment = _moments(ground, middle, h, (steps, length), spread, order)
+        self.ends, self.truncation = np.arange(length, steps, length), left_out(phase, order)
 
     def response(self, rate: Array, node: Array) -> Array:
         """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N), for eigenvalues (N,)."""
@@ -100,7 +88,7 @@ class LoadTables:
         """One of each mode."""
         middle, rest = self.rate.coefficients[0], self.rate.coefficients[1:]
         pairs = zip(middle.tolist(), np.abs(rest).sum(0).tolist(), strict=True)
-        return [LoadTable.build(self.ground, self.time, *pair) for pair in pairs]
+        return [LoadTable(self.ground, self.time, *pair) for pair in pairs]
 
     def in_units(self, scale: Array) -> LoadTables:
         """The same for outputs divided by their scale (m,)."""

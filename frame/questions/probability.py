@@ -22,10 +22,12 @@ from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import require
 
 LIMITS = 201
 """Limits for which the probability is computed besides."""
+SPREAD = 64
+"""Points inside each α-cut."""
 LOOKED_AT = 4
 """Fuzzy points, and draws of each, whose motion between nodes is looked at."""
 MOST_CORNERS = 8
@@ -68,7 +70,6 @@ def probabilities(
     step: float,
     alpha: Sequence[float] = ALPHA,
     samples: int = 200,
-    spread: int = 64,
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> dict[str, Probability]:
@@ -84,7 +85,6 @@ def probabilities(
         step: Distance of nodes, in s.
         alpha: Levels.
         samples: Random draws.
-        spread: Points inside each α-cut.
         rng: Source of the draws.
         progress: Takes the share done.
 
@@ -93,14 +93,17 @@ def probabilities(
             output, or a random parameter does not give `samples` finite values.
     """
     require_limits(limits, model.outputs)
-    if both := sorted(set(fuzzy) & set(random)):
-        raise RefusedError("random", ", ".join(both), "inputs that are not fuzzy as well")
-    drawn = [_drawn(name, draw, rng, samples) for name, draw in random.items()]
+    both = sorted(set(fuzzy) & set(random))
+    require(not both, "random", ", ".join(both), "inputs that are not fuzzy as well")
+    drawn = [np.asarray(draw(rng, samples), float) for draw in random.values()]
+    for name, values in zip(random, drawn, strict=True):
+        finite = values.shape == (samples,) and bool(np.isfinite(values).all())
+        require(finite, f"values of {name}", values.shape, f"{samples} finite numbers")
     draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
     cuts = boxes(fuzzy, alpha)
     scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"
     flow = flow_of(model, (*cuts.names, *random), duration, step, scheme)
-    tried = [_tried(cuts, level, spread) for level in range(len(cuts.alpha))]
+    tried = [_tried(cuts, level) for level in range(len(cuts.alpha))]
     points = np.concatenate(tried)
     looked_at = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
@@ -123,19 +126,12 @@ def probabilities(
     }
 
 
-def _drawn(name: str, draw: Sampler, rng: np.random.Generator, samples: int) -> Array:
-    values = np.asarray(draw(rng, samples), float)
-    if values.shape != (samples,) or not np.isfinite(values).all():
-        raise RefusedError(f"values of {name}", values.shape, f"{samples} finite numbers")
-    return values
-
-
-def _tried(cuts: Boxes, level: int, spread: int) -> Array:
+def _tried(cuts: Boxes, level: int) -> Array:
     """Corners of an α-cut and points inside, shape (S, d)."""
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():
         return cuts.modal[None]
-    inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), spread)
+    inner = (lower + upper) / 2 + (upper - lower) / 2 * chebyshev_points(len(lower), SPREAD)
     ends = corners(lower, upper) if len(lower) <= MOST_CORNERS else inner[:0]
     return np.asarray(cuts.to_physical(np.vstack([ends, inner])))
 
@@ -154,22 +150,18 @@ def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> 
     low, _ = _bounds(least, level, np.append(limits, 1.0))
     lowest, high = _bounds(peak, level, np.append(limits, 1.0))
     above = [ends[:, 0] for ends in _bounds(more, level, np.ones(1))]
-    shares = np.append(low[:, -1], high[:, -1])
+    draws = peak.shape[1]
+    mean = (np.append(low[:, -1], high[:, -1]) * draws + 1) / (draws + 2)  # Laplace's rule
+    deviation = float(np.sqrt(mean * (1 - mean) / (draws + 3)).max())
     return Probability(
         low[:, -1],
         high[:, -1],
         np.maximum(above[0] - lowest[:, -1], above[1] - high[:, -1]),
-        float(_deviation(shares, peak.shape[1]).max()) if spreads else 0.0,
+        deviation if spreads else 0.0,
         limits * scale,
         np.stack([low[:, :-1], high[:, :-1]]),
         peak.size,
     )
-
-
-def _deviation(share: Array, draws: int) -> Array:
-    """Standard deviation of probabilities from shares of draws (Laplace's rule)."""
-    mean = (share * draws + 1) / (draws + 2)
-    return np.asarray(np.sqrt(mean * (1 - mean) / (draws + 3)))
 
 
 def _bounds(peak: Array, level: Array, limits: Array) -> tuple[Array, Array]:

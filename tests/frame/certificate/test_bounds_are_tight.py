@@ -1,5 +1,6 @@
 """Ingredients of a proof on cases where they nearly are the truth: halved, none would cover it."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -120,7 +121,8 @@ def least_closed(tree: Tree) -> np.ndarray:
     low, high = (np.full(len(tree.best), end) for end in (-2.5, 2.5))
     for _ in range(30):
         target = (low + high) / 2
-        aimed = replace(tree, best=target, gap=0.0)
+        aimed = copy(tree)
+        aimed.best, aimed.gap = target, 0.0
         code = aimed.examine(frontier, slice(0, 1), slice(0, len(frontier)))[0]
         low, high = np.where(code, target, low), np.where(code, high, target)
     return high
@@ -139,7 +141,7 @@ def test_a_box_is_closed_where_its_mode_allows_no_more(even: bool) -> None:
     model, ends = turning() if even else spring(1.0, None, 12.0, 0.1), np.ones(1)
     optima = problems(np.arange(len(model.time)), 1, 1)
     optima.point[:] = 9.0  # so that no box is near the best point
-    closed = least_closed(Tree.of(model, -ends, ends, optima, 1e-6)).reshape(-1, 2)
+    closed = least_closed(Tree(model, -ends, ends, optima, 1e-6)).reshape(-1, 2)
     values = model.values(np.linspace(-1, 1, 2001)[:, None])[..., 0]
     truth = np.stack([-values.min(0), values.max(0)], 1)
     assert (closed >= truth - 1e-7).all()

@@ -148,7 +148,7 @@ def speed(rng, count):
 
 
 def probable(frame=FRAME, inputs=INPUTS, limits=None, **changes):
-    settings = {"duration": 4, "step": 0.05, "alpha": (0, 0.5, 1), "spread": 16}
+    settings = {"duration": 4, "step": 0.05, "alpha": (0, 0.5, 1)}
     settings |= {"rng": np.random.default_rng(0), "samples": 400, **changes}
     limits = limits or {"drift2": 0.16, "q1": 0.14}
     return probabilities(frame, inputs, {"v2_0": speed}, limits, **settings)
