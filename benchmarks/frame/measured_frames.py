@@ -65,7 +65,7 @@ def tall_rows() -> list[dict[str, object]]:
     prior: dict[str, FuzzyNumber] = {
         f"c{z + 1}": Interval(0.7 * k, 1.3 * k) for z, k in enumerate(STIFFNESS / 12)
     }
-    chain = Chain.of(frame, tuple(prior))
+    chain = Chain(frame, tuple(prior))
     ends = eigenvalue_ranges(chain, np.full(18, np.log(0.7)), np.full(18, np.log(1.3)))
     low, high = (float(np.sqrt(end[2]) / (2 * np.pi)) for end in ends)
     try:

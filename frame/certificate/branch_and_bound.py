@@ -93,7 +93,7 @@ class Tree:
         self.model, self.lower, self.upper = model, lower, upper
         self.optima, self.gap = optima, gap
         self.numbers = (optima.node * m + optima.output) * 2 + (optima.side > 0)
-        self.remainder = Remainder.of(model, lower, upper)
+        self.remainder = Remainder(model, lower, upper)
         self.best, self.point = np.zeros(total), np.zeros((total, d))
         self.jets = np.zeros((total, 1 + d + d * (d + 1) // 2))
         self._renew(np.arange(len(self.numbers)))

@@ -67,7 +67,7 @@ def certify(
     """
     scale = np.ones(len(model.outputs)) if scale is None else scale
     model, unit, error = model.in_units(scale), scale[:, None], model_error / scale
-    rounding = Remainder.of(model, *model.boxes.unit(0)).margin[..., 0]
+    rounding = Remainder(model, *model.boxes.unit(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for
     limit = float((2 * error + rounding).max())
     slack = (1 - 1e-6) * gap - limit

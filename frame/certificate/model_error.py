@@ -47,7 +47,7 @@ def proved_error(model: ModalModel) -> Array:
     for _, sample in samples:
         _require_affordable(grid, sample)
     structure = _expanded(grid, partial(_structure, model))
-    stiffness, mass = Comparison.of(structure["stiffness"]), Comparison.of(structure["mass"])
+    stiffness, mass = Comparison(structure["stiffness"]), Comparison(structure["mass"])
     deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
     for part, sample in samples:
         defect = _expanded(grid, sample)

@@ -25,27 +25,20 @@ from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence as dependence
 
 
-@dataclass(frozen=True, eq=False)
 class Comparison:
     """Symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀.
 
     Args:
+        coefficients: Chebyshev coefficients of A, shape (J, N, N), the mean first.
+
+    Attributes:
         factor: L, shape (N, N).
-        lowest: See above.
-        highest: See above.
+
+    Raises:
+        UnprovedError: A(p) is not shown to stay positive definite.
     """
 
-    factor: Array
-    lowest: float
-    highest: float
-
-    @classmethod
-    def of(cls, coefficients: Array) -> Comparison:
-        """From the Chebyshev coefficients of A, shape (J, N, N), the mean first.
-
-        Raises:
-            UnprovedError: A(p) is not shown to stay positive definite.
-        """
+    def __init__(self, coefficients: Array) -> None:
         try:
             factor = np.linalg.cholesky(coefficients[0])
         except np.linalg.LinAlgError:
@@ -58,7 +51,7 @@ class Comparison:
             raise dependence.UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
-        return cls(factor, 1 - spread, 1 + spread)
+        self.factor, self.lowest, self.highest = factor, 1 - spread, 1 + spread
 
     def least(self, other: Comparison) -> float:
         """Lower bound over the box of the eigenvalues of A against another matrix B."""

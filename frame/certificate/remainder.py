@@ -99,7 +99,7 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
     kernels = [_largest(growth, h, count, power) for power in range(4)]
     # ∫ exp(g s) ds to the end of each interval, at most
     swell = np.cumsum(kernels[0], axis=0) * h
-    size = Segments.of(ground, h, count).magnitudes(count)
+    size = Segments(ground, h, count).magnitudes(count)
     waves, elapsed, push = (
         _convolved(kernel, size)[..., ::parts, :]
         for kernel in (np.stack(kernels), swell, np.ones((count, 1)))
@@ -138,11 +138,12 @@ def _convolved(kernel: Array, size: Array) -> Array:
     return np.concatenate([start, np.maximum(whole, 0.0) + rounding], axis=-2)
 
 
-@dataclass(frozen=True, eq=False)
 class Remainder:
     """Bounds of what quadratic Taylor models of the outputs leave out in a box, and of rounding.
 
-    Args:
+    They follow for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k).
+
+    Attributes:
         tensor: |∂³ output / ∂u_i ∂u_j ∂u_k| at most, shape (T, m, d, d, d), symmetric in the last
             three.
         margin: Rounding of values, and of slopes, at most, shape (T, m, 1 + d).
@@ -150,14 +151,7 @@ class Remainder:
         share: The same of the shares of the last part, shapes (d,) * order + (n, m).
     """
 
-    tensor: Array
-    margin: Array
-    rate: list[Array]
-    share: list[Array]
-
-    @classmethod
-    def of(cls, model: ModalModel, lower: Array, upper: Array) -> Remainder:
-        """Bounds for the box [lower, upper] by Leibniz' rule on C_k w(t; λ_k)."""
+    def __init__(self, model: ModalModel, lower: Array, upper: Array) -> None:
         d, n, m = len(lower), model.count, len(model.outputs)
         reach, width = np.maximum(np.abs(lower), np.abs(upper)), upper - lower
         rate, growth = suprema(model.eigenvalue, reach), largest_growth(model.eigenvalue, reach)
@@ -180,7 +174,7 @@ class Remainder:
                 margin[..., 0] += noise[:, k, None] * values
                 margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
         third[model.time == 0] = _at_rest(model, reach)
-        return cls((1 + 1e-9) * third, margin, rate, share)
+        self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
 
 
 def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:

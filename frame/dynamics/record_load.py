@@ -25,11 +25,10 @@ MOST = 4096
 """Parts of a step, at most."""
 
 
-@dataclass(frozen=True, eq=False)
 class Segments:
-    """A record cut at all nodes and samples: linear in each of L segments.
+    """A record over `count` steps, cut at all nodes and samples: linear in each of L segments.
 
-    Args:
+    Attributes:
         step: Step of the nodes in which each segment lies, rising from 0, shape (L,).
         start: Time from the beginning of its step, shape (L,), in s.
         length: Shape (L,), in s.
@@ -37,15 +36,7 @@ class Segments:
         last: Acceleration just before its end, shape (L,), in m/s².
     """
 
-    step: Array
-    start: Array
-    length: Array
-    first: Array
-    last: Array
-
-    @classmethod
-    def of(cls, ground: Accelerogram, step: float, count: int) -> Segments:
-        """The record over `count` steps of length `step`."""
+    def __init__(self, ground: Accelerogram, step: float, count: int) -> None:
         samples = np.arange(len(ground.acceleration)) * ground.step
         nearest = np.round(samples / step)
         inner = (np.abs(samples - nearest * step) > SAME * step) & (samples < count * step)
@@ -55,8 +46,8 @@ class Segments:
         home, start = home[order], start[order]
         end = np.append(start[1:], 0.0)
         end[np.append(np.diff(home) > 0, True)] = step
-        first, last = _linear(ground, home * step + start, home * step + end)
-        return cls(home, start, end - start, first, last)
+        self.first, self.last = _linear(ground, home * step + start, home * step + end)
+        self.step, self.start, self.length = home, start, end - start
 
     def magnitudes(self, count: int) -> Array:
         """∫ |a| over every step, shape (count,), in m/s."""
@@ -121,7 +112,7 @@ def load_rule(ground: Accelerogram, step: float, count: int, parts: int) -> Load
     angle = (np.arange(POINTS) + 0.5) * np.pi / POINTS
     basis = np.cos(np.arange(POINTS)[:, None] * angle) * (2 / POINTS)
     basis[0] /= 2
-    moments = Segments.of(ground, h, count * parts).moments(h, count * parts, POINTS)
+    moments = Segments(ground, h, count * parts).moments(h, count * parts, POINTS)
     weight = (moments @ basis).reshape(count, parts, POINTS)[:, ::-1]
     tau = (np.arange(parts)[:, None] + (1 + np.cos(angle)) / 2) * h
     return LoadRule(tau.ravel(), weight.reshape(count, -1))
@@ -150,7 +141,7 @@ def linear_load(ground: Accelerogram, step: float, count: int) -> Array:
     They are those of the straight line with the record's impulse and first moment in the step,
     which is the record where that is linear.
     """
-    level, tilt = Segments.of(ground, step, count).moments(step, count, 2).T / step
+    level, tilt = Segments(ground, step, count).moments(step, count, 2).T / step
     return np.stack([level + 3 * tilt, level - 3 * tilt], -1)
 
 

@@ -9,76 +9,58 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.structures.storey import StoreyFrame, chain
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 
 ROUND_OFF = 1e-13
 """Share of the largest eigenvalue by which a computed one may be wrong, at most."""
 
 
-@dataclass(frozen=True, eq=False)
 class Chain:
-    """Chain of n masses on springs that depends on d parameters.
+    """Chain of n masses on springs: a frame of which d parameters are uncertain.
 
     Args:
+        frame: The frame.
         names: The parameters, of "E", "I" or "I1" …, "c1" …, "l1" …, "k1" …, "m1" ….
+
+    Attributes:
         nominal: Their nominal values, shape (d,).
         stiffness: Nominal stiffnesses, shape (n,), in N/m.
         mass: Nominal masses, shape (n,), in kg.
-        stiffness_powers: Exponents of the parameters in the stiffnesses, shape (n, d).
-        mass_powers: Exponents in the masses, shape (n, d).
+        powers: Exponents of the parameters in stiffnesses and masses, shape (2, n, d).
+
+    Raises:
+        RefusedError: A name is no parameter of stiffness or mass, or weights soften the storeys, so
+            that stiffnesses are no products.
     """
 
-    names: tuple[str, ...]
-    nominal: Array
-    stiffness: Array
-    mass: Array
-    stiffness_powers: Array
-    mass_powers: Array
-
-    @classmethod
-    def of(cls, frame: StoreyFrame, names: Sequence[str]) -> Chain:
-        """The chain of a frame with some parameters uncertain.
-
-        Raises:
-            RefusedError: A name is no parameter of stiffness or mass, or weights soften the
-                storeys, so that stiffnesses are no products.
-        """
+    def __init__(self, frame: StoreyFrame, names: Sequence[str]) -> None:
         n, values = frame.floors, frame.parameters
-        if frame.gravity:
-            allowed = "none: a storey softened by weight has no stiffness of such a product"
-            raise RefusedError("frame.gravity", frame.gravity, allowed)
-        powers = np.zeros((2, n, len(names)))
+        allowed = "none: a storey softened by weight has no stiffness of such a product"
+        require(not frame.gravity, "frame.gravity", frame.gravity, allowed)
+        self.powers = np.zeros((2, n, len(names)))
         for column, name in enumerate(names):
             part = re.fullmatch(r"([clmkI])(\d+)", name)
             if name in ("E", "I") and name in values:
-                powers[0, :, column] = 1
+                self.powers[0, :, column] = 1
             elif part and name in values:
                 row = int(part[2]) - 1
-                powers[int(part[1] == "m"), row, column] = -3 if part[1] == "l" else 1
+                self.powers[int(part[1] == "m"), row, column] = -3 if part[1] == "l" else 1
             else:
                 allowed = f"E, I, c1 … c{n} (columns), l1 …, m1 …, or k1 … k{n} (stiffnesses)"
                 raise RefusedError("identify.parameters", name, allowed)
         modal = {name: Jet.constant([value], 0) for name, value in values.items()}
-        k = frame.springs(modal).value[0]
-        nominal = np.array([values[name] for name in names])
-        mass = np.asarray(frame.masses, float)
-        return cls(tuple(names), nominal, k, mass, powers[0], powers[1])
-
-    def factors(self, points: Array) -> tuple[Array, Array]:
-        """Stiffnesses and masses over their nominal ones, each (S, n), at points (S, d)."""
-        logs = np.log(points / self.nominal)
-        return np.exp(logs @ self.stiffness_powers.T), np.exp(logs @ self.mass_powers.T)
+        self.names, self.nominal = tuple(names), np.array([values[name] for name in names])
+        self.stiffness, self.mass = frame.springs(modal).value[0], np.asarray(frame.masses, float)
 
     def modes(self, points: Array) -> tuple[Array, Array]:
         """Squared angular frequencies (S, n), rising, and shapes (S, floor, mode), at (S, d)."""
-        stiffness, mass = self.factors(points)
+        stiffness, mass = np.exp(np.log(points / self.nominal) @ self.powers.swapaxes(1, 2))
         return chain_modes(self.stiffness * stiffness, self.mass * mass)
 
     def ranges(self, lower: Array, upper: Array) -> tuple[Array, Array]:
@@ -87,9 +69,9 @@ class Chain:
         Returns:
             Lower and upper ends of log stiffness and log mass factors, each (2, n).
         """
-        powers = np.stack([self.stiffness_powers, self.mass_powers])
-        ends = np.where(powers > 0, powers * lower, powers * upper).sum(-1)
-        tops = np.where(powers > 0, powers * upper, powers * lower).sum(-1)
+        rising = self.powers > 0
+        ends = np.where(rising, self.powers * lower, self.powers * upper).sum(-1)
+        tops = np.where(rising, self.powers * upper, self.powers * lower).sum(-1)
         return ends, tops
 
 

@@ -178,7 +178,7 @@ def identify(
     """
     numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
     _refuse(frame, measured, numbers, alpha)
-    evidence = Evidence(Chain.of(frame, tuple(numbers)), numbers, tuple(measured))
+    evidence = Evidence(Chain(frame, tuple(numbers)), numbers, tuple(measured))
     levels = np.asarray(alpha, float)
     boxes, empty = _boxes(evidence, levels)
     if not boxes:

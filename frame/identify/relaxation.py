@@ -259,8 +259,7 @@ class _Chains:
     def __init__(self, chain: Chain, lower: Array, upper: Array) -> None:
         self.chain, self.rows = chain, Rows()
         self.logs = [self.rows.variable(*ends) for ends in zip(lower, upper, strict=True)]
-        self.stiffness = [self._exponential(powers) for powers in chain.stiffness_powers]
-        self.mass = [self._exponential(powers) for powers in chain.mass_powers]
+        self.stiffness, self.mass = ([self._exponential(x) for x in of] for of in chain.powers)
         self.least, self.most = eigenvalue_ranges(chain, lower, upper)
         low, high = chain.ranges(lower, upper)
         self.low, self.high = np.exp(low), np.exp(high)  # factors of stiffness and mass, (2, n)

@@ -92,14 +92,13 @@ class LagrangianSystem:
     @cached_property
     def symbols(self) -> Equations:
         """The equations of motion in symbols."""
-        return Equations.derive(self)
+        return Equations(self)
 
 
-@dataclass(frozen=True, eq=False)
 class Equations:
-    """Symbols and expressions of a system.
+    """Symbols and expressions of a system, from its Lagrangian.
 
-    Args:
+    Attributes:
         q: Coordinates.
         v: Velocities.
         p: Parameters by name.
@@ -108,16 +107,7 @@ class Equations:
         mass: ∂²L/∂v².
     """
 
-    q: Matrix
-    v: Matrix
-    p: dict[str, Expr]
-    momentum: Matrix
-    push: Matrix
-    mass: Matrix
-
-    @classmethod
-    def derive(cls, system: LagrangianSystem) -> Equations:
-        """Differentiates the Lagrangian."""
+    def __init__(self, system: LagrangianSystem) -> None:
         import sympy
 
         n = system.coordinates
@@ -129,7 +119,8 @@ class Equations:
         push = sympy.Matrix([L.diff(x) for x in q])
         if force := system.force:
             push += sympy.Matrix(_expressions("force", lambda: force(*state), p, n))
-        return cls(q, v, p, momentum, push, momentum.jacobian(v))
+        self.q, self.v, self.p, self.momentum, self.push = q, v, p, momentum, push
+        self.mass = momentum.jacobian(v)
 
     def velocity(self, momentum: Matrix) -> Matrix:
         """Velocities from momenta."""

@@ -39,7 +39,7 @@ def spring(omega: float, ground: Accelerogram | None, duration: float, step: flo
 
 def test_remainder_of_the_quadratic_model_is_that_of_a_late_oscillation() -> None:
     model = spring(1.0, None, 400.0, 1.0)
-    bound = Remainder.of(model, -np.ones(1), np.ones(1)).tensor[:, 0, 0, 0, 0]
+    bound = Remainder(model, -np.ones(1), np.ones(1)).tensor[:, 0, 0, 0, 0]
     unit, h = np.linspace(-0.99, 0.99, 400)[:, None], 1e-4
     for node in (100, 200, 400):
         at = np.full(len(unit), node), np.zeros(len(unit), int)
@@ -151,7 +151,7 @@ def test_a_box_is_closed_where_its_mode_allows_no_more(even: bool) -> None:
 
 def test_rounding_of_late_phases_is_in_the_margin() -> None:
     model, narrow = spring(1.0, None, 1e8, 1e6), np.full(1, 1e-8)
-    margin = Remainder.of(model, -narrow, narrow).margin[:, 0, 0]
+    margin = Remainder(model, -narrow, narrow).margin[:, 0, 0]
     unit = np.random.default_rng(2).uniform(-narrow, narrow, (200, 1))
     powers = np.longdouble(unit) ** model.eigenvalue.index[:, 0]
     phase = powers @ model.eigenvalue.coefficients[:, 0].imag

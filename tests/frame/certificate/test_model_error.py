@@ -141,7 +141,7 @@ def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(squared, root) -> No
     force, own = law.defects(np.zeros((1, 1)), np.zeros((1, 1)), speed, M, K)
     missed = speed[0, 0] @ D[0] - force[0, 0]
     true = float(np.sqrt(missed @ np.linalg.solve(M[0], missed)))
-    bound = law.missed(own, 0, Comparison.of(K), Comparison.of(M))
+    bound = law.missed(own, 0, Comparison(K), Comparison(M))
     assert 1 - 1e-9 <= bound / true <= 1.8
 
 
@@ -213,7 +213,7 @@ def test_comparison_holds_over_the_box() -> None:
     rng = np.random.default_rng(5)
     mean, part = np.diag([2.0, 3.0, 4.0]), rng.uniform(-0.3, 0.3, (2, 3, 3))
     coefficients = np.stack([mean, *(part + part.swapaxes(-1, -2)) / 2])
-    found = Comparison.of(coefficients)
+    found = Comparison(coefficients)
     x = rng.standard_normal((5, 3))
     for u, v in rng.uniform(-1, 1, (200, 2)):
         A = coefficients[0] + u * coefficients[1] + v * coefficients[2]
