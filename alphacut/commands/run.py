@@ -55,8 +55,7 @@ def computed(
     start = time.perf_counter()
     with pool(store.workers) as executor:
         results = Chain(Results(case.content), store, petsc, figures, executor).run()
-        look = {"fresh": store.fresh, "quiet": store.quiet}
-        names = drawn(results, folder, executor, **look) if figures else []
+        names = drawn(results, store, executor) if figures else []
     document: Document = {
         "format_version": FORMAT,
         "case": case.name,

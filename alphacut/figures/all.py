@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
@@ -15,17 +14,16 @@ from alphacut.export.mesh import draw_mesh
 from alphacut.figures import envelope, follower, frame, material
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
-from alphacut.fuzzy.progress_bar import showing
-from alphacut.io.files import Document, as_json, write_text
-from alphacut.io.netcdf import document_of
-from alphacut.io.provenance import NESTED, fingerprint, version_of
+from alphacut.io.netcdf import dataset_of, document_of
+from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.cell import modal_cell
 from alphacut.stages.results import Results
+from alphacut.stages.store import Stage, Store, Work
 
 if TYPE_CHECKING:
+    import xarray
     from matplotlib.figure import Figure
 
-KEPT = "figures/.kept.json"
 PARTS = 6  # into which the figures are dealt out, so that no process waits long for the other
 Drawing = tuple[str, Callable[[], "Figure"]]
 
@@ -73,66 +71,43 @@ def _structure(results: Results) -> Iterator[Drawing]:
         yield "fig21-25-graph-follower", partial(follower.follower, results, richest)
 
 
-def drawn(
-    results: Results,
-    folder: Path,
-    executor: Executor | None,
-    *,
-    fresh: bool = False,
-    quiet: bool = False,
-) -> list[str]:
+def drawn(results: Results, store: Store, executor: Executor | None) -> list[str]:
     """Draws every figure as SVG and PNG into figures/, unless they show the same already.
 
     Args:
         results: Of the run.
-        folder: Folder of the results.
+        store: Folder of the results.
         executor: Processes that draw side by side; None: this one draws.
-        fresh: Whether figures that are up to date are drawn as well.
-        quiet: Whether no progress is shown.
 
     Returns:
         Names of the files, in the folder of the results.
     """
-    content = [results.content, results.answers]
-    content += [sorted(x.attrs["fingerprint"] for x in results.datasets.values())]
-    content += [version_of(name) for name in ("matplotlib", "pyvista")]
-    key = fingerprint(content, (*NESTED, "alphacut"))
-    before = _kept(folder)
-    names = list(map(str, before.get("figures", ())))
-    there = bool(names) and all((folder / name).is_file() for name in names)
-    if fresh or not there or before.get("fingerprint") != key:
-        for name in filter(re.compile(r"figures/[\w+-][\w.+-]*\.(svg|png)").fullmatch, names):
-            (folder / name).unlink(missing_ok=True)
-        names, whole = _draw(results, folder, executor, quiet=quiet)
-        if whole:
-            write_text(folder / KEPT, as_json({"fingerprint": key, "figures": names}))
-    data = results.microstructure
-    particles = [] if data is None else document_of(data)["figures"]
-    return [*(name for name in particles if (folder / name).is_file()), *names]
+    folder = store.folder or Path()
+    inputs = [results.content, results.answers]
+    inputs += [sorted(x.attrs["fingerprint"] for x in results.datasets.values())]
+    inputs += [version_of(name) for name in ("matplotlib", "pyvista")]
+    compute = partial(dataset, results, folder, executor)
+    data = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), compute))
+    if not all((folder / name).is_file() for name in document_of(data)["figures"]):
+        data = compute(Work())
+    every = [one for one in (results.microstructure, data) if one is not None]
+    names = (name for one in every for name in document_of(one)["figures"])
+    return [name for name in names if (folder / name).is_file()]
 
 
-def _kept(folder: Path) -> Document:
-    """Fingerprint and names of an earlier run's figures; empty where there are none."""
-    try:
-        return dict(json.loads((folder / KEPT).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
-        return {}
-
-
-def _draw(
-    results: Results, folder: Path, executor: Executor | None, *, quiet: bool
-) -> tuple[list[str], bool]:
-    """Draws all figures in parts; their names, and False where the mesh found no display."""
+def dataset(
+    results: Results, folder: Path, executor: Executor | None, work: Work
+) -> xarray.Dataset:
+    """Names of all figures, which are drawn in parts, as a document."""
     mesh = _mesh(results, folder, executor)
     parts = [submitted(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
-    with showing(not quiet) as tick:
-        for count, part in enumerate(parts, start=1):
-            names += part.result()
-            if tick:
-                tick(count / PARTS)
-    made = {name: future.result() for name, future in mesh.items()}
-    return [*sorted(names), *(name for name in made if made[name])], all(made.values())
+    for count, part in enumerate(parts, start=1):
+        names += part.result()
+        if work.tick:
+            work.tick(count / PARTS)
+    made = [name for name, future in mesh.items() if future.result()]
+    return dataset_of({"figures": [*sorted(names), *made]})
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:

@@ -191,14 +191,7 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         head: Titles of the n columns.
         rows: Each of n cells.
     """
-    lines = [list(head), *(list(row) for row in rows)]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(head))]
-    return "".join(f"{_aligned(line, widths)}\n" for line in lines)
-
-
-def _aligned(line: Sequence[str], widths: Sequence[int]) -> str:
-    first, *others = (
-        cell.ljust(width) if k == 0 else cell.rjust(width)
-        for k, (cell, width) in enumerate(zip(line, widths, strict=True))
-    )
-    return "  ".join([first, *others]).rstrip()
+    lines = [[*head], *map(list, rows)]
+    first, *others = (max(len(line[k]) for line in lines) for k in range(len(head)))
+    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], others)] for line in lines)
+    return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)

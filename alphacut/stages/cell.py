@@ -15,7 +15,7 @@ from alphacut.io.files import Document
 from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
 from alphacut.rve import bounds as plane
-from alphacut.rve.cell import STRAIN, AnyPhase, Cell, Phase
+from alphacut.rve.cell import STRAIN, Cell, Phase
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.mesh.outline import circle
 from alphacut.rve.result import Homogenised, effective_modulus
@@ -24,7 +24,6 @@ from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
 from alphacut.rve.spheres.series.model import SphereSeriesModel
-from alphacut.stochastic import RadiusMap as Radii
 from alphacut.stochastic import gauss_rule
 
 GPA = 1e9
@@ -32,8 +31,6 @@ SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""
 SPHERES = 1e-5
 """Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
-
-
 Solve = Callable[..., Sequence[Homogenised]]
 """A model of the cell: from radius map, matrix and inclusions to one result for each of these."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
@@ -94,20 +91,17 @@ def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
     return radius.numbers | cell.phases
 
 
-def parts(
-    values: Mapping[str, float], radius: RadiusMap, cell: RoundCell
-) -> tuple[Radii, Phase, AnyPhase]:
-    """Radius map, matrix and inclusion from crisp values of the inputs, in SI."""
+def cell_at(values: Mapping[str, float], radius: RadiusMap, cell: RoundCell) -> Cell:
+    """The cell at crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
     inclusion = cell.stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-    return radius.at(values), matrix, inclusion
+    return Cell(matrix, inclusion, radius.at(values), cell.outline or circle)
 
 
 def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    map_of, matrix, inclusion = parts(values, radius, cell)
-    return Cell(matrix, inclusion, map_of, cell.outline or circle)
+    return cell_at(values, radius, cell)
 
 
 def solve(radius: RadiusMap, cell: RoundCell, model: Solve) -> Homogenised:

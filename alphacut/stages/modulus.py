@@ -21,7 +21,7 @@ from alphacut.io.files import Document, as_json
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
-from alphacut.stages.cell import GPA, Solve, inputs_of, meaning, model_of, parts, solve
+from alphacut.stages.cell import GPA, Solve, cell_at, inputs_of, meaning, model_of, solve
 from alphacut.stages.store import Stage, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
 
@@ -72,9 +72,9 @@ class CellTask:
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
-        every = [parts({**self.crisp, **point}, self.radius, self.cell) for point in points]
-        radius, matrix, _ = every[0]
-        results = self.model(radius, matrix, [inclusion for *_, inclusion in every])
+        every = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
+        first, inclusions = every[0], [one.inclusion for one in every]
+        results = self.model(first.radius, first.matrix, inclusions)
         return [self._outputs(result) for result in results]
 
     def _outputs(self, result: Homogenised) -> dict[str, float | Array]:

@@ -66,18 +66,10 @@ class Results:
 
     def document(self) -> Document:
         """Everything in numbers, for summary.json."""
-        makers = {
-            "microstructure": document_of,
-            "modulus": modulus.document,
-            "image": document_of,
-        }
-        numbers = {
-            name: make(data)
-            for name, make in makers.items()
-            if (data := getattr(self, name)) is not None
-        }
+        every = {name: getattr(self, name) for name in ("microstructure", "image", "shares")}
+        numbers = {name: document_of(data) for name, data in every.items() if data is not None}
         if self.modulus is not None:
-            numbers["modulus"]["references"] = self.references
+            numbers["modulus"] = modulus.document(self.modulus) | {"references": self.references}
         if self.structure is not None and self.structure.frame is not None:
             numbers["structure"] = sizes(self.structure, self.structure.frame)
         of = {task.name: task for task in self.tasks}
@@ -88,8 +80,6 @@ class Results:
             }
         if self.learned is not None:
             numbers["update"] = self.learned
-        if self.shares is not None:
-            numbers["shares"] = document_of(self.shares)
         return {**numbers, **self.answers}
 
 
