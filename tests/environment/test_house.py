@@ -9,7 +9,7 @@ import pytest
 from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
-    "lines of the packages": 31_294,
+    "lines of the packages": 31_245,
     "places that raise": 302,
 }
 ANY = 7  # public functions with Any; most pass on what FEniCSx does not type
