@@ -54,7 +54,7 @@ def from_data(
     """
     quantile = _quantile(claim)
     if law is not None:
-        chosen("law", law, get_args(Law))
+        chosen("law", law, ("normal",) if claim == "mean" else get_args(Law))
     data = Observations.of(values, bounds)
     if law is not None:
         number, decided = law_cuts(data, law, quantile, mean=claim == "mean")

@@ -40,11 +40,10 @@ def law_cuts(
 
     Raises:
         RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
-            censored without an end; or the mean of a log-normal law is meant.
+            censored without an end.
     """
     logarithmic, finite = law == "log-normal", np.isfinite([data.lower, data.upper]).all()
     cure = "give bounds=(lower, upper) in place of a law, or measure more"
-    require(not (logarithmic and mean), "law of a mean", law, "normal", cure)
     positive = not logarithmic or data.lower[0] > 0
     require(positive, "least value", data.lower[0], "positive ones with a log-normal law", cure)
     unlike = not data.exact or data.lower[0] < data.lower[-1]

@@ -12,7 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.design import of_samples
-from alphacut.fuzzy.refused import FailedError, real
+from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.interaction import pulled
@@ -109,9 +109,6 @@ class LevelSearch:
 
         Returns:
             The spread points that the interactions allow, shape (n, moving).
-
-        Raises:
-            FailedError: No point of the cut is allowed.
         """
         from scipy.stats import qmc
 
@@ -123,9 +120,6 @@ class LevelSearch:
         allowed = both[self.slack(both) >= 0]
         if len(allowed):
             self.campaign(self.points(allowed))
-        if not self.domain.inside(self.campaign.samples.points)[self.level].any():
-            what = f"no point of the cut at α = {self.alpha:g} fulfils its interactions"
-            raise FailedError(what, "widen them, or take fewer")
         return spread[self.slack(spread) >= 0]
 
     def worth(self, unit: Array, output: str, sign: float) -> Array:

@@ -78,7 +78,8 @@ class Design:
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
             both = [*([rows[values[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
             if not both:
-                raise FailedError(f"no sample lies in the cut at α = {alpha:g}")
+                what = f"no sample of the cut at α = {alpha:g} fulfils its interactions"
+                raise FailedError(what, "widen them, or take fewer")
             least = np.array(both)
             best.append(least[values[least, columns].argmin(axis=0), columns])
         return np.array(best[::-1])

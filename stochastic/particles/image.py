@@ -57,21 +57,17 @@ class SectionImage:
         """Grey values of the material, shape (rows, columns).
 
         Raises:
-            RefusedError: The file is no image, or smaller than 16 × 16 pixels.
+            RefusedError: The file is no image.
         """
         from PIL import Image
 
         try:
             with Image.open(self.path) as opened:
                 plain = opened.mode in ("1", "L", "I", "F") or opened.mode.startswith("I;16")
-                picture = np.asarray(opened if plain else opened.convert("L"), float)
+                return np.asarray(opened if plain else opened.convert("L"), float)
         except Exception as error:  # readers of damaged files raise errors of many kinds
             allowed = f"images that can be read ({error})"
             raise RefusedError("image.file", self.path, allowed) from None
-        size, plane = " × ".join(map(str, picture.shape)), picture.ndim == 2
-        allowed = "plane images of 16 × 16 pixels or more"
-        require(plane and min(picture.shape) >= 16, "image", f"{size} pixels", allowed)
-        return picture
 
     def circles(self, picture: Array) -> Particles:
         """Circles of a grey image.

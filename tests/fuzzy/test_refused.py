@@ -102,7 +102,7 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: from_data([5, 5, 5], "mean", law="normal"), "values of a normal law"),
         (lambda: from_data([1, (5, np.inf)], "mean", law="normal"), "values of a normal law"),
         (lambda: from_data([-1, 5], "median", law="log-normal"), "least value"),
-        (lambda: from_data([1, 5], "mean", law="log-normal"), "law of a mean"),
+        (lambda: from_data([1, 5], "mean", law="log-normal"), "law"),
         (lambda: from_data([(-np.inf, np.inf)], "next value"), "value 1"),
         (lambda: from_data(SEVEN, "next value").cut(0.05), "alpha of the next value"),
         (
