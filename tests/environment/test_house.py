@@ -10,7 +10,6 @@ from tests.environment import house, words
 
 REACHED = {  # counts above their bound, which must not grow; delete a line when its bound is met
     "lines of the packages": 31_245,
-    "places that raise": 302,
 }
 ANY = 7  # public functions with Any; most pass on what FEniCSx does not type
 TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
