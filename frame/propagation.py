@@ -35,7 +35,7 @@ from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.fuzzy.refused import RefusedError, chosen, require
+from alphacut.fuzzy.refused import chosen, require
 
 JUDGED = 4
 """Most inputs of a follower's envelope that a proof is made beside."""
@@ -96,24 +96,29 @@ def envelope(
             values without a meaning, or a motion that does not exist.
         FailedError: A step is too long, or a method cannot do what it is to do.
     """
-    if not isinstance(model, LagrangianSystem) and not hasattr(model, "matrices"):
-        allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
-        raise RefusedError("model", type(model).__name__, allowed)
+    known = isinstance(model, LagrangianSystem) or hasattr(model, "matrices")
+    allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
+    require(known, "model", type(model).__name__, allowed)
     relative = relative or (
         method is None
         and options.get("tolerance") is None
         and not any(Output(name).unit == "m" for name in model.outputs)
     )
     way = _method(model, method, options)
-    over = _flow(model, inputs, (duration, step), alpha, way, integrator, relative)
-    cuts, which = over.boxes.distinct()
-    over = replace(over, boxes=cuts)
+    if integrator is None:
+        proves = isinstance(way, Auto | Proof | DualProof | Search)
+        integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
+    every = boxes(inputs, alpha)
+    flow = flow_of(model, every.names, duration, step, integrator)
+    require_admissible(model, every)
+    cuts, which = every.distinct()
+    over = UnitFlow(flow, cuts, relative)
     steps = step_error(over)
     with showing(progress) as tick:
         bounds = way.run(over, tick)
     bounds = _judged(with_step_error(bounds, over, steps), over, way)
     bounds = with_stray(bounds, over)
-    return _on_levels(bounds, boxes(inputs, alpha).alpha, which)
+    return _on_levels(bounds, every.alpha, which)
 
 
 def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
@@ -154,25 +159,6 @@ def _method(
         chosen(f"option of {method}", option, [field.name for field in fields(METHODS[method])])
     made: Method = METHODS[method](**options)
     return made
-
-
-def _flow(
-    model: LinearSystem | LagrangianSystem,
-    inputs: Mapping[str, FuzzyNumber | float],
-    nodes: tuple[float, float],
-    alpha: Sequence[float],
-    way: Method,
-    integrator: str | Integrator | None,
-    relative: bool,
-) -> UnitFlow:
-    """The trajectories over the boxes of the inputs."""
-    cuts = boxes(inputs, alpha)
-    if integrator is None:
-        proves = isinstance(way, Auto | Proof | DualProof | Search)
-        integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
-    flow = flow_of(model, cuts.names, *nodes, integrator)
-    require_admissible(model, cuts)
-    return UnitFlow(flow, cuts, relative)
 
 
 def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:

@@ -88,7 +88,9 @@ def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
     """
     d = g.shape[1]
     if d > FACES_UP_TO:
-        return _best_of_starts(g, H, lower, upper)
+        starts = [np.zeros_like(g), np.where(g > 0, upper, lower)]
+        optima = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
+        return np.asarray(optima[np.arange(len(g)), gain(g, H, optima).argmax(1)])
     best, best_gain = np.zeros_like(g, order="C"), np.zeros(len(g))
     for size in range(d + 1):
         for free in combinations(range(d), size):
@@ -121,9 +123,3 @@ def _face_points(g: Array, H: Array, lower: Array, upper: Array, free: tuple[int
         step = -np.linalg.solve(block, slope.swapaxes(1, 2)).swapaxes(1, 2)
         points[:, :, f] = np.clip(step, lower[:, None, f], upper[:, None, f])
     return points
-
-
-def _best_of_starts(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    starts = [np.zeros_like(g), np.where(g > 0, upper, lower)]
-    optima = np.stack([local_maximum(g, H, lower, upper, start) for start in starts], 1)
-    return np.asarray(optima[np.arange(len(g)), gain(g, H, optima).argmax(1)])

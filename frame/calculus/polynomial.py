@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement, pairwise
@@ -112,11 +111,6 @@ class Polynomial:
             for j in range(i, d):
                 out[i, j] = out[j, i] = derivative(self.index, j, self.slope[i])
         return out
-
-    @classmethod
-    def beside(cls, parts: Sequence[Polynomial]) -> Polynomial:
-        """Vectors of polynomials of the same monomials as one."""
-        return cls(parts[0].index, np.hstack([part.coefficients for part in parts]))
 
     def divided(self, scale: Array) -> Polynomial:
         """Each polynomial over a number of its own, `scale` (K,)."""

@@ -118,7 +118,7 @@ class Tree:
         for part in frontier.pieces(PIECE):
             bound = self.examine(frontier, *part)[2]
             np.maximum.at(whole, frontier.problem[part[1]], bound)
-        return whole[self.numbers]
+        return np.asarray(whole[self.numbers])
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
         """Codes, side × output at the centres and upper bounds of some items; see `kernel`."""

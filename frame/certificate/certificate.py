@@ -84,8 +84,14 @@ def certify(
         if done:  # what the level inside attains is attained here too
             kept = (inside := done[-1][0]).value > optima.value
             optima.value[kept], optima.point[kept] = inside.value[kept], inside.point[kept]
-        how = {"gap": slack, "budget": budget, "workers": workers}
-        done.append((optima, *enclosed(model, lower, upper, optima, **how, progress=tick)))
+        proved, used = enclosed(
+            *(model, lower, upper, optima),
+            gap=slack,
+            budget=budget,
+            workers=workers,
+            progress=tick,
+        )
+        done.append((optima, proved, used))
     shape = (levels, *error.shape, 2)
     inner = np.stack([optima.value for optima, *_ in done[::-1]]).reshape(shape)
     at = np.stack([optima.point for optima, *_ in done[::-1]]).reshape(*shape, -1)

@@ -88,8 +88,9 @@ class ModalModel:
     @cached_property
     def together(self) -> Polynomial:
         """λ_k and behind them the shares of each part, free and forced: n + n m or n + 2 n m."""
-        shares = [self.coefficient] * self.started + ([self.load.share] if self.load else [])
-        return Polynomial.beside([self.eigenvalue, *shares])
+        parts = [self.eigenvalue, *[self.coefficient] * self.started]
+        parts += [self.load.share] if self.load else []
+        return Polynomial(parts[0].index, np.hstack([part.coefficients for part in parts]))
 
     @cached_property
     def of_output(self) -> list[Polynomial]:

@@ -91,11 +91,11 @@ class MatrixStructure:
         ratios = [ratio for ratio in self.ratios if isinstance(ratio, str)]
         return Parameter(name, range=RATIO if name in ratios else "")
 
-    def _term(self, kind: str, term: object) -> tuple[Factor | str | float, Array]:
+    def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
         """A factor that exists and has derivatives, and its array without round-off."""
         pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
         require(pair, f"term of {kind}", type(term).__name__, "pairs (factor, array)")
-        factor, array = term  # type: ignore[misc]
+        factor, array = term
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
             value = value_of(factor, variables(values, names, names[:1]))
