@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.stochastic.microstructure import CONFIDENCE, Microstructure
+from alphacut.stochastic.microstructure import Microstructure
 from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neighbours
 
 if TYPE_CHECKING:
@@ -45,9 +45,6 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
     distance = np.concatenate([one.distances for one in direct])
     sharing = [neighbouring_values(one, one.reduced_radii) for one in diagrams]
     return {
-        "cell_areas_sum_error": max(
-            abs(one.areas.sum() / one.discs.measure - 1) for one in diagrams
-        ),
         "neighbours": {
             "counted": len(number),
             "mean": float(number.mean()) if len(number) else None,
@@ -72,7 +69,6 @@ def _of_map(result: Microstructure) -> dict[str, object]:
         "a4": list(box.a4),
         "a2_band": list(result.slopes.a2),
         "a4_band": list(result.slopes.a4),
-        "confidence": CONFIDENCE,
         "band": result.band,
         "pbox_area": box.area,
         "pbox_breach": box.excess(result.kept),

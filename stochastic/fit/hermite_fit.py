@@ -29,7 +29,7 @@ XI = np.linspace(0, 1, 401)
 # least slope at the points XI, in units of a3 − a1: keeps it positive between them
 MARGIN = 2e-5
 STEEPEST = 3.0  # times the chord's slope, up to which both slopes make a monotone cubic
-# their slopes, shape (4, 201)
+# their slopes, shape (4, 401)
 SLOPES = np.array([polynomial.polyval(XI, polynomial.polyder(h)) for h in SHAPES])
 
 
@@ -148,12 +148,10 @@ class SlopeBand:
     Args:
         a2: Lower end, fitted value, upper end of a2.
         a4: The same of a4.
-        level: Probability with which both true slopes lie inside.
     """
 
     a2: tuple[float, float, float]
     a4: tuple[float, float, float]
-    level: float
 
     def monotone(self, fit: HermiteFit) -> SlopeBand:
         """The part of the band whose four corners are monotone maps.
@@ -175,7 +173,7 @@ class SlopeBand:
             if all(map(fit.is_monotone, itertools.product(*zip(a, b, strict=True)))):
                 break
         a2, a4 = ((float(x), float(y), float(z)) for x, y, z in zip(a, fitted, b, strict=True))
-        return SlopeBand(a2, a4, self.level)
+        return SlopeBand(a2, a4)
 
 
 def slope_band(
@@ -204,4 +202,4 @@ def slope_band(
     drawn = [fit.slopes(sample, weights) for weights in sample.resampled(resamples, generator)]
     half = float(stdtrit(sample.groups.max(), 1 - (1 - level) / 4)) * np.std(drawn, axis=0, ddof=1)
     a2, a4 = ((x - float(h), x, x + float(h)) for x, h in zip(fitted, half, strict=True))
-    return SlopeBand(a2, a4, level)
+    return SlopeBand(a2, a4)
