@@ -196,11 +196,10 @@ def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str
     names: list[str] = []
     for change in changes:
         name, equals, value = change.partition("=")
-        if not equals:
-            raise RefusedError("--set", change, "KEY=VALUE, as cell.matrix_modulus='20 GPa'")
-        full = _full_name(name.strip().replace("-", "_"), table)
-        if full in names:
-            raise RefusedError("--set", change, "each key once")
+        full = _full_name(name.strip().replace("-", "_"), table) if equals else ""
+        if not full or full in names:
+            allowed = "KEY=VALUE, each key once, as cell.matrix_modulus='20 GPa'"
+            raise RefusedError("--set", change, allowed)
         _put(table, full, _value(value.strip()))
         names.append(full)
     return tuple(names)

@@ -16,8 +16,6 @@ from alphacut.stochastic.particles.particles import DISCS, SPHERES
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
 from alphacut.stochastic.sections import Simulated
 
-SOURCES = ("packing", "circles", "image")
-
 
 class Packing(Section):
     """Particles packed at random in a periodic box: discs, or spheres where the cell has spheres.
@@ -67,8 +65,7 @@ class Circles(Section):
     file: CaseFile = Field(description="CSV file with the header x [mm], y [mm], r [mm]")
     size: tuple[Length, Length] = Field(description="width and height of the section")
 
-    @property
-    def source(self) -> CircleFile:
+    def source(self, spheres: bool) -> CircleFile:
         """The circles of the file."""
         return CircleFile(self.file, self.size)
 
@@ -79,8 +76,7 @@ class Photograph(Section):
     file: CaseFile = Field(description="image file")
     pixel: Length = Field(description="side of a pixel")
 
-    @property
-    def source(self) -> SectionImage:
+    def source(self, spheres: bool) -> SectionImage:
         """The circles in the image."""
         return SectionImage(self.file, self.pixel)
 
@@ -98,12 +94,16 @@ class Microstructure(Section):
     circles: Circles | None = None
     image: Photograph | None = None
 
+    @property
+    def sources(self) -> list[Packing | Circles | Photograph]:
+        """The section on the particles; one, once this is built."""
+        return [x for x in (self.packing, self.circles, self.image) if x is not None]
+
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         """Refuses several sources, or none."""
-        names = [name for name in SOURCES if getattr(self, name) is not None]
-        allowed = "one of packing, circles and image"
-        require(len(names) == 1, "microstructure", ", ".join(names) or None, allowed)
+        allowed, count = "one of packing, circles and image", len(self.sources)
+        require(count == 1, "microstructure", f"with {count} of them" if count else None, allowed)
         return self
 
     def study(self, *, spheres: bool) -> Study:
@@ -112,8 +112,4 @@ class Microstructure(Section):
         Args:
             spheres: Whether packed particles are spheres.
         """
-        if self.packing:
-            return Study(self.packing.source(spheres), self.limits, self.seed)
-        seen = self.circles or self.image
-        assert seen is not None
-        return Study(seen.source, self.limits, self.seed)
+        return Study(self.sources[0].source(spheres), self.limits, self.seed)

@@ -15,7 +15,7 @@ from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, chosen, require
 from alphacut.io.measured import accelerogram
 from alphacut.io.problem import suggestion
 
@@ -94,9 +94,7 @@ class Structure:
             RefusedError: One is not.
         """
         for name in names:
-            if name not in self.outputs:
-                cure = suggestion(name, self.outputs)
-                raise RefusedError(key, name, ", ".join(self.outputs), cure)
+            chosen(key, name, self.outputs)
 
     def observing(self, key: str, outputs: tuple[str, ...]) -> StoreyFrame | LagrangianSystem:
         """The model; of a storey frame with these outputs alone.

@@ -8,15 +8,12 @@ from typing import TextIO
 
 from alphacut.case.material import Mesh, RadiusMap, RoundCell
 from alphacut.commands.options import Command, add_common, answer, read
-from alphacut.commands.stage import image as image_text
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
-from alphacut.io.netcdf import document_of
 from alphacut.report.results import ISOTROPIC, fibre_label
-from alphacut.report.tables import tables, text_table
+from alphacut.report.tables import text_table
 from alphacut.rve.result import Homogenised
-from alphacut.stages import cell, image
-from alphacut.stages.store import Store
+from alphacut.stages import cell
 
 KEYS = {
     "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
@@ -45,15 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves and reports."""
-    case = read(options)
-    content = case.content
-    if content.picture is not None:
-        store = Store(None, case.text, quiet=options.quiet)
-        data = store.take(image.stage(content.picture, (1.0,), content.modulus.average))
-        document = document_of(data)
-        text = text_table(*tables({"image": document})["image"]) + image_text(document)
-        answer(options, document, out, text)
-        return 0
+    content = read(options).content
     radius, phases = content.round_cell
     elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)

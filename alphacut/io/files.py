@@ -15,7 +15,7 @@ from typing import Any, TextIO
 import numpy as np
 from pydantic_core import to_json
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.refused import FailedError, RefusedError, require
 from alphacut.io.problem import printable
 
 FULL = 1 << 20
@@ -139,18 +139,17 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
     Raises:
         RefusedError: It is one, or of the other kind.
     """
-    path, kind = Path(value), "a folder" if folder else "a file"
-    if not value.strip() or (path.exists() and path.is_dir() != folder and not is_special(path)):
-        raise RefusedError(option, value or "empty", f"the name of {kind}")
+    path, kind, reason = Path(value), "a folder" if folder else "a file", ""
+    holds = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
     there = path if folder else path.parent
     while not there.exists() and there != there.parent:
         there = there.parent
     try:
-        if not is_special(path):
-            tempfile.TemporaryFile(dir=there).close()
+        tempfile.TemporaryFile(dir=there).close()
     except OSError as error:
-        reason = f"nothing can be written in {there}: {error.strerror or error}"
-        raise RefusedError(option, value, f"{kind} where you may write", reason.lower()) from None
+        holds, reason = False, f"nothing can be written in {there}: {error.strerror or error}"
+    allowed = f"the name of {kind} where you may write"
+    require(holds or is_special(path), option, value or "empty", allowed, reason.lower())
 
 
 @contextmanager

@@ -101,10 +101,8 @@ def one(text: str, si: str) -> Decimal:
         ValueError: It begins with no number, or its unit is wrong.
     """
     match = SINGLE.fullmatch(text.strip())
-    if match is None:
-        raise ValueError(f'"{text.strip()}" does not begin with a number')
-    if match[2].startswith((",", "_")):
-        raise ValueError(f'"{text.strip()}" is no number; write a point, and no _')
+    if match is None or match[2].startswith((",", "_")):
+        raise ValueError(f'"{text.strip()}" does not begin with a number such as 1.5')
     return decimal(match[1]) * factor(match[2].strip(), si)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.figures import style
-from alphacut.figures.style import GREY, INK, ORANGE, colours
+from alphacut.figures.style import GREY, INK, ORANGE, Look, colours
 from alphacut.frame import Auto, envelope
 from alphacut.frame.questions.peaks import ANY, Passing, passing, peaks
 from alphacut.frame.structures.quantities import Output
@@ -106,20 +106,14 @@ class Decision(Question):
         alpha = np.asarray(document["alpha"], float)
         places = np.arange(len(each))[::-1]
         for place, one in zip(places, each.values(), strict=True):
-            low, high = (
-                1
-                - np.array([np.nan if x is None else x for x in one["margin"][side]]) / one["limit"]
-                for side in ("upper", "lower")
-            )
-            high = np.where(np.isfinite(high), high, np.nan)
+            margins = (np.asarray(one["margin"][side], float) for side in ("upper", "lower"))
+            low, high = (1 - margin / one["limit"] for margin in margins)
             for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
-                axes.barh(
-                    place, right - left, left=left, height=0.66 - 0.4 * level, color=shade, lw=0
-                )
-            text = (
-                f"possible to {degree(one['possibility'])}, necessary to {degree(one['necessity'])}"
-            )
-            text = f"{one['verdict']} ({one['nature']}): {text}"
+                bar: Look = {"left": left, "height": 0.66 - 0.4 * level, "color": shade, "lw": 0}
+                axes.barh(place, right - left, **bar)
+            possible, necessary = degree(one["possibility"]), degree(one["necessity"])
+            text = f"{one['verdict']} ({one['nature']}): possible to {possible}"
+            text += f", necessary to {necessary}"
             axes.text(0.01, place + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
         axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
         axes.axvline(0.0, color=GREY, lw=0.4)

@@ -20,7 +20,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.quantity import axis_prefix, between, engineering
+from alphacut.io.quantity import between, engineering
 from alphacut.questions.question import Motion, Question, Row, in_words
 
 if TYPE_CHECKING:
@@ -172,9 +172,7 @@ class Probability(Question):
             axes.plot(limits, end, color=INK, lw=1)
         _mark(axes, one["limit"], limits, one["unit"])
         title = f"limit of |{name}|" if one["unit"] else "all limits, over those of the case"
-        factor, unit = axis_prefix(float(limits[-1]), one["unit"])
-        axes.xaxis.set_major_formatter(lambda value, _: f"{value * factor:.10g}")
-        axes.set_xlabel(f"{title} ({unit})".replace("^2", "²") if unit else title)
+        style.prefix_axis(axes, title, one["unit"], across=True)
         axes.set_ylabel("probability of exceeding it")
         axes.set_ylim(0, 1.02)
         alpha_legend(axes, alpha)

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 def stage(section: Section, spheres: bool, figures: bool = True) -> Stage:
     """The stage of some particles; in a folder it writes radius.toml and figures as well."""
-    source = section.packing or section.circles or section.image
-    file = getattr(source, "file", None)
+    file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
     compute = partial(dataset, section, spheres, figures)
     return Stage("microstructure", inputs, ("stochastic",), compute)

@@ -66,7 +66,6 @@ class Store:
         fresh: Whether everything is computed anew.
         quiet: Whether nothing is shown.
         workers: Processes of a stage.
-        made: Fingerprints of the stages that this run has computed.
         taken: Names of the stages whose files were up to date.
     """
 
@@ -75,7 +74,6 @@ class Store:
     fresh: bool = False
     quiet: bool = False
     workers: int = 1
-    made: list[str] = field(default_factory=list)
     taken: list[str] = field(default_factory=list)
 
     @property
@@ -104,16 +102,17 @@ class Store:
             stages: Those that take longest first.
             executor: Processes; None where this one does everything.
         """
-        if executor is not None and self.folder is not None and len(stages) > 1:
-            work = Work(self.folder, self.fresh)
-            stale = [stage for stage in stages if not self._current(stage)]
-            under_way = {executor.submit(stage.compute, work): stage for stage in stale}
-            with showing(self.shown) as tick:
-                for done, future in enumerate(as_completed(under_way), start=1):
-                    self._put(under_way[future], future.result())
-                    if tick:
-                        tick(done / len(under_way))
-        return {stage.name: self.take(stage) for stage in stages}
+        if executor is None or self.folder is None or len(stages) == 1:
+            return {stage.name: self.take(stage) for stage in stages}
+        work = Work(self.folder, self.fresh)
+        stale = [stage for stage in stages if not self._current(stage)]
+        under_way = {executor.submit(stage.compute, work): stage for stage in stale}
+        with showing(self.shown) as tick:
+            for done, future in enumerate(as_completed(under_way), start=1):
+                self._put(under_way[future], future.result())
+                if tick:
+                    tick(done / len(under_way))
+        return {stage.name: read_dataset(self._file(stage)) for stage in stages}
 
     def _file(self, stage: Stage) -> Path:
         return (self.folder or Path()) / f"{stage.name}.nc"
@@ -122,15 +121,12 @@ class Store:
         """Writes a stage's dataset, whole or not at all."""
         with whole_file(self._file(stage)) as partial:
             dataset.assign_attrs(attributes(self.case_text, stage.key)).to_netcdf(partial)
-        self.made.append(stage.key)
 
     def _current(self, stage: Stage) -> bool:
         """True if the file of a stage may be taken."""
-        path, made = self._file(stage), stage.key in self.made
-        if self.folder is None or (self.fresh and not made) or not path.is_file():
+        path = self._file(stage)
+        if self.folder is None or self.fresh or not path.is_file():
             return False
-        if fingerprint_of(path) != stage.key:
-            return False
-        if not made:
-            self.taken.append(stage.name)
-        return True
+        current = fingerprint_of(path) == stage.key
+        self.taken.extend([stage.name] * current)
+        return current

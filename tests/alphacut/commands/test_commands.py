@@ -125,7 +125,7 @@ REFUSED = [
     ("check case.toml --set frame.masses=[]", "frame.masses is []; allowed: one entry or more"),
     ("check case.toml -rve_ksp_rtol 1e-9", "-rve_ksp_rtol"),
     ("run case.toml -rve_ksp_rtol 1e-9", "method prism"),
-    ("check case.toml --set frame.masses=[1_0] t", "is no number"),
+    ("check case.toml --set frame.masses=[1_0] t", "does not begin with a number"),
     ("check case.toml --set frame.lengths=" + "[" * 3000, "too long"),
     ("check case.toml --set frame.lengths=1e308 mm", "magnitudes"),
     ("check case.toml --set frame.lengths=" + "x" * 100_000, "frame.lengths"),
