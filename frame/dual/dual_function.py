@@ -37,6 +37,7 @@ class Data(NamedTuple):
         start: Least ω and q of each table, shape (K, 2).
         step: Distances of its points, shape (K, 2).
         points: Number of points along ω and along q, shape (2,).
+        ends: First and last place along ω and along q that the box reaches, shape (K, 4).
         centre: Centres of ω and g, shape (K, 2).
         radius: Their radii.
         share: Centres of the shares, shape (K, sources).
@@ -57,6 +58,7 @@ class Data(NamedTuple):
     start: Array
     step: Array
     points: Array
+    ends: Rows
     centre: Array
     radius: Array
     share: Array

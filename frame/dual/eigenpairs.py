@@ -167,8 +167,12 @@ def _norm_of(each: Array, squares: Mask) -> float:
     return float(np.linalg.norm(total, 2))
 
 
-def _series(k: int, degree: int, mass: Expansion, stiffness: Expansion) -> tuple[list[Array], ...]:
+def _series(
+    k: int, degree: int, mass: Expansion, stiffness: Expansion, lower: tuple[list[Array], ...] = ()
+) -> tuple[list[Array], ...]:
     """Perturbation series of mode k: (Λ − λ₀) x_m = λ_m e_k − what lower degrees have put there.
+
+    `lower` are the same to a lower degree, where they are known.
 
     Returns:
         Homogeneous polynomials of degree 0 to N, packed, of λ̃ (monomials, 1), of x̃ and of M x̃.
@@ -178,10 +182,10 @@ def _series(k: int, degree: int, mass: Expansion, stiffness: Expansion) -> tuple
     apart[k] = np.inf
     heavy, stiff = ([packed(part, a) for a, part in enumerate(x.parts)] for x in (mass, stiffness))
     unit = np.eye(len(middle))[k][None]
-    rate: list[Array] = [np.full((1, 1), middle[k])]
-    shape: list[Array] = [unit]
-    moved: list[Array] = [unit]
-    for m in range(1, degree + 1):
+    rate, shape, moved = (
+        [*part] for part in lower or ([np.full((1, 1), middle[k])], [unit], [unit])
+    )
+    for m in range(len(rate), degree + 1):
         of_mass, of_stiffness = (
             np.sum([product(x[b], shape[m - b], (b, m - b), d) for b in range(1, min(m, 3) + 1)], 0)
             for x in (heavy, stiff)
@@ -198,8 +202,10 @@ def _series(k: int, degree: int, mass: Expansion, stiffness: Expansion) -> tuple
 
 def _sharpest(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode | None:
     """Mode k by the least degree that is fine, or the greatest affordable; None if it is rough."""
+    series: tuple[list[Array], ...] = ()
     for degree in range(DEGREES[0], _degree(len(used)) + 1):
-        mode = _enclosed(k, degree, mass, stiffness, used)
+        series = _series(k, degree, mass, stiffness, series)
+        mode = _enclosed(k, series, mass, stiffness, used)
         if mode is not None and mode.doubt < FINE:
             break
     return mode if mode is not None and mode.doubt < ROUGH else None
@@ -219,15 +225,15 @@ def _sizes(part: Array) -> Array:
 
 
 def _enclosed(
-    k: int, degree: int, mass: Expansion, stiffness: Expansion, used: Rows
+    k: int, series: tuple[list[Array], ...], mass: Expansion, stiffness: Expansion, used: Rows
 ) -> Mode | None:
     """Mode k proved, or None where it is not enclosed."""
     n = len(mass.rest)
     middle = np.diag(stiffness.parts[0])
     if np.abs(np.delete(middle, k) - middle[k]).min(initial=np.inf) <= CLOSE * middle.max():
         return None
-    rate, shape, moved = _series(k, degree, mass, stiffness)
-    N, o = degree, np.delete(np.arange(n), k)
+    rate, shape, moved = series
+    N, o = len(rate) - 1, np.delete(np.arange(n), k)
     pencil, x = _Pencil.of(rate, mass, stiffness), [_sizes(part) for part in shape]
     t = pencil.sizes
     missed = t[-1] @ sum(x) + ROUND_OFF * stiffness.size().max(1)

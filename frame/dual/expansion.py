@@ -98,6 +98,20 @@ class Expansion:
                 parts[m] = np.take(parts[m], inputs, -axis)
         return Expansion(tuple(parts), self.rest)
 
+    def within(self, low: Array, high: Array) -> Expansion:
+        """The same over a part of the box, low ≤ u ≤ high, as functions of its own unit box."""
+        middle, half = (low + high) / 2, (high - low) / 2
+        value, slope, bend, twist = self.parts
+        bent, twisted = bend @ middle, twist @ middle
+        twice = twisted @ middle
+        parts = (
+            value + (slope + bent + twice) @ middle,
+            (slope + 2 * bent + 3 * twice) * half,
+            (bend + 3 * twisted) * half[:, None] * half,
+            twist * half[:, None, None] * half[:, None] * half,
+        )
+        return Expansion(parts, self.rest)
+
     def __getitem__(self, key: Key) -> Expansion:
         """Some of the functions; `key` acts on V."""
         return Expansion(tuple(part[key] for part in self.parts), self.rest[key])

@@ -45,31 +45,39 @@ def places(lists: Rows, d: int) -> Rows:
     )
 
 
-@njit(cache=True)
-def place_of_both(one: Rows, other: Rows, table: Rows) -> int:
-    """Place of the product of two monomials."""
-    m, q = len(one), len(other)
-    place, i, j = 0, 0, 0
-    for k in range(m + q):
-        if j == q or (i < m and one[i] <= other[j]):
-            place += table[one[i], k]
-            i += 1
-        else:
-            place += table[other[j], k]
-            j += 1
-    return place
+@cache
+def places_of_both(d: int, m: int, q: int) -> Rows:
+    """Places of the products of all monomials of degree m with all of degree q, shape (M, Q)."""
+    one, other = monomials(d, m), monomials(d, q)
+    out = np.empty((len(one), len(other)), np.int64)
+    _merge(one, other, binomials(d), out)
+    return out
 
 
 @njit(cache=True)
-def multiply(a: Array, b: Array, of_a: Rows, of_b: Rows, table: Rows, out: Array) -> None:
-    """Adds products: out[monomial of both, i] += a[α, i, j] b[β, j].
+def _merge(one: Rows, other: Rows, table: Rows, out: Rows) -> None:
+    m, q = one.shape[1], other.shape[1]
+    for x in range(len(one)):
+        for y in range(len(other)):
+            place, i, j = 0, 0, 0
+            for k in range(m + q):
+                if j == q or (i < m and one[x, i] <= other[y, j]):
+                    place += table[one[x, i], k]
+                    i += 1
+                else:
+                    place += table[other[y, j], k]
+                    j += 1
+            out[x, y] = place
+
+
+@njit(cache=True, nogil=True)
+def multiply(a: Array, b: Array, places: Rows, out: Array) -> None:
+    """Adds products: out[place of both, i] += a[α, i, j] b[β, j].
 
     Args:
         a: Matrix polynomial, shape (monomials, n, l).
         b: Vector polynomial, shape (monomials, l).
-        of_a: Monomials of a.
-        of_b: Monomials of b.
-        table: `binomials`.
+        places: Places of the products of their monomials.
         out: Vector polynomial, shape (monomials, n).
     """
     n, width = a.shape[1], a.shape[2]
@@ -81,7 +89,7 @@ def multiply(a: Array, b: Array, of_a: Rows, of_b: Rows, table: Rows, out: Array
         if not used:
             continue
         for y in range(len(b)):
-            place = place_of_both(of_a[x], of_b[y], table)
+            place = places[x, y]
             for i in range(n):
                 total = 0.0
                 for j in range(width):
@@ -92,16 +100,16 @@ def multiply(a: Array, b: Array, of_a: Rows, of_b: Rows, table: Rows, out: Array
 def product(a: Array, b: Array, degrees: tuple[int, int], d: int) -> Array:
     """Matrix polynomial (monomials, n, l) times vector polynomial (monomials, l)."""
     out = np.zeros((comb(d + sum(degrees) - 1, sum(degrees)), a.shape[1]))
-    multiply(a, b, monomials(d, degrees[0]), monomials(d, degrees[1]), binomials(d), out)
+    multiply(a, b, places_of_both(d, *degrees), out)
     return out
 
 
-@njit(cache=True)
-def multiply_each(a: Array, b: Array, of_a: Rows, of_b: Rows, table: Rows, out: Array) -> None:
-    """Adds products entry by entry: out[monomial of both, i] += a[α, i] b[β, i]."""
+@njit(cache=True, nogil=True)
+def multiply_each(a: Array, b: Array, places: Rows, out: Array) -> None:
+    """Adds products entry by entry: out[place of both, i] += a[α, i] b[β, i]."""
     for x in range(len(a)):
         for y in range(len(b)):
-            place = place_of_both(of_a[x], of_b[y], table)
+            place = places[x, y]
             for i in range(a.shape[1]):
                 out[place, i] += a[x, i] * b[y, i]
 
@@ -111,7 +119,7 @@ def each(a: Array, b: Array, degrees: tuple[int, int], d: int) -> Array:
     n = max(a.shape[1], b.shape[1])
     out = np.zeros((comb(d + sum(degrees) - 1, sum(degrees)), n))
     a, b = (np.ascontiguousarray(np.broadcast_to(x, (len(x), n))) for x in (a, b))
-    multiply_each(a, b, monomials(d, degrees[0]), monomials(d, degrees[1]), binomials(d), out)
+    multiply_each(a, b, places_of_both(d, *degrees), out)
     return out
 
 

@@ -14,7 +14,7 @@ less and an expansion: at inputs where A is large B is often small.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,8 +22,9 @@ from alphacut.frame.dual.eigenpairs import Mode, Modes
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion, product, stacked
 from alphacut.frame.dual.homogeneous import Series
 from alphacut.frame.dual.structure import Classical, spread
+from alphacut.frame.dual.waves import Grid
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
-from alphacut.fuzzy.arrays import Rows
+from alphacut.fuzzy.arrays import Array, Rows
 
 DEGREE = 6
 """Degree to which shares are expanded, before those above the third are left to the rest."""
@@ -36,6 +37,7 @@ class Oscillator:
     Args:
         omega: ω, V = (), in rad/s.
         decay: g, V = (), in 1/s.
+        quotient: g/ω, V = ().
         share: c, V = (sources, m).
         omega_range: Least and greatest ω.
         quotient_range: Least and greatest g/ω.
@@ -43,9 +45,22 @@ class Oscillator:
 
     omega: Expansion
     decay: Expansion
+    quotient: Expansion
     share: Expansion
     omega_range: tuple[float, float]
     quotient_range: tuple[float, float]
+
+    def within(self, low: Array, high: Array) -> Oscillator:
+        """The same over a part of the box, low ≤ u ≤ high."""
+        every = (self.omega, self.decay, self.quotient, self.share)
+        omega, decay, quotient, share = (x.within(low, high) for x in every)
+        ends = _overlap(_range(omega), self.omega_range)
+        quotients = _overlap(_range(quotient), self.quotient_range)
+        return Oscillator(omega, decay, quotient, share, ends, quotients)
+
+    def places(self, grid: Grid) -> tuple[int, ...]:
+        """First and last points of a grid that enclose ω, and those that enclose g/ω."""
+        return _places(grid.omega, self.omega_range) + _places(grid.quotient, self.quotient_range)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +78,11 @@ class Group:
     doubt: Expansion
     omega_range: tuple[float, float]
     quotient_range: tuple[float, float]
+
+    def within(self, low: Array, high: Array) -> Group:
+        """The same over a part of the box, low ≤ u ≤ high."""
+        share, doubt = (x.within(low, high) for x in (self.share, self.doubt))
+        return replace(self, share=share, doubt=doubt)
 
 
 def oscillators(
@@ -147,7 +167,7 @@ def _oscillator(
     top = np.sqrt(modes.high[k])
     least = np.sqrt(modes.low[k] / (1 + q[1] ** 2))
     return Oscillator(
-        omega, decay, share, (max(low, least), min(high, top)), (max(q[0], 0.0), q[1])
+        omega, decay, quotient, share, (max(low, least), min(high, top)), (max(q[0], 0.0), q[1])
     )
 
 
@@ -174,6 +194,17 @@ def _group_range(
 
 def _range(x: Expansion) -> tuple[float, float]:
     return float(x.parts[0] - x.spread()), float(x.parts[0] + x.spread())
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    return max(one[0], other[0]), min(one[1], other[1])
+
+
+def _places(points: Array, ends: tuple[float, float]) -> tuple[int, int]:
+    """The last point that is no more than a range's lower end, the first no less than its upper."""
+    first = int(np.searchsorted(points, ends[0], side="right")) - 1
+    last = int(np.searchsorted(points, ends[1]))
+    return max(first, 0), min(last, len(points) - 1)
 
 
 def inverse(mass: Expansion) -> Expansion:

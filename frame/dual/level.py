@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -144,6 +144,11 @@ class Level:
     tables: Tables
     sources: tuple[str, ...]
 
+    def within(self, low: Array, high: Array) -> Level:
+        """The same models over a part of the box, low ≤ u ≤ high."""
+        group = self.group and self.group.within(low, high)
+        return replace(self, single=[mode.within(low, high) for mode in self.single], group=group)
+
     @classmethod
     def of(
         cls,
@@ -228,6 +233,7 @@ class Problem:
         data: Models and tables of the output.
         out: Bounds and the model's values, shape (2, T).
         at: Inputs of the model's values, shape (T, d).
+        attained: A value that is known to be attained.
     """
 
     side: float
@@ -236,20 +242,22 @@ class Problem:
     data: Data
     out: Array
     at: Array
+    attained: float
 
     @classmethod
-    def of(cls, level: Level, o: int, s: int, enough: float) -> Problem:
+    def of(cls, level: Level, o: int, s: int, enough: float, attained: float = 0.0) -> Problem:
         """Bounds of one output of a level, on one side."""
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
         data = Data(*_tables(level, o), *_models(level, o), *group)
         out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
-        return cls(side, enough, constant, data, out, np.zeros((total, data.linear.shape[1])))
+        at = np.zeros((total, data.linear.shape[1]))
+        return cls(side, enough, constant, data, out, at, attained)
 
     @property
     def top(self) -> float:
-        """The largest value so far, or 0."""
-        return float(max(self.out[1].max(), 0.0))
+        """The largest value so far."""
+        return float(max(self.out[1].max(), self.attained))
 
     def left(self, loose: float) -> Rows:
         """Nodes whose gap is too wide."""
@@ -286,8 +294,9 @@ def _tables(level: Level, o: int) -> list[Array]:
     start = np.array([[g.omega[0], g.quotient[0]] for g in grids])
     step = np.array([[g.omega[1], g.quotient[1]] for g in grids]) - start
     points = np.array([len(grids[0].omega), len(grids[0].quotient)], float)
+    ends = np.array([mode.places(grid) for mode, grid in zip(level.single, grids, strict=True)])
     value = level.tables.value[int(level.structure.order[o])]
-    return [value, *scaled, start, step, points, centre, radius, *shares]
+    return [value, *scaled, start, step, points, ends, centre, radius, *shares]
 
 
 def _models(level: Level, o: int) -> list[Array]:

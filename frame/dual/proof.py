@@ -12,7 +12,9 @@ so that nothing rests on how μ is found. The cost is one of modes, tables and n
 one of inputs (`kernel`, `level`).
 3. Where the modes' own maxima lie too far from one u, their ranges are halved: slabs of few z,
    not boxes of many u. Near the peaks, that is; elsewhere a wider gap is left.
-4. What the maxima name leads to inputs whose exact motion is the other end of the gap
+4. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
+(`parts`).
+5. What the maxima name leads to inputs whose exact motion is the other end of the gap
    (`attained`).
 """
 
@@ -20,25 +22,26 @@ from __future__ import annotations
 
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
-from alphacut.frame.dual.attained import attained
-from alphacut.frame.dual.expansion import Expansion
-from alphacut.frame.dual.level import Level
-from alphacut.frame.dual.structure import Classical, classical
+from alphacut.frame.dual.box import Box
+from alphacut.frame.dual.parts import Peak
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.proof import exact
-from alphacut.frame.structures.linear import LinearSystem
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 
+PARTS = 32
+"""Most parts of the box over which the nodes above a peak are bounded."""
 ROUNDING = 1e-10
 """Share of an output's peak by which its exact values may be off."""
 
@@ -50,6 +53,8 @@ class DualProof:
     Args:
         gap: Distance of proved and attained bounds that suffices, as a share of each output's peak
             at the modal inputs; what the remainders leave may be more.
+        peaks: The same of the bounds above a peak, as a share of it, above which the box of inputs
+            is parted.
         slabs: Most parts of the modes' ranges for a bound.
         steps: Most evaluations of the dual function for each of them.
         workers: Threads, which hardly change the result; all cores unless given.
@@ -60,12 +65,13 @@ class DualProof:
 
     name: ClassVar[str] = "dual"
     gap: float = 2e-3
+    peaks: float = 0.019
     slabs: int = 24
     steps: int = 40
     workers: int | None = None
 
     def __post_init__(self) -> None:
-        for key in ("gap", "slabs", "steps"):
+        for key in ("gap", "peaks", "slabs", "steps"):
             if not getattr(self, key) > 0:
                 raise RefusedError(key, getattr(self, key), "a positive number")
 
@@ -120,29 +126,52 @@ class DualProof:
     ) -> _Bounded:
         """Bounds of one level; what the level inside it attains is attained here too."""
         low, high = cuts.lower[a], cuts.upper[a]
-        active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
         margin = ROUNDING * peak[:, None]
-        if not len(active):
-            value = flow.values(centre[None])[0]
+        if not (high > low).any():
+            value = flow.values(low[None])[0]
             both = np.stack([-value, value], -1)
-            at = np.broadcast_to(centre, (*both.shape, len(centre))).copy()
+            at = np.broadcast_to(low, (*both.shape, len(low))).copy()
             return _Bounded(both + margin, both - margin, at, np.zeros_like(value), len(value))
-        structure = over_box(flow.system, cuts.names, centre, radius, active)
-        moved = sources(flow.system, structure)
-        level = Level.of(structure, flow.system.ground, flow.time, moved)
-        workers = self.workers or os.cpu_count() or 1
+        box = Box(flow.system, cuts.names, flow.time, low, high)
+        level, workers = box.level(), self.workers or os.cpu_count() or 1
         outer, unit = level.bounds(self.gap * peak, self.slabs, self.steps, workers)
-        points = np.tile(centre, (*outer.shape, 1))
-        points[..., active] += radius[active] * unit
-        points = np.clip(points, low, high)
         node, output, side = (x.ravel() for x in np.indices(outer.shape))
-        flat = points.reshape(-1, len(centre)), unit.reshape(-1, len(active))
-        value = attained(flow.system, structure, cuts.names, flat, (node, output), flow.time)
+        value = box.attained(unit.reshape(len(node), -1), node, output)
         inner = (np.where(side, 1, -1) * value).reshape(outer.shape) - margin
+        self._parted(box, (outer, inner, unit), margin[:, 0], workers)
+        points = box.inputs(unit)
         if within is not None:
             better = within.inner > inner
             inner[better], points[better] = within.inner[better], within.at[better]
         return _Bounded(outer, inner, points, level.stray(), len(level.single))
+
+    def _parted(
+        self, box: Box, found: tuple[Array, Array, Array], margin: Array, workers: int
+    ) -> None:
+        """Improve bounds (outer, inner, unit) above peaks whose gap is too wide, over parts."""
+        outer, inner, unit = found
+        top = np.maximum(inner.max(0), 0.0)  # (m, 2)
+        enough = np.broadcast_to(self.peaks * top.max(1, keepdims=True), top.shape)
+
+        def improve(o: int, s: int) -> None:
+            nodes = np.flatnonzero(outer[:, o, s] > top[o, s] + enough[o, s])
+            every = np.full(len(nodes), o)
+            peak = Peak(
+                partial(box.part, o, nodes),
+                lambda unit: (-1, 1)[s] * box.attained(unit, nodes, every) - margin[o],
+                s,
+                outer[nodes, o, s],
+                float(top[o, s]),
+                float(enough[o, s]),
+            )
+            outer[nodes, o, s], value, at = peak.bounds(unit.shape[-1], PARTS)
+            better = value > inner[nodes, o, s]
+            inner[nodes[better], o, s], unit[nodes[better], o, s] = value[better], at[better]
+
+        wide = np.argwhere(outer.max(0) > top + enough)
+        with ThreadPoolExecutor(workers) as pool:
+            for job in [pool.submit(improve, int(o), int(s)) for o, s in wide]:
+                job.result()
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,22 +191,3 @@ class _Bounded:
     at: Array
     stray: Array
     single: int
-
-
-def over_box(
-    system: LinearSystem, names: tuple[str, ...], centre: Array, radius: Array, active: Rows
-) -> Classical:
-    """The structure over a box of its inputs, of which those `active` have a width."""
-    inputs, d = Expansion.inputs(centre[active], radius[active]), len(active)
-    own = {name: float(x) for name, x in zip(names, centre, strict=True)}
-    values = {**system.parameters, **own}
-    p = {name: Expansion.constant(x, d) for name, x in values.items()}
-    p |= {names[i]: inputs[place] for place, i in enumerate(active)}
-    return classical(system, p)
-
-
-def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
-    """Names of what moves the structure: load, velocity, start."""
-    moved = np.asarray(structure.start.size().any(-1))
-    present = {"load": system.ground is not None, "velocity": moved[1], "start": moved[0]}
-    return tuple(name for name, is_there in present.items() if is_there)

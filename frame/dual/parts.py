@@ -1,0 +1,151 @@
+"""Peaks of one output over parts of the box, where models of the whole box are too wide.
+
+Remainders fall with the fourth power of the inputs' widths, and modes part. So a few nodes, those
+whose bounds lie above the peak, are bounded over less:
+
+1. Of one input after the other, the half or quarter of its range that lies away from the best
+   inputs known is bounded by the models at hand. Where no bound lies above the peak it is taken
+   away.
+2. What is left is expanded anew. Where that is nearly all, it is first halved, along the input
+   whose far quarter came nearest to be taken away.
+
+A node's bound is the largest over all parts, those taken away included. The part with the largest
+bound comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.dual.level import Level, Problem
+from alphacut.fuzzy.arrays import Array
+
+PIECES = (0.5, 0.25)
+"""Shares of an input's range that are tried to be taken away."""
+EFFORTS = (1, 24)
+"""Slabs of a bound over what may be taken away."""
+LITTLE = 0.5
+"""Shares taken away of all inputs, in sum, below which a part is halved besides."""
+SLABS, STEPS = 240, 40
+"""Most slabs of a bound over a part, and evaluations for each."""
+
+
+@dataclass(eq=False)
+class Part:
+    """A part of the box and the bounds over it.
+
+    Args:
+        low: Its lower ends, in unit coordinates of the whole box, shape (d,).
+        high: Its upper ends.
+        level: Models over the part.
+        problem: Bounds and the model's values at J nodes.
+    """
+
+    low: Array
+    high: Array
+    level: Level
+    problem: Problem
+
+    @property
+    def bound(self) -> Array:
+        """Bounds over the part, shape (J,)."""
+        return np.asarray(self.problem.out[0])
+
+    @property
+    def inputs(self) -> Array:
+        """Coordinates of the whole box that lead to the bounds, shape (J, d)."""
+        return self.whole(self.problem.at)
+
+    def whole(self, unit: Array) -> Array:
+        """Coordinates of the whole box for those of the part."""
+        return np.asarray((self.low + self.high) / 2 + (self.high - self.low) / 2 * unit)
+
+
+@dataclass(eq=False)
+class Peak:
+    """Nodes of one output and side whose bounds lie above the peak.
+
+    Args:
+        expanded: Models of the output at these nodes over a part of the box, named by its ends.
+        motion: Exact values at these nodes for unit coordinates (J, d), on the side, shape (J,).
+        side: 0 for upper bounds of −output, 1 for those of the output.
+        outer: Bounds that are known, shape (J,).
+        top: The largest value that is attained.
+        enough: Gap above it at which bounds are left.
+    """
+
+    expanded: Callable[[Array, Array], Level]
+    motion: Callable[[Array], Array]
+    side: int
+    outer: Array
+    top: float
+    enough: float
+
+    def bounds(self, inputs: int, most: int) -> tuple[Array, Array, Array]:
+        """Bounds and attained values at the nodes, shape (J,), and their coordinates, (J, d).
+
+        Args:
+            inputs: Number of inputs d.
+            most: Most parts that are expanded.
+        """
+        gone, best = np.full(len(self.outer), -np.inf), np.full(len(self.outer), -np.inf)
+        at: Array = np.zeros((len(self.outer), inputs))
+        ends = [(-np.ones(inputs), np.ones(inputs), self.outer)]
+        parts: list[Part] = []
+        for _ in range(most):
+            part = self._part(*ends.pop())
+            parts.append(part)
+            value = self.motion(part.inputs)
+            better = value > best
+            best[better], at[better] = value[better], part.inputs[better]
+            self.top = max(self.top, float(best.max()))
+            if ends:
+                continue
+            parts.sort(key=lambda part: float(part.bound.max()))
+            if parts[-1].bound.max() <= self.top + self.enough:
+                break
+            ends, lost = self._shaved(parts.pop())
+            gone = np.maximum(gone, lost)
+        left = [part.bound for part in parts] + [bound for _, _, bound in ends]
+        return np.minimum(np.max([gone, *left], axis=0), self.outer), best, at
+
+    def _part(self, low: Array, high: Array, known: Array) -> Part:
+        """A part expanded, with bounds at nodes whose bounds known are above the peak."""
+        part = Part(low, high, *self._problem(self.expanded(low, high)))
+        part.problem.out[0] = known
+        part.problem.run(np.flatnonzero(known > self.top + self.enough), SLABS, STEPS, 1.0, 0.0)
+        return part
+
+    def _problem(self, level: Level) -> tuple[Level, Problem]:
+        return level, Problem.of(level, 0, self.side, self.enough, self.top)
+
+    def _shaved(self, part: Part) -> tuple[list[tuple[Array, Array, Array]], Array]:
+        """What is left of a part, by its ends and the bounds known, and bounds of what is not."""
+        u = part.problem.at[part.problem.out[1].argmax()]
+        low, high, lost = -np.ones_like(u), np.ones_like(u), np.full(len(self.outer), -np.inf)
+        nearest = np.full(len(u), np.inf)
+        for slabs in EFFORTS:
+            for i in range(len(u)):
+                for share in PIECES:
+                    if high[i] - low[i] < 2.0:
+                        break
+                    end = (1 - 2 * share) * (-1 if u[i] > 0 else 1)
+                    piece = (low.copy(), high.copy())
+                    piece[1 if u[i] > 0 else 0][i] = end
+                    problem = self._problem(part.level.within(*piece))[1]
+                    problem.run(np.arange(len(lost)), slabs, STEPS, 1.0, 0.0)
+                    nearest[i] = float(problem.out[0].max())
+                    if nearest[i] <= self.top + self.enough:
+                        lost = np.maximum(lost, problem.out[0])
+                        (low if u[i] > 0 else high)[i] = end
+        boxes = [(low, high)]
+        if (2 - (high - low)).sum() / 2 < LITTLE:
+            nearest[high - low < 2] = np.inf
+            i = int(nearest.argmin())
+            upper, lower = low.copy(), high.copy()
+            upper[i] = lower[i] = (low[i] + high[i]) / 2
+            boxes = [(low, lower), (upper, high)]
+        return [(part.whole(a), part.whole(b), part.bound) for a, b in boxes], lost
