@@ -122,6 +122,17 @@ class Peak:
     def _problem(self, level: Level) -> tuple[Level, Problem]:
         return level, Problem.of(level, 0, self.side, self.enough, self.top)
 
+    def _of_piece(self, part: Part, piece: tuple[Array, Array], slabs: int) -> Array:
+        """Bounds over a piece of a part, shape (J,), until one is above the peak."""
+        problem = self._problem(part.level.within(*piece))[1]
+        problem.out[0] = part.bound
+        for node in np.argsort(-part.bound):
+            if part.bound[node] > self.top + self.enough:
+                problem.run(np.array([node]), slabs, STEPS, 1.0, 0.0)
+            if problem.out[0, node] > self.top + self.enough:
+                break
+        return np.asarray(problem.out[0])
+
     def _shaved(self, part: Part) -> tuple[list[tuple[Array, Array, Array]], Array]:
         """What is left of a part, by its ends and the bounds known, and bounds of what is not."""
         u = part.problem.at[part.problem.out[1].argmax()]
@@ -135,11 +146,10 @@ class Peak:
                     end = (1 - 2 * share) * (-1 if u[i] > 0 else 1)
                     piece = (low.copy(), high.copy())
                     piece[1 if u[i] > 0 else 0][i] = end
-                    problem = self._problem(part.level.within(*piece))[1]
-                    problem.run(np.arange(len(lost)), slabs, STEPS, 1.0, 0.0)
-                    nearest[i] = float(problem.out[0].max())
+                    bound = self._of_piece(part, piece, slabs)
+                    nearest[i] = float(bound.max())
                     if nearest[i] <= self.top + self.enough:
-                        lost = np.maximum(lost, problem.out[0])
+                        lost = np.maximum(lost, bound)
                         (low if u[i] > 0 else high)[i] = end
         boxes = [(low, high)]
         if (2 - (high - low)).sum() / 2 < LITTLE:
