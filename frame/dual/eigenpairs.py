@@ -202,10 +202,15 @@ def _series(
 
 def _sharpest(k: int, mass: Expansion, stiffness: Expansion, used: Rows) -> Mode | None:
     """Mode k by the least degree that is fine, or the greatest affordable; None if it is rough."""
+    middle = np.diag(stiffness.parts[0])
+    if np.abs(np.delete(middle, k) - middle[k]).min(initial=np.inf) <= CLOSE * middle.max():
+        return None
     series: tuple[list[Array], ...] = ()
     for degree in range(DEGREES[0], _degree(len(used)) + 1):
         series = _series(k, degree, mass, stiffness, series)
         mode = _enclosed(k, series, mass, stiffness, used)
+        if mode is None and degree > DEGREES[0]:
+            break  # sizes of all degrees together stand in the way; more of them do not help
         if mode is not None and mode.doubt < FINE:
             break
     return mode if mode is not None and mode.doubt < ROUGH else None
@@ -230,8 +235,6 @@ def _enclosed(
     """Mode k proved, or None where it is not enclosed."""
     n = len(mass.rest)
     middle = np.diag(stiffness.parts[0])
-    if np.abs(np.delete(middle, k) - middle[k]).min(initial=np.inf) <= CLOSE * middle.max():
-        return None
     rate, shape, moved = series
     N, o = len(rate) - 1, np.delete(np.arange(n), k)
     pencil, x = _Pencil.of(rate, mass, stiffness), [_sizes(part) for part in shape]

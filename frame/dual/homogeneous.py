@@ -128,10 +128,15 @@ def packed(whole: Array, degree: int) -> Array:
     if degree == 0:
         return whole[None]
     d, kept = whole.shape[-1], whole.shape[: whole.ndim - degree]
+    at, count = _in_tensor(d, degree)
+    return np.asarray(np.moveaxis(whole.reshape(*kept, d**degree)[..., at] * count, -1, 0))
+
+
+@cache
+def _in_tensor(d: int, degree: int) -> tuple[Rows, Array]:
+    """Where each monomial stands in a flat tensor first, and how often it stands there."""
     lists = monomials(d, degree)
-    at = np.ravel_multi_index(tuple(lists.T), (d,) * degree)
-    values = whole.reshape(*kept, d**degree)[..., at]
-    return np.asarray(np.moveaxis(values * orders(lists), -1, 0))
+    return np.ravel_multi_index(tuple(lists.T), (d,) * degree), orders(lists)
 
 
 def tensor(coefficients: Array, d: int, degree: int) -> Array:

@@ -28,7 +28,7 @@ HUGE = 1e300
 """Less than this is no value."""
 LOOSE = 0.1
 """Gap that suffices far below the peak, as a share of how far."""
-AT_PEAKS = 20
+AT_PEAKS = 6
 """Multiple of the slabs that nodes are worth whose bounds lie above the peak."""
 FLOORS = 1.0, 0.25
 """Multiples of the remainders' own part below which no effort is made: elsewhere, and there."""

@@ -27,6 +27,8 @@ PIECES = (0.5, 0.25)
 """Shares of an input's range that are tried to be taken away."""
 EFFORTS = (1, 24)
 """Slabs of a bound over what may be taken away."""
+HOPE = 0.3
+"""Share of an even fall of the gap, over the most parts allowed, below which the effort ends."""
 LITTLE = 0.5
 """Shares taken away of all inputs, in sum, below which a part is halved besides."""
 SLABS, STEPS = 240, 40
@@ -55,9 +57,9 @@ class Part:
         return np.asarray(self.problem.out[0])
 
     @property
-    def inputs(self) -> Array:
-        """Coordinates of the whole box that lead to the bounds, shape (J, d)."""
-        return self.whole(self.problem.at)
+    def worst(self) -> float:
+        """The largest of them."""
+        return float(self.bound.max())
 
     def whole(self, unit: Array) -> Array:
         """Coordinates of the whole box for those of the part."""
@@ -71,6 +73,7 @@ class Peak:
     Args:
         expanded: Models of the output at these nodes over a part of the box, named by its ends.
         motion: Exact values at these nodes for unit coordinates (J, d), on the side, shape (J,).
+        inputs: Number of inputs d.
         side: 0 for upper bounds of −output, 1 for those of the output.
         outer: Bounds that are known, shape (J,).
         top: The largest value that is attained.
@@ -79,44 +82,50 @@ class Peak:
 
     expanded: Callable[[Array, Array], Level]
     motion: Callable[[Array], Array]
+    inputs: int
     side: int
     outer: Array
     top: float
     enough: float
 
-    def bounds(self, inputs: int, most: int) -> tuple[Array, Array, Array]:
-        """Bounds and attained values at the nodes, shape (J,), and their coordinates, (J, d).
+    def __post_init__(self) -> None:
+        self.value = np.full(len(self.outer), -np.inf)
+        self.at: Array = np.zeros((len(self.outer), self.inputs))
 
-        Args:
-            inputs: Number of inputs d.
-            most: Most parts that are expanded.
+    def bounds(self, most: int) -> Array:
+        """Bounds at the nodes, shape (J,), from `most` parts at most.
+
+        What is attained there is left in `value`, its unit coordinates in `at`.
         """
-        gone, best = np.full(len(self.outer), -np.inf), np.full(len(self.outer), -np.inf)
-        at: Array = np.zeros((len(self.outer), inputs))
-        ends = [(-np.ones(inputs), np.ones(inputs), self.outer)]
-        parts: list[Part] = []
-        for _ in range(most):
-            part = self._part(*ends.pop())
-            parts.append(part)
-            value = self.motion(part.inputs)
-            better = value > best
-            best[better], at[better] = value[better], part.inputs[better]
-            self.top = max(self.top, float(best.max()))
+        gone: Array = np.full(len(self.outer), -np.inf)
+        ends = [(-np.ones(self.inputs), np.ones(self.inputs), self.outer)]
+        parts, begun = list[Part](), 0.0
+        for count in range(most):
+            parts.append(self._part(*ends.pop()))
             if ends:
                 continue
-            parts.sort(key=lambda part: float(part.bound.max()))
-            if parts[-1].bound.max() <= self.top + self.enough:
+            first = max(parts, key=lambda part: part.worst)
+            gap = first.worst - self.top
+            begun = gap if count == 0 else begun
+            even = (begun - self.enough) * count / most
+            if gap <= self.enough or gap > begun - HOPE * even:
                 break
-            ends, lost = self._shaved(parts.pop())
+            parts.remove(first)
+            ends, lost = self._shaved(first)
             gone = np.maximum(gone, lost)
         left = [part.bound for part in parts] + [bound for _, _, bound in ends]
-        return np.minimum(np.max([gone, *left], axis=0), self.outer), best, at
+        return np.minimum(np.max([gone, *left], axis=0), self.outer)
 
     def _part(self, low: Array, high: Array, known: Array) -> Part:
         """A part expanded, with bounds at nodes whose bounds known are above the peak."""
         part = Part(low, high, *self._problem(self.expanded(low, high)))
         part.problem.out[0] = known
         part.problem.run(np.flatnonzero(known > self.top + self.enough), SLABS, STEPS, 1.0, 0.0)
+        at = part.whole(part.problem.at)
+        value = self.motion(at)
+        better = value > self.value
+        self.value[better], self.at[better] = value[better], at[better]
+        self.top = max(self.top, float(self.value.max()))
         return part
 
     def _problem(self, level: Level) -> tuple[Level, Problem]:

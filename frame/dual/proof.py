@@ -159,14 +159,16 @@ class DualProof:
             peak = Peak(
                 partial(box.part, o, nodes),
                 lambda unit: (-1, 1)[s] * box.attained(unit, nodes, every) - margin[o],
+                unit.shape[-1],
                 s,
                 outer[nodes, o, s],
                 float(top[o, s]),
                 float(enough[o, s]),
             )
-            outer[nodes, o, s], value, at = peak.bounds(unit.shape[-1], PARTS)
-            better = value > inner[nodes, o, s]
-            inner[nodes[better], o, s], unit[nodes[better], o, s] = value[better], at[better]
+            outer[nodes, o, s] = peak.bounds(PARTS)
+            better = peak.value > inner[nodes, o, s]
+            inner[nodes[better], o, s] = peak.value[better]
+            unit[nodes[better], o, s] = peak.at[better]
 
         wide = np.argwhere(outer.max(0) > top + enough)
         with ThreadPoolExecutor(workers) as pool:

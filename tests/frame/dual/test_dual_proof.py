@@ -5,8 +5,9 @@ import pytest
 
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dual import dual_function as kernel
-from alphacut.frame.dual.level import Level, Problem
-from alphacut.frame.dual.proof import DualProof, over_box, sources
+from alphacut.frame.dual.box import Box
+from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.methods.proof import Proof
@@ -187,9 +188,8 @@ def test_motions_between_nodes_stay_within_what_is_stated(case):
 def level_of(model, fuzzy, time):
     """The widest level and its box."""
     cut = np.array([number.cut(0) for number in fuzzy.values()])
-    centre, radius = cut.mean(1), np.diff(cut)[:, 0] / 2
-    structure = over_box(model, tuple(fuzzy), centre, radius, np.arange(len(centre)))
-    return Level.of(structure, model.ground, time, sources(model, structure)), centre, radius
+    level = Box(model, tuple(fuzzy), time, *cut.T).level()
+    return level, cut.mean(1), np.diff(cut)[:, 0] / 2
 
 
 def test_any_multipliers_bound_any_motion():

@@ -8,12 +8,12 @@ from scipy.linalg import eigh
 
 from alphacut.frame import StoreyFrame
 from alphacut.frame.dual import dual_function, homogeneous
+from alphacut.frame.dual.box import over_box
 from alphacut.frame.dual.eigenpairs import modes
 from alphacut.frame.dual.expansion import Expansion
 from alphacut.frame.dual.homogeneous import Series, packed, tensor
 from alphacut.frame.dual.intervening import inverse, oscillators
 from alphacut.frame.dual.level import Level, Problem
-from alphacut.frame.dual.proof import over_box
 from alphacut.frame.dual.structure import classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import Accelerogram
@@ -125,7 +125,13 @@ def frame(storeys=4, width=0.05, **values):
     names = tuple(f"{kind}{z + 1}" for kind in "km" for z in range(storeys))
     centre = np.array([own.parameters[name] for name in names])
     radius = width * centre
-    return own, names, centre, radius, over_box(own, names, centre, radius, np.arange(len(names)))
+    return own, names, centre, radius, over_box(own, names, centre - radius, centre + radius)
+
+
+def along(own, names, centre, radius, i):
+    """The structure where input i alone varies."""
+    only = radius * (np.arange(len(names)) == i)
+    return over_box(own, names, centre - only, centre + only)
 
 
 def exact_modes(own, names, centre, radius, u):
@@ -162,7 +168,7 @@ def test_eigenpairs_stay_within_their_remainders():
 def test_half_of_a_remainder_of_eigenpairs_would_not_do():
     own, names, centre, radius, _ = frame(2, 0.1)
     for i, entries in ((0, {"squared": 0, "shape": 1, "norm": 0}), (2, {"moved": 0})):
-        found, u = modes(over_box(own, names, centre, radius, np.array([i]))), np.array([-1.0, 1])
+        found, u = modes(along(own, names, centre, radius, i)), np.array([-1.0, 1])
         ends = exact_modes(own, names, centre, radius, u[:, None] * np.eye(4)[i])
         off = {name: [] for name in entries}
         for at, M, (squared, shapes) in zip(u, found.mass.at(u[:, None]), ends, strict=True):
@@ -231,7 +237,7 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
 
 def test_half_of_the_cubic_part_would_not_do():
     own, names, centre, radius, _ = frame(1, 0.1)
-    structure = over_box(own, names, centre, radius, np.array([1]))
+    structure = along(own, names, centre, radius, 1)
     data = Problem.of(
         Level.of(structure, None, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0
     ).data
