@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import envelope
+from alphacut.frame.dual import parts
 from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.parts import Peak
@@ -68,25 +69,49 @@ def peak_of(box, enough):
     return peak, nodes
 
 
-def test_what_is_taken_away_is_bounded(box):
-    peak, nodes = peak_of(box, 0.02)
+@pytest.mark.parametrize("little", [0.0, 99.0])
+def test_what_is_taken_away_is_bounded(box, monkeypatch, little):
+    monkeypatch.setattr(parts, "LITTLE", little)
+    peak, nodes = peak_of(box, 0.05)
     part = peak._part(-np.ones(7), np.ones(7), peak.outer)
+    tried, of_piece = [], peak._of_piece
+
+    def noted(_, whole, piece, slabs):
+        tried.append((*piece, of_piece(whole, piece, slabs)))
+        return tried[-1][-1]
+
+    monkeypatch.setattr(Peak, "_of_piece", noted)
     ends, lost = peak._shaved(part)
+    away = [one for one in tried if one[-1].max() <= peak.top + peak.enough]
+    assert len(away) > 2
+    assert (lost == np.max([bound for _, _, bound in away], axis=0)).all()
     values, unit = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(1), 4000)
-    held = [((low <= unit) & (unit <= high)).all(1) for low, high, _ in ends]
-    gone = ~np.any(held, axis=0)
-    assert gone.sum() > 100
-    assert (values[gone][:, nodes, 0].max(0) <= lost + 1e-12).all()
-    assert lost.max() <= peak.top + peak.enough
+    left = np.any([within(unit, low, high) for low, high, _ in ends], axis=0)
+    for low, high, bound in away:
+        inside = within(unit, low, high)
+        most = values[inside][:, nodes, 0].max(0)
+        assert (most <= bound + 1e-12).all()
+        left |= inside
+    assert left.all()
 
 
-def test_bounds_keep_what_is_taken_away_and_what_is_left(box, monkeypatch):
-    peak, nodes = peak_of(box, 1e-3)
+def within(unit, low, high):
+    """Which points lie in a part."""
+    return ((low <= unit) & (unit <= high)).all(1)
+
+
+@pytest.mark.parametrize("little", [0.0, 99.0])
+def test_bounds_keep_what_is_taken_away_and_what_is_left(box, monkeypatch, little):
+    monkeypatch.setattr(parts, "LITTLE", little)  # never halved, or always
+    monkeypatch.setattr(parts, "HOPE", -99.0)
+    monkeypatch.setattr(parts, "SLABS", 1)
+    monkeypatch.setattr(parts, "STEPS", 3)
+    peak, nodes = peak_of(box, 0.01)
     losts, shaved = [], peak._shaved
     monkeypatch.setattr(
         Peak, "_shaved", lambda _, part: losts.append((out := shaved(part))[1]) or out
     )
-    bounds = peak.bounds(6)
+    bounds = peak.bounds(12)
     values, _ = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(2), 2000)
     assert len(losts) > 1
     assert (bounds >= np.max(losts, axis=0)).all()
