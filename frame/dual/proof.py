@@ -15,7 +15,7 @@ one of inputs (`kernel`, `level`).
 4. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
 (`parts`).
 5. What the maxima name leads to inputs whose exact motion is the other end of the gap
-   (`attained`).
+   (`box`).
 """
 
 from __future__ import annotations
