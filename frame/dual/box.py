@@ -12,7 +12,7 @@ import numpy as np
 from alphacut.frame.dual.expansion import Expansion
 from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
-from alphacut.frame.dual.waves import phases_of, step_integrals
+from alphacut.frame.dual.waves import ALONE, phases_of, step_integrals
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.fuzzy.arrays import Array, Rows
 
@@ -131,7 +131,8 @@ def _load(system: LinearSystem, sigma: Array, node: Rows, time: Array) -> Array:
     assert system.ground is not None
     left, right, last, phases, which = phases_of(system.ground, time)
     out = np.empty(sigma.shape, complex)
-    _march(sigma, left, right, system.ground.step, phases[which][node], last[node], out)
+    with ALONE:
+        _march(sigma, left, right, system.ground.step, phases[which][node], last[node], out)
     return out
 
 

@@ -146,10 +146,10 @@ class DualProof:
         return _Bounded(outer, inner, points, level.stray(), len(level.single))
 
     def _parted(
-        self, box: Box, found: tuple[Array, Array, Array], margin: Array, workers: int
+        self, box: Box, bounds: tuple[Array, Array, Array], margin: Array, workers: int
     ) -> None:
         """Improve bounds (outer, inner, unit) above peaks whose gap is too wide, over parts."""
-        outer, inner, unit = found
+        outer, inner, unit = bounds
         top = np.maximum(inner.max(0), 0.0)  # (m, 2)
         enough = np.broadcast_to(self.peaks * top.max(1, keepdims=True), top.shape)
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb, perm
+from threading import Lock
 
 import numba
 import numpy as np
@@ -29,6 +30,8 @@ from alphacut.fuzzy.arrays import Array, Rows
 TERMS = 40
 """Terms of a power series in σ h; at |σ h| ≤ `LONGEST` they leave less than round-off."""
 LONGEST = 6.0
+ALONE = Lock()
+"""Held by the one thread that is in a parallel loop of Numba, which not all its layers share."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +213,8 @@ def loaded(sigma: Array, ground: Accelerogram, time: Array) -> Array:
     """ρ(σ; t) and its two derivatives by σ at nodes, shape (3, T, S)."""
     left, right, last, phases, which = phases_of(ground, time)
     out = np.empty((3, len(time), len(sigma)), complex)
-    _march(sigma, left, right, ground.step, phases, which, last, out)
+    with ALONE:
+        _march(sigma, left, right, ground.step, phases, which, last, out)
     return out
 
 
