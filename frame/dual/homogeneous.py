@@ -134,7 +134,7 @@ def packed(whole: Array, degree: int) -> Array:
 
 @cache
 def _in_tensor(d: int, degree: int) -> tuple[Rows, Array]:
-    """Where each monomial stands in a flat tensor first, and how often it stands there."""
+    """First places of all monomials in a flat tensor, and how often they stand there."""
     lists = monomials(d, degree)
     return np.ravel_multi_index(tuple(lists.T), (d,) * degree), orders(lists)
 

@@ -143,7 +143,7 @@ class Peak:
         return np.asarray(problem.out[0])
 
     def _shaved(self, part: Part) -> tuple[list[tuple[Array, Array, Array]], Array]:
-        """What is left of a part, by its ends and the bounds known, and bounds of what is not."""
+        """Boxes left of a part with the bounds known, and bounds over all that is taken away."""
         u = part.problem.at[part.problem.out[1].argmax()]
         low, high, lost = -np.ones_like(u), np.ones_like(u), np.full(len(self.outer), -np.inf)
         nearest = np.full(len(u), np.inf)
@@ -162,9 +162,12 @@ class Peak:
                         (low if u[i] > 0 else high)[i] = end
         boxes = [(low, high)]
         if (2 - (high - low)).sum() / 2 < LITTLE:
-            nearest[high - low < 2] = np.inf
-            i = int(nearest.argmin())
-            upper, lower = low.copy(), high.copy()
-            upper[i] = lower[i] = (low[i] + high[i]) / 2
-            boxes = [(low, lower), (upper, high)]
+            boxes = _halves(low, high, int(np.where(high - low < 2, np.inf, nearest).argmin()))
         return [(part.whole(a), part.whole(b), part.bound) for a, b in boxes], lost
+
+
+def _halves(low: Array, high: Array, i: int) -> list[tuple[Array, Array]]:
+    """Both halves of a box along input i."""
+    upper, lower = low.copy(), high.copy()
+    upper[i] = lower[i] = (low[i] + high[i]) / 2
+    return [(low, lower), (upper, high)]
