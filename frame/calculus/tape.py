@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 Tape = tuple[Rows, Rows, Array]
 """Operations (L, 3), places of the results (m,), and the places themselves.
 
-An operation has a number and the places of two operands. Places hold arguments, numbers, and the
-result of each operation, in this order.
+An operation has a number and the places of two operands. Places hold arguments, the result of each
+operation, and numbers, these counted from the end: the first is at −1.
 """
 BINARY = ("add", "multiply", "power")
 UNARY = ("reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log")
@@ -57,26 +57,18 @@ class _Writer:
         self.arguments = len(arguments)
 
     def tape(self, expressions: Sequence[Expr]) -> Tape:
-        """The tape; places below 0 are those of numbers until all are known."""
-        results = [self.place(e) for e in expressions]
-        count = len(self.numbers)
-        begin = self.arguments + count
-
-        def final(place: int) -> int:
-            if place < 0:
-                return self.arguments - 1 - place
-            return place + count if place >= self.arguments else place
-
-        rows = [(number, final(x), final(y)) for number, x, y in self.code]
-        places = np.zeros(begin + len(rows))
-        places[self.arguments : begin] = list(self.numbers)
-        code = np.array(rows, np.int64).reshape(-1, 3)
-        return code, np.array([final(x) for x in results], np.int64), places
+        """The tape."""
+        results = np.array([self.place(e) for e in expressions], np.int64)
+        code = np.array(self.code, np.int64).reshape(-1, 3)
+        places = np.zeros(self.arguments + len(code) + len(self.numbers))
+        places[self.arguments + len(code) :] = [*self.numbers][::-1]
+        return code, results, places
 
     def place(self, e: Expr) -> int:
         """Place of an expression."""
         if e not in self.places:
-            self.places[e] = self._number(float(e)) if e.is_number else self._write(e)
+            number = e.is_number and self.numbers.setdefault(float(e), len(self.numbers))
+            self.places[e] = -1 - number if e.is_number else self._write(e)
         return self.places[e]
 
     def _write(self, e: Expr) -> int:
@@ -107,6 +99,3 @@ class _Writer:
             self.code.append(row)
             self.made[row] = self.arguments + len(self.code) - 1
         return self.made[row]
-
-    def _number(self, value: float) -> int:
-        return -1 - self.numbers.setdefault(value, len(self.numbers))

@@ -45,7 +45,7 @@ def certify(
     *,
     gap: float,
     model_error: Array,
-    scale: Array | None = None,
+    scale: Array,
     workers: int = 1,
     budget: float = 4000,
     progress: Progress | None = None,
@@ -57,7 +57,7 @@ def certify(
         gap: Wanted difference between proved and attained bound, in units of the reference output.
         model_error: Bound of the difference between the modal model and the trajectories, shape (T,
             m).
-        scale: Factor on the gap for each output, shape (m,); ones if not given.
+        scale: Factor on the gap for each output, shape (m,).
         workers: Threads.
         budget: Most boxes per bound on average.
         progress: Called with the fraction done.
@@ -65,7 +65,6 @@ def certify(
     Raises:
         ValueError: The model error alone exceeds the gap.
     """
-    scale = np.ones(len(model.outputs)) if scale is None else scale
     model, unit, error = model.in_units(scale), scale[:, None], model_error / scale
     rounding = Remainder(model, *model.boxes.unit(0)).margin[..., 0]
     # so that rounding does not lift the gap above what was asked for

@@ -101,20 +101,15 @@ class RatioDamping:
 
     @classmethod
     def of(cls, model: ModalModel) -> Self | None:
-        """Damping of a model by its ratio; None without one.
-
-        Raises:
-            UnprovedError: Modes have ratios of their own.
-        """
+        """Damping of a model by its ratio; None without one."""
         ratio = dependence.common_ratio(model.flow.system)
         if ratio is None:
             return None
-        value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else float(ratio)
+        value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else ratio
+        own: tuple[float | int, float] = float(value), float(value)
         if ratio in model.flow.names:
             place = model.flow.names.index(str(ratio))
-            own: tuple[float | int, float] = place, float(model.boxes.upper[0, place])
-        else:
-            own = float(value), float(value)
+            own = place, float(model.boxes.upper[0, place])
         unit = fit_points(len(model.boxes.names), model.degree)
         rate = analyse(model.flow, model.boxes, unit, model.chosen).eigenvalue
         real, imaginary = rate.map(np.real), rate.map(np.imag)
@@ -153,15 +148,8 @@ class RatioDamping:
         system, boxes = self.model.flow.system, self.model.boxes
         roots = np.full(len(self.model.outputs), np.inf)
         for place, floor in dependence.accelerations(system).items():
-            name = f"m{floor + 1}"
-            least = system.parameters.get(name, np.nan)
-            if name in boxes.names:
-                least = float(boxes.lower[0, boxes.names.index(name)])
-            roots[place] = np.sqrt(least)
-        if not (roots > 0).all():
-            raise dependence.UnprovedError(
-                "the masses of accelerated floors are not known one by one"
-            )
+            name, fuzzy = f"m{floor + 1}", dict(zip(boxes.names, boxes.lower[0], strict=True))
+            roots[place] = np.sqrt(fuzzy.get(name, system.parameters[name]))
         return roots
 
     def missed(

@@ -53,9 +53,8 @@ def evaluate(tape: Tape, arguments: Array, out: Array) -> None:
     code, results, place = tape
     for k in range(len(arguments)):
         place[k] = arguments[k]
-    begin = len(place) - len(code)
     for k in range(len(code)):
-        place[begin + k] = operation(code[k, 0], place[code[k, 1]], place[code[k, 2]])
+        place[len(arguments) + k] = operation(code[k, 0], place[code[k, 1]], place[code[k, 2]])
     for k in range(len(results)):
         out[k] = place[results[k]]
 

@@ -74,7 +74,7 @@ def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> No
     flow = LinearFlow(frame, ("E",), 3.7 * 20 / 20, 3.7, Exact())
     model = fit_modes(flow, boxes({"E": Interval(0.9e-6 / 24, 1e-6 / 24)}, (0,)), tolerance=1e-9)
     values = model.values(np.zeros((1, 1)))[0]
-    proof = certify(model, gap=1e-2, model_error=np.zeros(values.shape))
+    proof = certify(model, gap=1e-2, model_error=np.zeros(values.shape), scale=np.ones(1))
     fine = LinearFlow(frame, ("E",), 3.7, 3.7 / 200, Exact()).values(np.array([[1e-6 / 24]]))[0]
     line = np.linspace(fine[0], fine[-1], len(fine))
     assert 1 <= proof.between[1, 0] / np.abs(fine - line).max() <= 1.8
