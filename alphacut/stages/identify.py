@@ -9,7 +9,6 @@ from alphacut.case.structure import Structure
 from alphacut.frame.identify import (
     Identified,
     MeasuredMode,
-    Prediction,
     RefutedError,
     measured_mode,
 )
@@ -17,6 +16,7 @@ from alphacut.frame.identify import identify as identified
 from alphacut.frame.identify.identify import widest
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Ends
 from alphacut.io.files import Document
 from alphacut.io.measured import ModeRows, mode_rows
 
@@ -45,7 +45,8 @@ def learned(
         after = identified(structure.frame, prior, used, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
-    predicted = [_predicted(rows[x.mode], x) for x in after.predictions() if x.mode in held]
+    known = sorted(mode for mode in held if mode <= structure.frame.floors)
+    predicted = [_predicted(rows[mode], after.predictions()) for mode in known]
     document = {**_document(after), "held_out": predicted}
     document["prior"] = {name: list(widest(number)) for name, number in prior.items()}
     return document, replace(structure, numbers={**structure.numbers, **after.numbers})
@@ -74,8 +75,8 @@ def _document(after: Identified) -> Document:
     }
 
 
-def _predicted(row: ModeRows, prediction: Prediction) -> Document:
-    low, high = float(prediction.lower[0]), float(prediction.upper[0])
+def _predicted(row: ModeRows, every: Ends) -> Document:
+    low, high = (float(ends[0, row.mode - 1]) for ends in every)
     measured = float(row.frequencies.mean())
     inside = low <= measured <= high
     return {"mode": row.mode, "measured": measured, "predicted": [low, high], "inside": inside}

@@ -71,8 +71,7 @@ def tall_rows() -> list[dict[str, object]]:
     try:
         result = identify(frame, prior, tall_modes((1, 2)), alpha=(0.05,))
         two = "agree"
-        third = result.predictions()[2]
-        low, high = float(third.lower[0]), float(third.upper[0])
+        low, high = (float(ends[0, 2]) for ends in result.predictions())
     except RefutedError:
         two = "refuted"
     try:

@@ -22,6 +22,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
+from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
@@ -72,21 +73,6 @@ class Evidence:
 def widest(number: FuzzyNumber) -> Cut:
     """The widest cut that a number decides."""
     return number.cut(number.decided) if isinstance(number, Claimed) else number.support
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """Natural frequency of one mode over the identified parameters.
-
-    Args:
-        mode: Its number by rising frequency, from 1.
-        lower: Least frequency at each level, proved, shape (A,), in Hz.
-        upper: Greatest frequency.
-    """
-
-    mode: int
-    lower: Array
-    upper: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,13 +132,13 @@ class Identified:
         widths = np.array([of.cut(of.prior[name], level).width for name in self.names])
         return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
 
-    def predictions(self) -> tuple[Prediction, ...]:
-        """Natural frequencies of all modes, measured or not, at each level."""
+    def predictions(self) -> Ends:
+        """Proved ends of the natural frequencies of all n modes, measured or not, (A, n), in Hz."""
         chain = self.evidence.chain
         logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
         ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
-        hertz = np.sqrt(np.maximum(np.array(ranges), 0.0)) / (2 * np.pi)  # (A, 2, n)
-        return tuple(Prediction(k + 1, *each) for k, each in enumerate(hertz.transpose(2, 1, 0)))
+        lower, upper = np.sqrt(np.maximum(np.array(ranges), 0.0)).swapaxes(0, 1) / (2 * np.pi)
+        return Ends(lower, upper)
 
 
 def identify(

@@ -15,6 +15,7 @@ from alphacut.frame.calculus.polynomial import Polynomial, fit
 from alphacut.frame.modal.fitting import analyse, fit_points
 from alphacut.frame.modal.ground_response import LoadTables
 from alphacut.frame.modal.model import ModalModel
+from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.modes import Modes
 from alphacut.fuzzy.arrays import Array, Rows
 
@@ -48,7 +49,8 @@ class ExactResponse:
             ModalError: Under a record, a mode does not oscillate.
         """
         flow, cuts, load = model.flow, model.boxes, model.load
-        if flow.system.ground is not None and len(model.chosen) < model.modes:
+        size = len(frequencies(flow.system))
+        if flow.system.ground is not None and len(model.chosen) < size:
             points = fit_points(len(cuts.names), 2)
             rate = fit(points, analyse(flow, cuts, points).eigenvalue, 2)
             nothing = Polynomial(rate.index, np.zeros_like(rate.coefficients))

@@ -142,7 +142,7 @@ def _fitted(
     if ground is not None:
         load = LoadTables(ground, flow.time, rate, forced)
     nothing = np.zeros((len(flow.time), len(flow.outputs)))
-    return ModalModel(flow, boxes, rate, free, load, chosen, own.of, nothing, 0)
+    return ModalModel(flow, boxes, rate, free, load, chosen, nothing, 0)
 
 
 def _shares(points: Array, own: Modes, degree: int) -> tuple[Polynomial, Polynomial]:
@@ -199,7 +199,7 @@ def analyse(
     if not order:
         return own
     rate, start, kick = map(boxes.in_unit, (own.eigenvalue, own.coefficient, own.load))
-    return Modes(rate, start, kick, own.of)
+    return Modes(rate, start, kick)
 
 
 def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:

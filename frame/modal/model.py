@@ -38,7 +38,6 @@ class ModalModel:
         coefficient: C_k, n m polynomials.
         load: Response to the ground's motion, or None.
         chosen: Which modes it has, by rising |λ|, shape (n,).
-        modes: How many the structure has.
         error: Largest deviation of held-out trajectories, shape (T, m).
         analyses: Eigen-analyses made.
     """
@@ -49,7 +48,6 @@ class ModalModel:
     coefficient: Polynomial
     load: LoadTables | None
     chosen: Array
-    modes: int
     error: Array
     analyses: int
     secant: ClassVar[bool] = False

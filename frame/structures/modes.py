@@ -37,13 +37,11 @@ class Modes:
         eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
         coefficient: C_k, what the initial state puts into the outputs, V = (S, n, m).
         load: The same for a unit impulse of the ground's acceleration, V = (S, n, m).
-        of: How many the structure has.
     """
 
     eigenvalue: Jet
     coefficient: Jet
     load: Jet
-    of: int
 
 
 def joined(parts: Sequence[Modes]) -> Modes:
@@ -52,7 +50,6 @@ def joined(parts: Sequence[Modes]) -> Modes:
         concatenate([part.eigenvalue for part in parts], -2),
         concatenate([part.coefficient for part in parts], -3),
         concatenate([part.load for part in parts], -3),
-        parts[0].of,
     )
 
 
@@ -82,7 +79,7 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
         share = (Y @ excitation)[..., some, 0][..., None, :]
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
-    return Modes(values, through(matrices.start), through(matrices.kick), len(matrices.rigid))
+    return Modes(values, through(matrices.start), through(matrices.kick))
 
 
 def require_single(matrices: Matrices, chosen: Array) -> None:
