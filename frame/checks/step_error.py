@@ -17,31 +17,24 @@ CORNERS = 16
 OPTIMA = 64
 """Points at which bounds are reached that are looked at besides, at most."""
 MARGIN = 1.5
-"""Factor on the largest error at these, since other points of the box may exceed it."""
+"""Factor on the largest error or stray at these, since other points of the box may exceed it."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
 AT_ONCE = 16
 """Trajectories that are held at once."""
-SAFETY = 1.5
-"""Factor on the largest stray of the trajectories looked at."""
 FLOOR = 0.1
 """Least stray of a step, as a share of the largest of all steps."""
 
 
 def probes(cuts: Boxes) -> Array:
     """The modal parameters and corners of the widest box, shape (S, d), in SI units."""
-    points: Array = np.unique(
-        np.vstack([cuts.modal, cuts.to_physical(signs(len(cuts.names), CORNERS))]), axis=0
-    )
-    return points
-
-
-def signs(d: int, most: int) -> Array:
-    """All corners of [−1, 1]^d, or `most` of them, two opposite ones among them, shape (S, d)."""
-    if 2**d <= most:
-        return corners(-np.ones(d), np.ones(d))
-    drawn = np.random.default_rng(7).choice([-1.0, 1.0], (most - 2, d))
-    return np.vstack([-np.ones(d), np.ones(d), drawn])
+    d = len(cuts.names)
+    if 2**d <= CORNERS:
+        ends = corners(-np.ones(d), np.ones(d))
+    else:  # some, two opposite ones among them
+        drawn = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
+        ends = np.vstack([-np.ones(d), np.ones(d), drawn])
+    return np.asarray(np.unique(np.vstack([cuts.modal, cuts.to_physical(ends)]), axis=0))
 
 
 def step_error(flow: UnitFlow) -> Array:
@@ -121,7 +114,7 @@ def stray(flow: Flow, points: Array) -> Array:
     # where the trajectories looked at are straight, others are not
     near = [np.roll(off, k, 0) for k in (-1, 0, 1)]
     near.append(np.broadcast_to(FLOOR * off.max(0), off.shape))
-    return np.concatenate([np.zeros((1, off.shape[1])), SAFETY * np.max(near, 0)])
+    return np.concatenate([np.zeros((1, off.shape[1])), MARGIN * np.max(near, 0)])
 
 
 def _off(flow: Flow, points: Array) -> Array:

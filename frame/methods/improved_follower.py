@@ -36,6 +36,8 @@ TRIES = 40
 """Proposals looked at per window of time."""
 SPACING = 0.02
 """Distance in unit coordinates between graphs of one batch."""
+SPREAD = 64
+"""Graphs on a spread of points per level that start the search."""
 APART = 100_003
 """Points of the sequence between those that two seeds spread."""
 
@@ -47,7 +49,6 @@ class ImprovedFollower:
     Args:
         tolerance: Predicted gain above which a new graph is computed, in units of the outputs.
         budget: Most graphs over all levels.
-        spread: Graphs on a spread of points per level that start the search.
         seed: Which points are spread.
 
     Raises:
@@ -57,13 +58,11 @@ class ImprovedFollower:
     name: ClassVar[str] = "improved-graph-follower"
     tolerance: float = 7e-5
     budget: int = 5000
-    spread: int = 64
     seed: int = 0
 
     def __post_init__(self) -> None:
         real("tolerance", self.tolerance, positive=True)
         real("budget", self.budget, whole=True, least=1)
-        real("spread", self.spread, whole=True, least=1)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of two passes from different points, corrected by what their models promise.
@@ -129,7 +128,7 @@ class ImprovedFollower:
             return modal[: 0 if len(storage) else 1]
         middle, half = (lower + upper) / 2, (upper - lower) / 2
         skip = 1 + len(storage) + APART * self.seed
-        spread = chebyshev_points(len(lower), self.spread, skip=skip)
+        spread = chebyshev_points(len(lower), SPREAD, skip=skip)
         return np.vstack([modal, middle + half * spread])
 
 

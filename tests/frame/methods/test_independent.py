@@ -9,7 +9,7 @@ from alphacut.frame.methods import graph_follower, improved_follower
 from alphacut.frame.methods.independent import beyond
 from alphacut.fuzzy import Interval, Nature
 
-METHODS = {graph_follower: GraphFollower(), improved_follower: ImprovedFollower(spread=8)}
+METHODS = {graph_follower: GraphFollower(), improved_follower: ImprovedFollower()}
 
 
 @pytest.mark.parametrize("module", METHODS)
