@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from alphacut.case.content import Content
 from alphacut.case.keys import every_key, sections
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.problem import BadInput, Problem, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
@@ -57,8 +57,7 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 
     Args:
         path: TOML file.
-        changes: ``KEY=VALUE`` each; the key in full (``cell.matrix_modulus``) or alone where that
-            is clear.
+        changes: ``KEY=VALUE`` each, as ``cell.matrix_modulus=20 GPa``.
 
     Raises:
         BadInput: With every problem of the case.
@@ -188,41 +187,22 @@ def _opened(rest: str) -> str:
 
 
 def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
-    """Puts every change into the table of a case; returns the keys' full names.
+    """Puts every change into the table of a case; returns the keys.
 
     Raises:
         RefusedError: A key is unknown, or changed twice.
     """
-    names: list[str] = []
-    for change in changes:
-        name, equals, value = change.partition("=")
-        full = _full_name(name.strip().replace("-", "_"), table) if equals else ""
-        if not full or full in names:
-            allowed = "KEY=VALUE, each key once, as cell.matrix_modulus='20 GPa'"
-            raise RefusedError("--set", change, allowed)
-        _put(table, full, _value(value.strip()))
-        names.append(full)
-    return tuple(names)
-
-
-def _full_name(name: str, table: dict[str, object]) -> str:
-    """The one key of a name: of several, the one that the case has already."""
     known = [key for key in every_key() if not key.startswith("study.")]
-    full = [name] if name in known else [key for key in known if key.rpartition(".")[2] == name]
-    if len(full) > 1:
-        full = [key for key in full if _has(table, key)]
-    if len(full) != 1:
-        near = suggestion(name, [x.rpartition(".")[2] for x in known]) or suggestion(name, known)
-        raise RefusedError("--set", name, "the full name of a key", near)
-    return full[0]
-
-
-def _has(table: object, key: str) -> bool:
-    for name in key.split("."):
-        if not isinstance(table, dict) or name not in table:
-            return False
-        table = table[name]
-    return True
+    keys: list[str] = []
+    for change in changes:
+        key, _, value = (part.strip() for part in change.partition("="))
+        alike = (f"did you mean {full}?" for full in known if full.endswith(f".{key}"))
+        cure = next(alike, suggestion(key, known))
+        allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
+        require(key in known and key not in keys, "--set", change, allowed, cure)
+        _put(table, key, _value(value))
+        keys.append(key)
+    return tuple(keys)
 
 
 def _put(table: object, key: str, value: object) -> None:

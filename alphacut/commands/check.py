@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import asdict
 from math import pi
 from typing import TextIO
 
@@ -15,7 +14,6 @@ from alphacut.commands.options import Command, add_common, answer, read
 from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
-from alphacut.io.problem import BadInput
 from alphacut.io.quantity import engineering
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
@@ -25,19 +23,12 @@ Row = tuple[str, str, str]
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Checks and reports; with ``--json`` the problems as data."""
-    try:
-        content = read(options).content
-    except BadInput as error:
-        problems = [asdict(problem) for problem in error.problems]
-        answer(options, {"case": options.case, "ok": False, "problems": problems}, out)
-        raise
+    """Checks and reports."""
+    content = read(options).content
     rows, linear = list(rows_of("", content)), structure(content)
     period = 2 * pi / float(frequencies(linear)[0]) if linear else None
     document = {
         "case": options.case,
-        "ok": True,
-        "problems": [],
         "stages": list(content.stages),
         "period_s": period,
         "inputs": [dict(zip(("key", "value", "kind"), row, strict=True)) for row in rows],

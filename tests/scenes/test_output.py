@@ -13,12 +13,16 @@ from scipy.signal import lsim
 from tests.alphacut.small import SMALLER, written
 
 ROOT = Path(__file__).parents[2]
-SHORT = ("duration=4 s", "step=0.02 s", "envelope.alpha=[0, 0.5, 1]")
+SHORT = ("envelope.duration=4 s", "envelope.step=0.02 s", "envelope.alpha=[0, 0.5, 1]")
 COARSE = {  # case: most lines, changes of its text, changes of its keys
     "paper": (20, SMALLER, ()),
-    "building": (25, {}, (*SHORT, "envelope.tolerance=2 mm", "samples=40")),
-    "composite": (25, {}, ("duration=1 s", "envelope.step=0.02 s", "modulus.alpha=[0, 0.5, 1]")),
-    "laboratory-frame": (25, {}, ("duration=2 s",)),
+    "building": (25, {}, (*SHORT, "envelope.tolerance=2 mm", "probability.samples=40")),
+    "composite": (
+        25,
+        {},
+        ("envelope.duration=1 s", "envelope.step=0.02 s", "modulus.alpha=[0, 0.5, 1]"),
+    ),
+    "laboratory-frame": (25, {}, ("envelope.duration=2 s",)),
 }
 
 

@@ -76,7 +76,8 @@ def test_fingerprints_see_every_input(tmp_path):
         (task,) = envelope.tasks(content.envelope, ())
         return envelope.stage(content.frame.structure(), task).key
 
-    changes = ("lengths=3.1 m", "masses=[9, 10, 12] t", "alpha=0,1", "step=0.01 s", "gain=0.1")
+    changes = ("frame.lengths=3.1 m", "frame.masses=[9, 10, 12] t")
+    changes += ("envelope.alpha=0,1", "envelope.step=0.01 s", "envelope.gain=0.1")
     assert len({key(), *map(key, changes)}) == 1 + len(changes)
     assert key() == key("title=other")
 
