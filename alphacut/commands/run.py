@@ -53,6 +53,8 @@ def computed(
 ) -> Document:
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
+    for old in folder.glob("samples.db*") if store.fresh else ():
+        old.unlink()
     with pool(store.workers) as executor:
         results = Chain(Results(case.content), store, petsc, figures, executor).run()
         names = drawn(results, store, executor) if figures else []

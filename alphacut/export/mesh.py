@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import meshio
     from pyvista import PolyData, UnstructuredGrid
 
-    from alphacut.rve.prism.fields import CellFields
-
 # From Basix's order of a wedge's edges to that of meshio, Abaqus and Gmsh: lower triangle, upper
 # triangle, vertical edges; from there to VTK's, the lower triangle seen from outside.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
@@ -99,18 +97,13 @@ def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:
 
     model = PrismModel(size, layers, outline=cell.outline)
     fields = prism.cell_fields(model, cell.radius, cell.matrix, cell.inclusion)
-    return wedges(fields.points, fields.cells, fields.phase, point_data(fields))
-
-
-def point_data(fields: CellFields) -> dict[str, Array]:
-    """Fields of both loads by name."""
     data = {}
     for load in range(len(LOADS)):
         flat = np.pad(fields.displacement[..., load], ((0, 0), (0, 1)))
         data[f"displacement_{load + 1}_in_half_sides"] = flat
         for row, name in enumerate(COMPONENTS):
             data[f"stress_{load + 1}_{name}_Pa"] = fields.stress[:, row, load]
-    return data
+    return wedges(fields.points, fields.cells, fields.phase, data)
 
 
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:

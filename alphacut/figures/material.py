@@ -11,6 +11,7 @@ from alphacut.case.material import RadiusMap
 from alphacut.case.structure import Frame
 from alphacut.figures import style as look
 from alphacut.fuzzy.arrays import Array
+from alphacut.io.netcdf import document_of
 from alphacut.stages.cell import GPA
 from alphacut.stochastic import HermiteMap
 
@@ -155,7 +156,8 @@ def fuzzy_modulus(dataset: xarray.Dataset, frame: Frame | None) -> Figure:
         axes.plot(look.outline(*cuts.T), [0, 1, 1, 0], **line)
         axes.plot([], [], color=look.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
-    look.membership_axes(axes, f"effective Young's modulus E, {dataset.attrs['average']} (GPa)")
+    average = document_of(dataset)["average"]
+    look.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
     look.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
     look.membership_axes(below, "effective Poisson's ratio ν of the same")
     return drawn

@@ -177,14 +177,11 @@ def fibres(result: Homogenised) -> Document:
     """Constants of fibres with their declared errors, moduli in GPa; none of other particles."""
     if isinstance(result, HomogenisedSpheres) or result.cell is None or not result.cell.square:
         return {}
-    constants = fibre_constants(result)
-    return {
-        name if name == "nu_LT" else f"{name}_GPa": {
-            "value": value / (1 if name == "nu_LT" else GPA),
-            "error": constants.errors[name] / (1 if name == "nu_LT" else GPA),
-        }
-        for name, value in constants.values.items()
-    }
+    constants, fibres = fibre_constants(result), {}
+    for name, value in constants.values.items():
+        key, unit = (name, 1.0) if name == "nu_LT" else (f"{name}_GPa", GPA)
+        fibres[key] = {"value": value / unit, "error": constants.errors[name] / unit}
+    return fibres
 
 
 def declared_errors(result: Homogenised) -> Document | None:

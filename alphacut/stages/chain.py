@@ -94,8 +94,7 @@ class Chain:
             results.image = self.store.take(stage)
             return
         results.modulus = data = self.store.take(modulus.stage(self.campaign))
-        cell.require_tolerance(modulus.errors_of(data), section.tolerance)
-        results.references = cell.references(*self.content.round_cell)
+        cell.require_tolerance(document_of(data)["error"], section.tolerance)
 
     def structure(self, number: FuzzyNumber | None) -> Structure:
         """The structure with a modulus in Pa, None for its own."""

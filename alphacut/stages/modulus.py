@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -21,7 +20,16 @@ from alphacut.io.files import Document, as_json
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
-from alphacut.stages.cell import GPA, Solve, cell_at, inputs_of, meaning, model_of, solve
+from alphacut.stages.cell import (
+    GPA,
+    Solve,
+    cell_at,
+    inputs_of,
+    meaning,
+    model_of,
+    references,
+    solve,
+)
 from alphacut.stages.store import Stage, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
 
@@ -155,9 +163,6 @@ class Campaign:
     def run(self, work: Work) -> xarray.Dataset:
         """The α-cuts with all samples; a store beside them goes on after an interruption."""
         store = None if work.folder is None else work.folder / "samples.db"
-        if store is not None and work.fresh:
-            for old in store.parent.glob("samples.db*"):
-                old.unlink()
         result = self.propagation(
             self.inputs,
             PLANS[self.modulus.plan],
@@ -209,19 +214,23 @@ def stage(campaign: Campaign) -> Stage:
 
 
 def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
-    """α-cuts of every quantity (alpha, bound), where reached, and all samples."""
+    """α-cuts of every quantity (alpha, bound), where reached, all samples, and a document."""
     import xarray
 
     samples = result.samples
     assert samples is not None
     variables: dict[str, Any] = {}
+    cuts: dict[str, Document] = {}
     for name, (unit, about) in (BOUNDS | (FIBRES if campaign.cell.fibres else {})).items():
         words, column = {"units": unit, "long_name": about}, result.column(name)
+        ends = np.stack(result.bounds(name), axis=1)
         places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
         reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
-        variables[name] = (CUT, np.stack(result.bounds(name), axis=1), words)
+        variables[name] = (CUT, ends, words)
         variables[f"{name}_at"] = ((*CUT, "parameter"), places, reached)
         variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
+        shown, key = (ends / GPA, f"{name}_GPa") if unit == "Pa" else (ends, name)
+        cuts[key] = {"lower": shown[:, 0], "upper": shown[:, 1]}
     about_points = {"long_name": "inputs, in SI"}
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
     words = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
@@ -232,7 +241,11 @@ def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
         "bound": ["lower", "upper"],
         "parameter": list(result.inputs),
     }
-    facts = {
+    document = {
+        "alpha": result.alpha,
+        "E_GPa": cuts["E_GPa"],
+        "nu_cuts": cuts["nu"],
+        "fibres": {key: of for key, of in cuts.items() if key.removesuffix("_GPa") in FIBRES},
         "method": campaign.modulus.method,
         "plan": result.method,
         "samples": result.evaluations,
@@ -241,10 +254,11 @@ def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
         "nature": str(result.nature_of("E")),
         "particles": campaign.cell.particles,
         "average": meaning(campaign.cell, campaign.modulus),
-        "error": as_json(campaign.errors(result)),
-        "checks": as_json(_largest(result, "check")),
+        "error": campaign.errors(result),
+        "checks": _largest(result, "check"),
+        "references": references(campaign.radius, campaign.cell),
     }
-    return xarray.Dataset(variables, coordinates, facts)
+    return xarray.Dataset(variables, coordinates, {"document": as_json(document)})
 
 
 def _largest(result: Cuts, kind: str) -> dict[str, float]:
@@ -256,34 +270,6 @@ def _largest(result: Cuts, kind: str) -> dict[str, float]:
         for name, _ in values.layout
         if name.startswith(f"{kind}:")
     }
-
-
-def document(data: xarray.Dataset) -> Document:
-    """α-cuts in GPa, their ends, nature, errors and cost."""
-    ends = data["E"].transpose("alpha", "bound").values / GPA
-    poisson = data["nu"].transpose("alpha", "bound").values
-    names = ("samples", "solves", "seconds", "method", "plan", "nature", "particles", "average")
-    fibres = {}
-    for name, (unit, _) in FIBRES.items():
-        if name in data:
-            of = data[name].transpose("alpha", "bound").values / (GPA if unit == "Pa" else 1)
-            key = f"{name}_GPa" if unit == "Pa" else name
-            fibres[key] = {"lower": of[:, 0], "upper": of[:, 1]}
-    return {
-        "alpha": data["alpha"].values,
-        "E_GPa": {"lower": ends[:, 0], "upper": ends[:, 1]},
-        "nu_cuts": {"lower": poisson[:, 0], "upper": poisson[:, 1]},
-        "fibres": fibres,
-        **{name: data.attrs[name] for name in names},
-        "error": errors_of(data),
-        "checks": json.loads(data.attrs["checks"]),
-    }
-
-
-def errors_of(data: xarray.Dataset) -> dict[str, float]:
-    """Declared relative error of E by source."""
-    errors: dict[str, float] = json.loads(data.attrs["error"])
-    return errors
 
 
 def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:

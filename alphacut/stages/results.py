@@ -14,11 +14,13 @@ from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
 from alphacut.io.netcdf import document_of
 from alphacut.io.quantity import STANDARD_GRAVITY
-from alphacut.stages import envelope, modulus
+from alphacut.stages import envelope
 from alphacut.stages.envelope import EnvelopeTask
 
 if TYPE_CHECKING:
     import xarray
+NAMES = ("microstructure", "modulus", "image", "shares")
+"""Stages with a document in one dataset."""
 
 
 @dataclass
@@ -30,7 +32,6 @@ class Results:
         microstructure: Particles and their map.
         modulus: Fuzzy modulus of a round cell.
         image: Proved modulus of an image.
-        references: Analytical bounds and estimate of E.
         structure: The structure with its modulus, and with what was learned.
         tasks: The studies.
         envelopes: Their datasets by name.
@@ -43,7 +44,6 @@ class Results:
     microstructure: xarray.Dataset | None = None
     modulus: xarray.Dataset | None = None
     image: xarray.Dataset | None = None
-    references: Document = field(default_factory=dict)
     structure: Structure | None = None
     tasks: tuple[EnvelopeTask, ...] = ()
     envelopes: dict[str, xarray.Dataset] = field(default_factory=dict)
@@ -59,17 +59,14 @@ class Results:
     @property
     def datasets(self) -> dict[str, xarray.Dataset]:
         """Every dataset by the name of its file without ending."""
-        names = ("microstructure", "modulus", "image", "shares")
-        every = {name: getattr(self, name) for name in names}
+        every = {name: getattr(self, name) for name in NAMES}
         every |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
         return {name: data for name, data in every.items() if data is not None}
 
     def document(self) -> Document:
         """Everything in numbers, for summary.json."""
-        every = {name: getattr(self, name) for name in ("microstructure", "image", "shares")}
+        every = {name: getattr(self, name) for name in NAMES}
         numbers = {name: document_of(data) for name, data in every.items() if data is not None}
-        if self.modulus is not None:
-            numbers["modulus"] = modulus.document(self.modulus) | {"references": self.references}
         if self.structure is not None and self.structure.frame is not None:
             numbers["structure"] = sizes(self.structure, self.structure.frame)
         of = {task.name: task for task in self.tasks}

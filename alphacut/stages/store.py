@@ -23,13 +23,11 @@ class Work:
 
     Args:
         folder: Folder for what is kept on the way; None to keep nothing.
-        fresh: Whether what an earlier run kept is passed over.
         workers: Processes.
         tick: Takes the share done; None to show nothing.
     """
 
     folder: Path | None = None
-    fresh: bool = False
     workers: int = 1
     tick: Progress | None = None
 
@@ -87,7 +85,7 @@ class Store:
             if self.folder is not None:
                 self.folder.mkdir(parents=True, exist_ok=True)
             with showing(self.shown) as tick:
-                data = stage.compute(Work(self.folder, self.fresh, self.workers, tick))
+                data = stage.compute(Work(self.folder, self.workers, tick))
             if self.folder is None:
                 return data
             self._put(stage, data)
@@ -104,7 +102,7 @@ class Store:
         """
         if executor is None or self.folder is None or len(stages) == 1:
             return {stage.name: self.take(stage) for stage in stages}
-        work = Work(self.folder, self.fresh)
+        work = Work(self.folder)
         stale = [stage for stage in stages if not self._current(stage)]
         under_way = {executor.submit(stage.compute, work): stage for stage in stale}
         with showing(self.shown) as tick:
