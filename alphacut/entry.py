@@ -19,8 +19,14 @@ from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import stoppable, uninterrupted
 
 COMMANDS = {
-    **{"run": "run", "check": "check", "microstructure": "stage", "cell": "cell"},
-    **{"modulus": "stage", "envelope": "stage", "identify": "stage", "report": "run"},
+    "run": "run",
+    "check": "check",
+    "microstructure": "stage",
+    "cell": "cell",
+    "modulus": "stage",
+    "envelope": "stage",
+    "identify": "stage",
+    "report": "run",
 }
 """Commands by the names that a user writes, each with its file in `alphacut.commands`."""
 STATUSES = """\

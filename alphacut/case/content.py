@@ -6,14 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from alphacut.case.material import (
-    Cell,
-    ImageCell,
-    Mesh,
-    ModulusSection,
-    RadiusMap,
-    RoundCell,
-)
+from alphacut.case.material import Cell, ImageCell, Mesh, ModulusSection, RadiusMap, RoundCell
 from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
 from alphacut.case.structure import Frame, Pendulum, Structure

@@ -14,15 +14,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.netcdf import dataset_of, document_of
 from alphacut.questions.question import Motion, Question
-from alphacut.stages import (
-    cell,
-    envelope,
-    identify,
-    image,
-    microstructure,
-    modulus,
-    shares,
-)
+from alphacut.stages import cell, envelope, identify, image, microstructure, modulus, shares
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import Campaign
 from alphacut.stages.results import Results

@@ -6,12 +6,7 @@ from dataclasses import replace
 
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
-from alphacut.frame.identify import (
-    Identified,
-    MeasuredMode,
-    RefutedError,
-    measured_mode,
-)
+from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, measured_mode
 from alphacut.frame.identify import identify as identified
 from alphacut.frame.identify.identify import widest
 from alphacut.frame.structures.quantities import of_storey_frame

@@ -19,6 +19,7 @@ from alphacut.stages.envelope import EnvelopeTask
 
 if TYPE_CHECKING:
     import xarray
+
 NAMES = ("microstructure", "modulus", "image", "shares")
 """Stages with a document in one dataset."""
 
