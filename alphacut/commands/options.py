@@ -38,7 +38,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raises the complaint of argparse as a problem."""
-        raise BadInput(Problem(self.prog.removeprefix("alphacut "), f"{message}; see --help"))
+        command = self.prog.removeprefix("alphacut").strip()
+        raise BadInput(Problem(command, f"{message}; see --help"))
 
     def refuse(self, word: str) -> NoReturn:
         """Raises the problem of a word that is no option of this command."""

@@ -24,7 +24,6 @@ LONGEST = 1000
 """Characters of a line to people."""
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
-
 OUTPUTS = ("out", "json", "export", "csv")
 """Options that name what is written."""
 Document = dict[str, Any]

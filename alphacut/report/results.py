@@ -76,7 +76,7 @@ def fibre_label(key: str) -> str:
 def width_text(image: Document) -> str:
     """Width of E at the lowest level by what it comes from; empty without one."""
     parts = (f"{source} {width:.3g} GPa" for source, width in image["widths_GPa"].items())
-    return "Width of E from " + ", ".join(parts)
+    return f"Width of E from {', '.join(parts)}"
 
 
 def motion(summary: Document) -> Table:
