@@ -109,7 +109,8 @@ def few(step: float, width: float, counts: Sequence[int]) -> Iterator[dict[str, 
     for count in counts:
         inputs = dict(list(every.items())[:count])
         for gap in GAPS:
-            made = [bounded(frame, inputs, way, step) for way in (DualProof(gap), Proof(gap=gap))]
+            ways = DualProof(gap, peaks=gap), Proof(gap=gap)
+            made = [bounded(frame, inputs, way, step) for way in ways]
             (_, one), (_, other) = made
             if one is not None and other is not None:
                 made[0][0]["cover each other"] = covered(one, other) and covered(other, one)

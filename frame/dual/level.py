@@ -107,10 +107,10 @@ def _responses(
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
     """Points of the modes' tables, all as many as the most demanding one needs."""
-    most = [2.0, 2.0]
+    most, slow = [2.0, 2.0], 2 / duration if duration > 0 else np.inf
     for mode in single:
         (low, high), (least, top) = mode.omega_range, mode.quotient_range
-        reach = FINE * (max(least, 0.0) * low + 2 / duration)
+        reach = FINE * (max(least, 0.0) * low + slow)
         most = [max(most[0], (high - low) / reach), max(most[1], (top - least) * high / reach)]
     return (int(np.clip(most[0], *POINTS[0])) + 1, int(np.clip(most[1], *POINTS[1])) + 1)
 

@@ -27,7 +27,7 @@ PIECES = (0.5, 0.25)
 """Shares of an input's range that are tried to be taken away."""
 EFFORTS = (1, 24)
 """Slabs of a bound over what may be taken away."""
-HOPE = 0.3
+HOPE = 0.8
 """Share of an even fall of the gap, over the most parts allowed, below which the effort ends."""
 LITTLE = 0.5
 """Shares taken away of all inputs, in sum, below which a part is halved besides."""
