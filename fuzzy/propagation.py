@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.design import Method
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import chosen, require
-from alphacut.fuzzy.result import Bounds
+from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.interaction import Interaction
 from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber
@@ -40,6 +41,8 @@ def propagate(
     interactions: Sequence[Interaction] = (),
     known: Known | None = None,
     budget: int = BUDGET,
+    units: Mapping[str, str] | None = None,
+    on_failure: Literal["raise", "skip"] = "raise",
     shared: Sequence[str] = (),
     vectorised: bool = False,
     workers: int = 1,
@@ -63,6 +66,9 @@ def propagate(
         known: Facts on which guaranteed bounds rest, such as the signs of the inputs' effects.
         budget: Evaluations that the call may take, stored ones among them. Methods that know their
             samples beforehand refuse to begin; a search ends, and says so.
+        units: Unit of each output by name, for texts, tables and drawings.
+        on_failure: "raise" ends the call where a sample failed, after all others have been run;
+            "skip" leaves such samples out: the bounds are then attained only.
         shared: Inputs whose equality lets samples share one call. The function then takes a list of
             mappings of names to numbers that agree in them, and returns a list of outputs.
         vectorised: Whether the function takes arrays, shape (n,), and returns arrays whose first
@@ -85,9 +91,7 @@ def propagate(
     """
     start = perf_counter()
     domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
-    method = method or Automatic()
-    runs = hasattr(method, "run") and not isinstance(method, type)
-    require(runs, "method", repr(method), "an object such as General() or Signed()")
+    method = _checked(method or Automatic(), on_failure)
     holds = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
     require(holds, "executor", executor, allowed)
@@ -98,16 +102,51 @@ def propagate(
         nullcontext(executor) if executor else pool(workers) as each,
         nullcontext(store) if isinstance(store, Store | None) else Store(store) as shelf,
     ):
-        campaign = Campaign(call, known or Known(), budget, each, tell, shelf, key)
-        bounds = method.run(campaign, domain)
+        skip = on_failure == "skip"
+        campaign = Campaign(call, known or Known(), budget, each, tell, shelf, key, skip)
+        bounds = _without_failed(method.run(campaign, domain), campaign.failed)
         campaign.report(1.0)
     return replace(
         bounds,
+        units=_units(units or {}, bounds.outputs),
         evaluations=len(campaign),
         samples=campaign.samples,
         budget=budget,
         seconds=perf_counter() - start,
     )
+
+
+def _checked(method: Method, on_failure: str) -> Method:
+    """The method, which must be an object that runs."""
+    runs = hasattr(method, "run") and not isinstance(method, type)
+    require(runs, "method", repr(method), "an object such as General() or Signed()")
+    chosen("on_failure", on_failure, ("raise", "skip"))
+    return method
+
+
+def _without_failed(bounds: Bounds, failed: int) -> Bounds:
+    """The bounds as attained ones where samples were left out."""
+    if not failed:
+        return bounds
+    note = f"{failed} samples failed and were left out: the true range may reach further there"
+    return replace(
+        bounds,
+        nature=Nature.ATTAINED,
+        natures=(),
+        error=0 * bounds.lower,
+        basis=(),
+        inner=None,
+        notes=(*bounds.notes, note),
+    )
+
+
+def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
+    """Unit of each output; an entry of an array has its array's."""
+    names = {name.partition("[")[0] for name in outputs}.union(outputs)
+    for name in units:
+        chosen("unit of", name, sorted(names))
+    own = tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
+    return own if units else ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,8 +51,12 @@ class Values:
 
     def column(self, name: str) -> int:
         """Index of a column."""
-        chosen("output", name, self.columns)
-        return self.columns.index(name)
+        chosen("output", name, self._places)
+        return self._places[name]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: column for column, name in enumerate(self.columns)}
 
 
 @dataclass(frozen=True, eq=False)

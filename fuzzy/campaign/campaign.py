@@ -45,7 +45,7 @@ class CampaignError(FailedError):
         lines = [f"at {_place(point)}: {_brief(error)}" for point, error in failures[:_SHOWN]]
         more = f"; and {len(failures) - _SHOWN} more" if len(failures) > _SHOWN else ""
         what = f"{len(failures)} of {total} samples failed, the others are done: "
-        super().__init__(what + "; ".join(lines) + more, "a store keeps those for the next call")
+        super().__init__(what + "; ".join(lines) + more, 'on_failure="skip" leaves them out')
 
 
 def _place(point: dict[str, float]) -> str:
@@ -69,8 +69,10 @@ class Campaign:
         progress: Called with the share done, 0 … 1.
         store: Where samples are kept; None keeps none.
         model: Key of the model in the store.
+        skip: Whether samples that fail are left out (NaN) instead of ending the campaign.
 
     Attributes:
+        failed: Samples left out.
         layout: Names and shapes of the outputs, as the first sample had them.
 
     Raises:
@@ -84,6 +86,8 @@ class Campaign:
     progress: Callable[[float], None] | None = None
     store: Store | None = None
     model: bytes = b""
+    skip: bool = False
+    failed: int = 0
     layout: Layout = ()
     _rows: dict[bytes, Array] = field(default_factory=dict)  # outputs by the bytes of the point
     _samples: Samples | None = None
@@ -112,7 +116,7 @@ class Campaign:
         return self._samples
 
     def __call__(self, points: Array) -> Values:
-        """Outputs at the points, shape (n, inputs), in their order.
+        """Outputs at the points, shape (n, inputs), in their order; NaN where one was skipped.
 
         A point that was seen before costs nothing.
 
@@ -135,25 +139,34 @@ class Campaign:
         """Outputs at new points, shape (n, columns)."""
         batch = _Batch(self, points)
         batch.run()
-        failures = [
-            (named_point(self.call.names, points[row]), one.error)
-            for row, one in sorted(batch.outcomes.items())
-            if isinstance(one, Failure)
-        ]
-        if failures:
-            raise CampaignError(failures, len(points))
-        rows = (batch.outcomes[row] for row in range(len(points)))
-        return np.array([one.row for one in rows if isinstance(one, Sample)])
+        failures = {
+            row: one.error for row, one in batch.outcomes.items() if isinstance(one, Failure)
+        }
+        if failures and (not self.skip or (len(failures) == len(points) and not self._rows)):
+            names = self.call.names
+            pairs = [(named_point(names, points[row]), failures[row]) for row in sorted(failures)]
+            raise CampaignError(pairs, len(points))
+        self.failed += len(failures)
+        width = len(Values(self.layout, np.zeros((0, 0))).columns)
+        array = np.full((len(points), width), np.nan)
+        for row, outcome in batch.outcomes.items():
+            if isinstance(outcome, Sample):
+                array[row] = outcome.row
+        return array
 
-    def agreeing(self, outcome: Outcome) -> Outcome:
-        """The outcome, a failure if its outputs are not those of the first sample."""
+    def in_order(self, outcome: Outcome) -> Outcome:
+        """The outcome with its outputs in the order of the first sample's."""
         if isinstance(outcome, Failure) or outcome.layout == self.layout:
             return outcome
-        if self.layout:
+        if not self.layout:
+            self.layout = outcome.layout
+            self.known.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
+            return outcome
+        if sorted(outcome.layout) != sorted(self.layout):
             return Failure(f"outputs are {outcome.layout} where others have {self.layout}")
-        self.layout = outcome.layout
-        self.known.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
-        return outcome
+        values = Values(outcome.layout, outcome.row[None])
+        row = np.concatenate([values.output(name).ravel() for name, _ in self.layout])
+        return Sample(self.layout, row)
 
     def report(self, share: float) -> None:
         """Report the completed fraction, which never falls."""
@@ -195,7 +208,7 @@ class _Batch:
         for row in range(len(self.points)):
             sample = campaign.store.get(campaign.model, self._key(row))
             if sample is not None:
-                self.outcomes[row] = campaign.agreeing(sample)
+                self.outcomes[row] = campaign.in_order(sample)
 
     def _tasks(self) -> Iterator[Task]:
         """Calls to be made, without samples that are stored."""
@@ -204,7 +217,7 @@ class _Batch:
                 yield rows, self.points[rows]
 
     def _record(self, row: int, outcome: Outcome) -> None:
-        outcome = self.outcomes[row] = self.campaign.agreeing(outcome)
+        outcome = self.outcomes[row] = self.campaign.in_order(outcome)
         if self.campaign.store and isinstance(outcome, Sample):
             self._gathered[self._key(row)] = outcome
 

@@ -78,7 +78,8 @@ class Known:
 
 def negligible(values: Array) -> Array:
     """Differences of outputs, shape (outputs,), that round-off explains."""
-    return np.asarray(ROUND_OFF * (np.ptp(values, axis=0) + np.abs(values).max(axis=0)))
+    size = np.nanmax(np.abs(values), axis=0)
+    return np.asarray(ROUND_OFF * (np.nanmax(values, axis=0) - np.nanmin(values, axis=0) + size))
 
 
 def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Array] | None:
@@ -93,7 +94,7 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
     Returns:
         Two points; the second should have the larger output and has not.
     """
-    rows = np.argsort(values)
+    rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _COMPARED)).astype(int))]
     step = (points[rows][None] - points[rows][:, None]) * np.where(signs, signs, 1)
     ordered = ((step >= 0) & ((signs != 0) | (step == 0))).all(axis=2)

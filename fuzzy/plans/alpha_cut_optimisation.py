@@ -123,13 +123,13 @@ class LevelSearch:
         return spread[self.slack(spread) >= 0]
 
     def worth(self, unit: Array, output: str, sign: float) -> Array:
-        """`sign` times the output at points of the unit cube; inf where not allowed."""
+        """`sign` times the output at points of the unit cube; inf where not allowed or failed."""
         inside = self.slack(unit) >= 0
         worth: Array = np.full(len(unit), np.inf)
         if inside.any():
             values = self.campaign(self.points(unit[inside]))
             worth[inside] = sign * values.array[:, values.column(output)]
-        return worth
+        return np.where(np.isnan(worth), np.inf, worth)
 
     def best(self, output: str, sign: float, count: int) -> Array:
         """The best few samples in the cut that lie apart, in unit coordinates."""
@@ -181,7 +181,7 @@ class LevelSearch:
         """Unit of an output for optimisers: its range over all samples, or 1."""
         values = self.campaign.samples.values
         own = values.array[:, values.column(output)]
-        span = float(np.ptp(own))
+        span = float(np.nanmax(own) - np.nanmin(own))
         return span if span >= np.finfo(float).tiny else 1.0
 
     def descend(self, start: Array, output: str, sign: float, rounds: int = 50) -> Array:
@@ -194,7 +194,7 @@ class LevelSearch:
             steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
             points = self.points(np.concatenate([unit[None], unit + np.diag(steps)]))
             values = self.campaign(points)
-            worth = sign / scale * values.array[:, values.column(output)]
+            worth = np.nan_to_num(sign / scale * values.array[:, values.column(output)], nan=1e6)
             return float(worth[0]), (worth[1:] - worth[0]) / steps
 
         cube = [(0.0, 1.0)] * len(start)

@@ -175,4 +175,5 @@ class _Passes:
 
     def _span(self) -> Array:
         """Range of each output over all samples, shape (columns,)."""
-        return np.asarray(np.ptp(self.campaign.samples.values.array, axis=0))
+        values = self.campaign.samples.values.array
+        return np.asarray(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))

@@ -53,7 +53,7 @@ class Design:
         """Retransformation: attained extremes of each level's samples and of every level above.
 
         Args:
-            values: Outputs at `points`.
+            values: Outputs at `points`; NaN where a sample failed and was skipped.
             method: Name of the method.
         """
         lowest, highest = self._extremes(values.array), self._extremes(-values.array)
@@ -74,14 +74,17 @@ class Design:
     def _extremes(self, values: Array) -> Rows:
         """Rows of the least values, shape (levels, outputs)."""
         columns = np.arange(values.shape[1])
+        usable = np.where(np.isnan(values), np.inf, values)
         best: list[Rows] = []
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
-            both = [*([rows[values[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
+            both = [*([rows[usable[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
             if not both:
                 what = f"no sample of the cut at α = {alpha:g} fulfils its interactions"
                 raise FailedError(what, "widen them, or take fewer")
+            if np.isinf(usable[both[0], columns]).any():
+                raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
             least = np.array(both)
-            best.append(least[values[least, columns].argmin(axis=0), columns])
+            best.append(least[usable[least, columns].argmin(axis=0), columns])
         return np.array(best[::-1])
 
 

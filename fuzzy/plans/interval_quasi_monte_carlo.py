@@ -62,6 +62,11 @@ class IntervalResponse:
     bounds: Sequence[Bounds]
 
     @property
+    def evaluations(self) -> int:
+        """Evaluations of the model."""
+        return sum(one.evaluations for one in self.bounds)
+
+    @property
     def nature(self) -> Nature:
         """The weakest of the points; averages have the error of quasi-Monte Carlo besides."""
         return Nature.weakest(one.nature for one in self.bounds)

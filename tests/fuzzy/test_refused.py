@@ -59,6 +59,8 @@ def run(function=lambda x: x, inputs=X, *args, **options):
         (lambda: run(workers=0), "workers"),
         (lambda: run(budget=0), "budget"),
         (lambda: run(lambda x: x, X, General(), budget=14), "budget"),
+        (lambda: run(on_failure="ignore"), "on_failure"),
+        (lambda: run(units={"z": "m"}), "unit of"),
         (lambda: run(executor=object()), "executor"),
         (lambda: run(shared=("y",)), "shared input"),
         (lambda: run(shared=("x",), vectorised=True), "shared"),
@@ -139,7 +141,7 @@ def test_outputs_that_are_no_numbers_fail_with_the_point_and_the_cause(output, a
         run(lambda x: output)
     assert allowed in failed.value.what
     assert "at x = 1" in failed.value.what
-    assert "store" in failed.value.cure
+    assert "skip" in failed.value.cure
 
 
 def test_a_cut_without_an_allowed_point_is_a_failure():

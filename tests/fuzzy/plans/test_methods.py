@@ -1,4 +1,4 @@
-"""Every method against brute force; natures and budgets."""
+"""Every method against brute force; natures, budgets, units, and samples that fail."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from scipy.stats import norm
 from alphacut.fuzzy import (
     Automatic,
     Extended,
+    FailedError,
     General,
     Interval,
     IntervalQuasiMonteCarlo,
@@ -215,9 +216,29 @@ def test_a_design_beyond_the_budget_is_refused_before_it_runs(method):
     assert "state signs" in refused.value.cure
 
 
-def test_outputs_that_are_arrays_have_a_name_for_each_entry():
-    result = propagate(lambda a, b: {"u": [a, b], "f": a * b}, INPUTS, Reduced())
+def test_samples_that_fail_end_the_call_or_are_left_out():
+    def broken(a, b):
+        if a > 0.9:
+            raise ArithmeticError("no convergence")
+        return a + b
+
+    with pytest.raises(FailedError, match=r"2 of \d+ samples failed.*no convergence"):
+        propagate(broken, INPUTS, Reduced(), alpha=[0.05, 0.9])
+    for method in (Automatic(), General(), Signed()):
+        result = propagate(broken, INPUTS, method, on_failure="skip", known=Known({"a": 1, "b": 1}))
+        assert result.nature is Nature.ATTAINED
+        assert "failed and were left out" in result.notes[-1]
+        assert result.lower[0, 0] == -1
+        assert 1.0 < result.upper[0, 0] <= 1.9
+
+
+def test_units_are_shown_and_arrays_share_theirs():
+    result = propagate(
+        lambda a, b: {"u": [a, b], "f": a * b}, INPUTS, Reduced(), units={"u": "mm", "f": "Hz"}
+    )
     assert result.outputs == ("u[0]", "u[1]", "f")
+    assert result.units == ("mm", "mm", "Hz")
+    assert "u[1] [mm]" in str(result)
 
 
 def test_many_outputs_are_attained_by_looks_alone():
@@ -253,6 +274,7 @@ def test_interval_quasi_monte_carlo_holds_the_fuzzy_mean_and_quantiles():
         lambda r, x: r + x, random, {"x": Interval(0, 1)}, alpha=levels(2), known=known
     )
     assert response.nature is Nature.GUARANTEED
+    assert response.evaluations > 128
     for level, alpha in enumerate(levels(2)):
         low, high = mean.cut(alpha)
         # the mean of the wider interval of quantiles lies outside that of the parameters
