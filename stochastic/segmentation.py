@@ -9,6 +9,10 @@ light there. Texture of the phases counts as noise.
 Grey values that are clipped hide noise and light, so that no judgement holds: an image is refused
 where the values of a class pile up at an end, or one class is flat beside another one that is not.
 Clipped until both are flat, an image looks like a clean one and is taken for it.
+
+Smoothing is that of non-local means (Buades, Coll, Morel 2005), which keeps edges. In doubt besides
+is what a second pass would change once more, or one deviation of the noise that smoothing leaves
+(measured by adding half as much noise again), whichever is more.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter, median_filter, minimum_filter
+from scipy.ndimage import maximum_filter, median_filter, minimum_filter, uniform_filter
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError, require
@@ -34,7 +38,9 @@ _EXACT = 1e-9  # of the grey values: noise that is rounding
 _LEAST_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
 _FLAT = 0.95  # of a class at one value; where particles meet, a blurred image has others
 _FEWEST = 50  # pixels of a class that tell
-_PATCH = 5  # side of the pixels whose classes are settled together before clipping is looked for
+_PATCH, _REACH = 5, 7  # pixels of a neighbourhood, and to those that it is compared with
+_AGAIN = 4  # times that noise is added to see what smoothing leaves
+_STRENGTH = 0.8  # of the smoothing, over the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +48,13 @@ class Segmentation:
     """Grey classes of an image, and where they are in doubt.
 
     Args:
-        grey: Grey values, shape (rows, columns).
+        grey: Grey values that are segmented, shape (rows, columns).
         thresholds: Values that part the classes, rising; a pixel is of class k if k of them are at
             or below its grey value.
         levels: Grey value of each class under mean light.
         light: What the light adds to each pixel, of mean zero, shape (rows, columns).
         noise: Standard deviation of the rest, in grey values.
+        moved: What smoothing may have moved each grey value by, or left of its noise.
     """
 
     grey: Array
@@ -55,11 +62,17 @@ class Segmentation:
     levels: Array
     light: Array
     noise: float
+    moved: Array | float = 0.0
 
     @property
     def drift(self) -> float:
         """Range of the light over the image, in grey values."""
         return float(np.ptp(self.light))
+
+    @property
+    def middles(self) -> tuple[float, ...]:
+        """Grey values half-way between the levels of neighbouring classes."""
+        return tuple(float(value) for value in (self.levels[1:] + self.levels[:-1]) / 2)
 
     @property
     def fractions(self) -> Array:
@@ -75,7 +88,7 @@ class Segmentation:
 
     def ranges(self) -> tuple[Rows, Rows]:
         """Least and greatest class that each pixel may be of, shape (rows, columns) each."""
-        doubt = CONFIDENT * self.noise + np.abs(self.light)
+        doubt = CONFIDENT * self.noise + np.abs(self.light) + self.moved
         first, last = (
             np.searchsorted(self.thresholds, self.grey + sign * doubt, side="right")
             for sign in (-1, 1)
@@ -93,30 +106,37 @@ class Segmentation:
             f"in doubt on {share:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
             f" drift of light of {self.drift:.3g} grey levels"
         )
-        cure = "average several images, and subtract an image of the light alone"
+        cure = "smooth = true takes noise away, level = true the drift of light"
         require(share <= most, "threshold", value, f"up to {most:.0%}", cure)
 
 
-def segmented(grey: Array, thresholds: Sequence[float]) -> Segmentation:
+def segmented(
+    grey: Array, thresholds: Sequence[float], *, smooth: bool = False, level: bool = False
+) -> Segmentation:
     """The classes of an image.
 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Values that part the classes, rising.
+        smooth: Take the noise away first.
+        level: Take the light's drift away first; the thresholds, which were read off the uneven
+            image, then give way to the `middles` of the even one.
 
     Raises:
         RefusedError: A class has no pixel, or grey values are clipped.
     """
     values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
     _refuse_clipped(values, borders)
-    shapes, light, before = _polynomials(values.shape), np.zeros_like(values), None
-    for _ in range(_TURNS):
-        labels = np.searchsorted(borders, values - light, side="right")
-        if before is not None and np.array_equal(labels, before):
-            break
-        levels, light, noise = _fitted(values, labels, shapes, len(borders) + 1)
-        before = labels
-    return Segmentation(values, borders, levels, light, noise)
+    moved: Array | float = 0.0
+    if level:
+        values = values - _judged(values, borders).light
+        borders = _judged(values, borders).middles
+    if smooth and (noise := _judged(values, borders).noise):
+        rough, values = values, _smoothed(values, noise)
+        again = np.abs(values - _smoothed(values, noise))
+        moved = np.maximum(again, _left(rough, values, noise))
+    judged = _judged(values, borders)
+    return Segmentation(values, borders, judged.levels, judged.light, judged.noise, moved)
 
 
 def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
@@ -140,6 +160,43 @@ def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
                 what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
                 cure = "take the image before its contrast was raised, or give cell.labels"
                 raise RefusedError("image", what, "grey values that are not clipped", cure)
+
+
+def _judged(values: Array, borders: tuple[float, ...]) -> Segmentation:
+    """The image as it is."""
+    shapes, light, before = _polynomials(values.shape), np.zeros_like(values), None
+    for _ in range(_TURNS):
+        labels = np.searchsorted(borders, values - light, side="right")
+        if before is not None and np.array_equal(labels, before):
+            break
+        levels, light, noise = _fitted(values, labels, shapes, len(borders) + 1)
+        before = labels
+    return Segmentation(values, borders, levels, light, noise)
+
+
+def _smoothed(grey: Array, noise: float) -> Array:
+    """The image by non-local means, as if it repeated itself."""
+    from skimage import restoration
+
+    edge = _PATCH + _REACH
+    around = np.pad(grey, edge, mode="wrap")
+    whole = restoration.denoise_nl_means(
+        around, patch_size=_PATCH, patch_distance=_REACH, h=_STRENGTH * noise, sigma=noise
+    )
+    return np.asarray(whole[edge:-edge, edge:-edge])
+
+
+def _left(rough: Array, smooth: Array, noise: float) -> Array:
+    """Noise that smoothing leaves in each pixel: from what it makes of half as much again nearby.
+
+    Near borders few patches are alike, so that more is left than inside the classes.
+    """
+    rng = np.random.default_rng(0)
+    squares = [
+        (_smoothed(rough + noise / 2 * rng.normal(size=rough.shape), noise) - smooth) ** 2
+        for _ in range(_AGAIN)
+    ]
+    return np.asarray(2 * np.sqrt(uniform_filter(np.mean(squares, axis=0), 3, mode="wrap")))
 
 
 def _polynomials(shape: tuple[int, ...]) -> Array:

@@ -185,6 +185,8 @@ class ImageCell(Section):
     )
     modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
     poisson: Annotated[tuple[Ratio, ...], Each] = Field(description="Poisson's ratio of each phase")
+    smooth: bool = Field(default=False, description="whether noise is taken away first")
+    level: bool = Field(default=False, description="whether the drift of light is taken away first")
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:

@@ -185,14 +185,17 @@ def _thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
-    judged = segmented(grey, modal)
+    judged = segmented(grey, modal, smooth=cell.smooth, level=cell.level)
     judged.require()
+    moved = [new - old for new, old in zip(judged.thresholds, modal, strict=True)]
     fuzzy = any(number.support.width > 0 for number in numbers)
 
     def ranges(level: Level) -> tuple[Rows, Rows]:
         if level is not None and not fuzzy:
             return judged.ranges()
-        return threshold_ranges(grey, [cut_at(number, level) for number in numbers])
+        cuts = (cut_at(number, level) for number in numbers)
+        pairs = [(low + by, high + by) for (low, high), by in zip(cuts, moved, strict=True)]
+        return threshold_ranges(judged.grey, pairs)
 
     return ImageStudy(cell, ranges, fuzzy or judged.open > 0)
 
