@@ -1,8 +1,8 @@
 """Auto: a proof; where there is none, the search; where there is none either, the follower.
 
-Up to six fuzzy inputs the branch and bound is tried, up to four if no tolerance is named or only
-the peaks are to keep it. The dual bound follows, which takes any number of inputs and states its
-gap. A gap above a named tolerance leads to the search, but not of the peaks.
+Up to six fuzzy inputs the branch and bound is tried, up to three or four if no tolerance is named
+or only the peaks are to keep it. The dual bound follows, which takes any number of inputs and
+states its gap. A gap above a named tolerance leads to the search, but not of the peaks.
 """
 
 from __future__ import annotations
@@ -27,8 +27,10 @@ from alphacut.fuzzy.refused import real
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
 FEW = 4
-"""Inputs up to which the branch and bound is worth its time where peaks count most. With five it
-takes thirty times as long as the dual bound (`benchmarks.frame.many_inputs --few`)."""
+"""Inputs up to which the branch and bound is worth its time where peaks count most."""
+BRANCHED = 1e-4, 5e-3
+"""Gaps of peaks, from one to below the other, with which it is so; else up to one input less
+(`benchmarks.frame.many_inputs --few`)."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Auto:
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
         reasons: list[str] = []
         named = None if self.peaks else self.tolerance
-        for proof in self._proofs(len(flow.boxes.names)):
+        for proof in self._proofs(flow):
             try:
                 proved = proof.run(flow, progress)
             except (UnprovedError, ModalError) as error:
@@ -80,12 +82,17 @@ class Auto:
             why = f"{why}; no search: {error}"
         return _noted(follower.run(flow, progress), f"improved-graph-follower; {why}")
 
-    def _proofs(self, inputs: int) -> tuple[Proof | DualProof, ...]:
-        """Proofs to try, in order, for a number of fuzzy inputs."""
-        dual = DualProof(workers=self.workers)
-        if inputs > (MOST_PARAMETERS if self.tolerance and not self.peaks else FEW):
-            return (dual,)
-        return Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers), dual
+    def _proofs(self, flow: UnitFlow) -> tuple[Proof | DualProof, ...]:
+        """Proofs to try, in order; the branch and bound where it is the cheaper one."""
+        inputs, dual = len(flow.boxes.names), DualProof(workers=self.workers)
+        proof = Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers)
+        share, few = self.tolerance or 0.0, FEW
+        if share and not self.peaks:
+            few = MOST_PARAMETERS
+        elif share and flow.relative and inputs <= MOST_PARAMETERS:
+            dual = replace(dual, gap=share, peaks=share)
+            few = FEW if BRANCHED[0] <= share < BRANCHED[1] else FEW - 1
+        return (proof, dual) if inputs <= few else (dual,)
 
     def _allowed(self, flow: UnitFlow) -> Array:
         """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""

@@ -59,6 +59,8 @@ SHIFTS = (1, 2, 4, 8, 16)
 """Distances of the nodes that try each other's points."""
 ROUNDS = 6
 """Rounds in which neighbours are tried, at most."""
+MANY = 12
+"""Inputs above which a pass takes so long that fewer are made; the error says what that costs."""
 ROUGH = 0.3
 """Error of the polynomials, as a share of an output's peak, above which they do not lead."""
 
@@ -70,7 +72,7 @@ class Search:
     Args:
         tolerance: Error wanted, in m, or in the unit of the first output where none is a
             displacement; 1e-4 unless given.
-        passes: Most independent passes.
+        passes: Most independent passes; 8 unless given, 5 of more than `MANY` inputs.
         seed: Of all that is drawn.
 
     Raises:
@@ -79,7 +81,7 @@ class Search:
 
     name: ClassVar[str] = "search"
     tolerance: float | None = None
-    passes: int = 8
+    passes: int | None = None
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -156,7 +158,8 @@ class Search:
         _follow(way, optima, grid, box, np.ones(len(every), bool))
         tick(0.5)
         gains = list[Array]()
-        for count in range(self.passes):
+        most = self.passes or (8 if len(lower) <= MANY else 5)
+        for count in range(most):
             before = optima.value.copy()
             rng = np.random.default_rng((self.seed, count, len(every)))
             self._pass(way, optima, grid, box, DRAWN * 2**count, rng)

@@ -83,7 +83,7 @@ def climbed(flow, ends, at, place):
 def leaves(structure, fuzzy, rng):
     """By how much the exact motion leaves its bounds at most, as a share of peaks; gap of peaks."""
     given = {"duration": DURATION, "step": STEP, "alpha": (0,), "progress": False}
-    bounds = envelope(structure, fuzzy, method=DualProof(slabs=4), **given)
+    bounds = envelope(structure, fuzzy, method=DualProof(slabs=4, peaks=0.05), **given)
     flow = LinearFlow(structure, list(fuzzy), DURATION, STEP, Exact())
     ends = np.array([number.support for number in fuzzy.values()])
     outer = np.stack([-bounds.lower[0], bounds.upper[0]], -1)
