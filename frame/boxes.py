@@ -9,13 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
-from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.knowledge.joint import joined_inputs as fuzzy_inputs
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, require, require_numbers
 from alphacut.fuzzy.result import Nature
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)

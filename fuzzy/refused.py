@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from math import inf, isfinite, nan
 from numbers import Integral, Real
 
@@ -69,6 +69,18 @@ def real(
     inside = isfinite(number) and least <= number <= most and (number > 0 or not positive)
     require(inside, key, repr(value), allowed)
     return number
+
+
+def require_numbers(name: str, values: object) -> None:
+    """Refuse what is no sequence of real and finite numbers.
+
+    Raises:
+        RefusedError: It is a text or a single number, or holds something else.
+    """
+    listed = isinstance(values, Collection) and not isinstance(values, str)
+    require(listed, name, repr(values), "a list of numbers")
+    for value in np.ravel(values).tolist() if isinstance(values, np.ndarray) else values:  # type: ignore[attr-defined]
+        real(name, value)
 
 
 def chosen(key: str, value: object, names: Iterable[str]) -> None:

@@ -3,7 +3,8 @@
 At each level the cuts of all priors and of all measured quantities leave a set of parameters. Where
 the claims among them hold together with P >= 1 − α, the set holds the true parameters with that
 probability, if the opinions and the model are right. A box encloses the set, proved by linear
-relaxations (`enclosure`). Predictions (`Identified.predictions`) say what its frames vibrate like.
+relaxations (`enclosure`). Samples (`Identified.samples`) fill the set and show how much narrower it
+is. Predictions (`Identified.predictions`) say what its frames vibrate like.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.frame.identify.measured import MeasuredMode, ModeCut
 from alphacut.frame.identify.relaxation import enclosure
+from alphacut.frame.identify.samples import inner_point, walk
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
@@ -68,6 +70,19 @@ class Evidence:
     def modes(self, alpha: float) -> list[ModeCut]:
         """Ranges of the measured modes at the joint level α."""
         return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
+
+    def beyond(self, points: Array, modes: list[ModeCut]) -> Array:
+        """Distance of modes at points (S, d) beyond their ranges, in half widths; <= 0 inside."""
+        values, vectors = self.chain.modes(points)
+        columns = []
+        for mode, cut in zip(self.measured, modes, strict=True):
+            shape = vectors[:, :, mode.mode - 1]
+            one = shape[:, mode.reference - 1]
+            columns.append((values[:, mode.mode - 1], cut.low, cut.high))
+            columns += [(shape[:, z - 1] / one, *cut.shape[z]) for z in mode.shape]
+        measured, low, high = (np.array(part) for part in zip(*columns, strict=True))
+        half = np.maximum((high - low) / 2, 1e-12 * np.abs(high))
+        return np.asarray(np.maximum(low - measured.T, measured.T - high) / half)
 
 
 def widest(number: FuzzyNumber) -> Cut:
@@ -131,6 +146,31 @@ class Identified:
         of, level = self.evidence, float(self.alpha[0])
         widths = np.array([of.cut(of.prior[name], level).width for name in self.names])
         return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
+
+    def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
+        """Points of the set at level `alpha[row]`, (number, d), about uniform in logarithms.
+
+        `evidence.chain.modes` gives their modes, which lie in all measured cuts.
+
+        Raises:
+            FailedError: No point of the set was met.
+        """
+        of, level, chance = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
+        nominal, modes = of.chain.nominal, of.modes(level)
+        cuts = np.array([of.cut(prior, level) for prior in of.prior.values()]).T
+
+        def place(logs: Array) -> Array:
+            return np.asarray(np.clip(nominal * np.exp(logs), *cuts))
+
+        def beyond(logs: Array) -> Array:
+            return of.beyond(place(logs), modes)
+
+        box = Ends(np.log(self.lower[row] / nominal), np.log(self.upper[row] / nominal))
+        start = inner_point(beyond, box, chance)
+        if start is None:
+            what = f"no parameters with modes in all measured cuts at α = {level:g} were met"
+            raise FailedError(what, "take samples of a lower level, or the box alone")
+        return place(walk(beyond, start, box, number, chance))
 
     def predictions(self) -> Ends:
         """Proved ends of the natural frequencies of all n modes, measured or not, (A, n), in Hz."""

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, variables
-from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import ratio_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import real, require, require_numbers
 
 KINDS = ("mass", "damping", "stiffness")
 Factor = Callable[[Mapping[str, Any]], Any]

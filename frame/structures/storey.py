@@ -15,12 +15,11 @@ from typing import Literal
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
-from alphacut.frame.calculus.numbers import require_numbers
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import ratio_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import chosen, real, require
+from alphacut.fuzzy.refused import chosen, real, require, require_numbers
 
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},

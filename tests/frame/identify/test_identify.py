@@ -9,7 +9,11 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.frame.identify.relaxation import CONSTANT, LinearProgram, Rows, relaxation
+from alphacut.frame.identify.samples import inner_point, walk
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.result import Ends
 from alphacut.fuzzy.sets.claimed import Claimed
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
@@ -149,11 +153,8 @@ def test_truth_is_covered_and_the_box_is_sharp(rng: np.random.Generator) -> None
         inside.append(bool(((found.lower[0] <= truth) & (truth <= found.upper[0])).all()))
         if possible[-1]:
             assert inside[-1]  # the box holds the set
-        points = rng.uniform(found.lower[0], found.upper[0], (4000, 3))
-        held = points[agree(found, points, 0.1)]
-        if len(held) > 100:
-            sharp.append(np.mean(np.ptp(held, axis=0) / (found.upper - found.lower)[0]))
-    assert len(sharp) > 3
+        held = found.samples(100)
+        sharp.append(np.mean(np.ptp(held, axis=0) / (found.upper - found.lower)[0]))
     assert np.mean(sharp) > 0.6
     assert np.mean(inside) >= 0.9 - 4 * np.sqrt(0.09 / 8)
 
@@ -196,6 +197,7 @@ def test_a_common_factor_of_stiffnesses_and_masses_is_not_learned(
     prior = {name: Interval(0.8 * x, 1.2 * x) for name, x in zip(names, nominal, strict=True)}
     found = identify(FRAME, prior, measured(nominal, rng, names=names), alpha=(0.05,))
     assert min(found.narrowed.values()) > 0.7
+    assert (np.ptp(found.samples(), axis=0) > 0.7 * (found.upper - found.lower)[0]).all()
     known = identify(FRAME, PRIOR, measured(np.full(3, 2.0), rng), alpha=(0.05,))
     assert max(known.narrowed.values()) < 0.5
 
@@ -331,6 +333,7 @@ def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
     found = identify(frame, prior, modes, alpha=(0.05, 1.0))
     assert found.upper[1] == pytest.approx(found.lower[1], rel=1e-12)
     assert found.empty == 1.0
+    assert (found.samples(3, row=1) == 103510.0).all()
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -389,3 +392,66 @@ def test_every_mode_is_predicted(rng: np.random.Generator) -> None:
     assert lower.shape == (2, 3)
     assert (lower[0] <= hertz).all()
     assert (hertz <= upper[0]).all()
+
+
+@pytest.mark.parametrize("shown", [{}, {"floors": (1, 3)}, {"floors": ()}, {"modes": (2,)}])
+def test_samples_are_in_the_set_and_their_modes_in_the_predictions(
+    rng: np.random.Generator, shown: dict[str, tuple[int, ...]]
+) -> None:
+    prior = {**PRIOR, "c1": Triangular(1.6, 1.9, 2.4)}
+    truth = np.array([1.9, 2.1, 2.2])
+    found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))  # type: ignore[arg-type]
+    predicted = found.predictions()
+    for row, level in enumerate(found.alpha):
+        points = found.samples(150, row=row, seed=2)
+        assert points.shape == (150, 3)
+        assert agree(found, points, float(level)).all()
+        hertz = np.sqrt(found.evidence.chain.modes(points)[0]) / (2 * np.pi)
+        assert ((predicted.lower[row] <= hertz) & (hertz <= predicted.upper[row])).all()
+        assert (found.samples(150, row=row, seed=2) == points).all()
+        assert (found.samples(150, row=row, seed=3) != points).any()
+
+
+def test_samples_scatter_like_points_of_the_box_that_agree(rng: np.random.Generator) -> None:
+    found = identify(FRAME, PRIOR, measured(np.array([1.9, 2.1, 2.2]), rng), alpha=(0.05,))
+    low, high = np.log([found.lower[0], found.upper[0]])
+    points = np.exp(rng.uniform(low, high, (20000, 3)))
+    held = np.log(points[agree(found, points, 0.05)])
+    samples = np.log(found.samples(1000))
+    assert (np.abs(samples.mean(axis=0) - held.mean(axis=0)) < 0.2 * held.std(axis=0)).all()
+    assert samples.std(axis=0) == pytest.approx(held.std(axis=0), rel=0.1)
+
+
+def test_a_level_without_points_has_no_samples(rng: np.random.Generator) -> None:
+    prior = dict.fromkeys(NAMES, Triangular(1.6, 1.7, 2.4))
+    found = identify(FRAME, prior, measured(np.full(3, 2.0), rng), alpha=(0.05, 1.0))
+    assert len(found.samples(1)) == 1
+    with pytest.raises(FailedError, match=r"at α = 1 were met; take samples of a lower level"):
+        found.samples(row=1)
+
+
+def test_walks_fill_a_disc_and_no_more() -> None:
+    """They are uniform, as the mean square radius of 1/2 says; a side of the box has no width."""
+    box = Ends(np.array([-1.0, -1.5, 0.3]), np.array([1.0, 1.5, 0.3]))
+    start, rng = np.array([0.9, 0.0, 0.3]), np.random.default_rng(1)
+    points = walk(lambda x: (x**2).sum(axis=1, keepdims=True) - 1, start, box, 2000, rng)
+    assert (points[:, 2] == 0.3).all()
+    square = (points[:, :2] ** 2).sum(axis=1) / (1 - 0.3**2)
+    assert square.max() <= 1 + 1e-12
+    assert square.mean() == pytest.approx(0.5, abs=0.04)
+    assert points[:, :2].mean(axis=0) == pytest.approx([0, 0], abs=0.06)
+
+
+def test_a_small_and_thin_set_is_met_and_filled() -> None:
+    """The band |x − y| <= 1e-4 right of the middle, uniform along its length."""
+    box, rng = Ends(np.full(2, -1.0), np.ones(2)), np.random.default_rng(1)
+
+    def beyond(x: Array) -> Array:
+        return np.stack([1e4 * np.abs(x[:, 0] - x[:, 1]), 4 * np.abs(x[:, 0] - 0.75)], axis=1) - 1
+
+    start = inner_point(beyond, box, rng)
+    assert start is not None
+    points = walk(beyond, start, box, 1000, rng)
+    assert (beyond(points) <= 0).all()
+    assert points.mean(axis=0) == pytest.approx([0.75, 0.75], abs=0.02)
+    assert points.std(axis=0) == pytest.approx(np.full(2, 0.5 / 12**0.5), rel=0.08)

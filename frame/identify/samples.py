@@ -1,0 +1,69 @@
+"""Points of a set in a box: a first one by least squares, the others by random walks from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.result import Ends
+
+STEPS = 60  # of each walk
+WALKS = 100  # at least: they show one another the way
+TRIES = 50  # of a step
+STARTS = 10  # of the search
+MARGINS = (1.0, 0.5, 0.1, 1e-2, 1e-4)  # that the search asks for in turn; 1 is the middle
+
+Beyond = Callable[[Array], Array]
+"""Distance of points (n, d) beyond each range of the set, (n, q), in half widths; <= 0 inside."""
+
+
+def inner_point(beyond: Beyond, box: Ends, chance: np.random.Generator) -> Array | None:
+    """A point of the set, shape (d,), from the middle of the box or random starts; None if none."""
+    for start in range(STARTS):
+        share = chance.random(len(box.lower)) if start else 0.5
+        point = box.lower + (box.upper - box.lower) * share
+        for margin in MARGINS:
+            fitted = least_squares(
+                lambda x, margin=margin: np.maximum(beyond(x[None])[0] + margin, 0.0),
+                point,
+                bounds=(box.lower - 1e-9, box.upper + 1e-9),  # a side may have no width
+                max_nfev=30,
+            )
+            point = np.clip(fitted.x, *box)
+            if (beyond(point[None]) <= 0).all():
+                return np.asarray(point)
+    return None
+
+
+def walk(
+    beyond: Beyond, start: Array, box: Ends, number: int, chance: np.random.Generator
+) -> Array:
+    """Ends of walks that hit and run from a point of the set: points (number, d) of it.
+
+    Each step is a point of a random chord, cut at points outside the set (shrinking slice sampler;
+    Neal, Annals of Statistics 31, 2003). Every second chord points from one walk to another, as
+    long and thin sets need (ter Braak, Statistics and Computing 16, 2006). The ends become uniform
+    in a convex set; in others they reach the part in which such chords lie.
+    """
+    points, width = np.tile(start, (max(number, WALKS), 1)), box.upper - box.lower
+    ends: Array = np.tile([[-1.0], [1.0]], len(points))
+    for step in range(STEPS):
+        way = chance.standard_normal(points.shape) * width
+        if step % 2:
+            way = chance.permutation(points) - chance.permutation(points)
+        longest = np.abs(way / np.where(width > 0, width, 1.0)).max(axis=1, keepdims=True)
+        way /= np.where(longest > 0, longest, 1.0)  # now as long as the box
+        (low, high), moved = ends, np.full(len(points), False)
+        for _ in range(TRIES):
+            share = chance.uniform(low, high)
+            place = points + share[:, None] * way
+            held = ((box.lower <= place) & (place <= box.upper)).all(axis=1)
+            hit = held & (beyond(place) <= 0).all(axis=1) & ~moved
+            points[hit], moved[hit] = place[hit], True
+            if moved.all():
+                break
+            low, high = np.where(share < 0, share, low), np.where(share < 0, high, share)
+    return points[:number]
