@@ -83,7 +83,7 @@ class Tolerances(Question):
         beyond = f"exceeded at {passed:.4g}" if passed is not None else "none is exceeded"
         if passed is not None and document["clear"] is not None:
             beyond = f"none seen up to {document['clear']:.4g}, {beyond}"
-        head = ("scale of all tolerances", scale, document["nature"], beyond)
+        head = ("scale of all tolerances", f"{scale}, {beyond}", document["nature"], "")
         return [head, *(_row(name, one, document) for name, one in document["supports"].items())]
 
     @staticmethod

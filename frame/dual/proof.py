@@ -42,6 +42,8 @@ from alphacut.fuzzy.result import Nature
 
 PARTS = 32
 """Most parts of the box over which the nodes above a peak are bounded."""
+HOPELESS = 0.1
+"""Gap of a peak, as a share of it, above which so many parts do not close it."""
 ROUNDING = 1e-10
 """Share of an output's peak by which its exact values may be off."""
 
@@ -170,7 +172,8 @@ class DualProof:
             inner[nodes[better], o, s] = peak.value[better]
             unit[nodes[better], o, s] = peak.at[better]
 
-        wide = np.argwhere(outer.max(0) > top + enough)
+        gap = outer.max(0) - top
+        wide = np.argwhere((gap > enough) & (gap <= HOPELESS * top.max(1, keepdims=True)))
         with ThreadPoolExecutor(workers) as pool:
             for job in [pool.submit(improve, int(o), int(s)) for o, s in wide]:
                 job.result()

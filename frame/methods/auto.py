@@ -32,6 +32,9 @@ BRANCHED = 1e-4, 5e-3
 """Gaps of peaks, from one to below the other, with which it is so; else up to one input less
 (`benchmarks.frame.many_inputs --few`)."""
 
+WIDE = 0.1
+"""Gap of a peak with many inputs up to which the box is not parted where envelopes are many."""
+
 
 @dataclass(frozen=True)
 class Auto:
@@ -89,7 +92,9 @@ class Auto:
         share, few = self.tolerance or 0.0, FEW
         if share and not self.peaks:
             few = MOST_PARAMETERS
-        elif share and flow.relative and inputs <= MOST_PARAMETERS:
+        elif share and inputs > MOST_PARAMETERS:
+            dual = replace(dual, peaks=WIDE)
+        elif share and flow.relative:
             dual = replace(dual, gap=share, peaks=share)
             few = FEW if BRANCHED[0] <= share < BRANCHED[1] else FEW - 1
         return (proof, dual) if inputs <= few else (dual,)
