@@ -68,7 +68,7 @@ class Box:
         """Models of one output at some nodes over the part between unit coordinates (d,)."""
         ends = self.inputs(low), self.inputs(high)
         whole = over_box(self.system, self.names, *ends)
-        one = [output]
+        one = slice(output, output + 1)
         structure = replace(
             whole, rows=whole.rows[one], factor=whole.factor[one], order=whole.order[one]
         )
@@ -87,7 +87,7 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
     inputs, d = Expansion.inputs(centre[active], radius[active]), len(active)
     own = {name: float(x) for name, x in zip(names, centre, strict=True)}
     p = {name: Expansion.constant(x, d) for name, x in {**system.parameters, **own}.items()}
-    p |= {names[i]: inputs[place] for place, i in enumerate(active)}
+    p |= {names[i]: inputs[place] for place, i in enumerate(active.tolist())}
     return classical(system, p)
 
 

@@ -58,7 +58,7 @@ class Data(NamedTuple):
     start: Array
     step: Array
     points: Array
-    ends: Rows
+    ends: Array
     centre: Array
     radius: Array
     share: Array

@@ -136,7 +136,7 @@ def packed(whole: Array, degree: int) -> Array:
 def _in_tensor(d: int, degree: int) -> tuple[Rows, Array]:
     """First places of all monomials in a flat tensor, and how often they stand there."""
     lists = monomials(d, degree)
-    return np.ravel_multi_index(tuple(lists.T), (d,) * degree), orders(lists)
+    return np.asarray(np.ravel_multi_index(tuple(lists.T), (d,) * degree)), orders(lists)
 
 
 def tensor(coefficients: Array, d: int, degree: int) -> Array:

@@ -294,7 +294,9 @@ def _tables(level: Level, o: int) -> list[Array]:
     start = np.array([[g.omega[0], g.quotient[0]] for g in grids])
     step = np.array([[g.omega[1], g.quotient[1]] for g in grids]) - start
     points = np.array([len(grids[0].omega), len(grids[0].quotient)], float)
-    ends = np.array([mode.places(grid) for mode, grid in zip(level.single, grids, strict=True)])
+    ends = np.array(
+        [mode.places(grid) for mode, grid in zip(level.single, grids, strict=True)], float
+    )
     value = level.tables.value[int(level.structure.order[o])]
     return [value, *scaled, start, step, points, ends, centre, radius, *shares]
 

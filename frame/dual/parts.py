@@ -98,7 +98,8 @@ class Peak:
         What is attained there is left in `value`, its unit coordinates in `at`.
         """
         gone: Array = np.full(len(self.outer), -np.inf)
-        ends = [(-np.ones(self.inputs), np.ones(self.inputs), self.outer)]
+        whole = -np.ones(self.inputs), np.ones(self.inputs), self.outer
+        ends: list[tuple[Array, Array, Array]] = [whole]
         parts, begun = list[Part](), 0.0
         for count in range(most):
             parts.append(self._part(*ends.pop()))

@@ -204,7 +204,7 @@ def refine(
     out: Array,
 ) -> None:
     """Bound at one node; the multipliers of the whole are left in `mu`, the best inputs in `u`."""
-    slabs.ends[0], slabs.mu[0], slabs.value[0] = data.ends, mu, np.inf
+    slabs.ends[0], slabs.mu[0], slabs.value[0] = data.ends.astype(np.int64), mu, np.inf
     reached = ascend(u, node, side, data)
     aim = sufficient(reached, 0.0, effort, constant)
     reached = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)

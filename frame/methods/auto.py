@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dual.proof import DualProof
@@ -67,6 +69,7 @@ class Auto:
         if not isinstance(flow.flow, LinearFlow):
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
         reasons: list[str] = []
+        held: Envelope | None = None
         named = None if self.peaks else self.tolerance
         for proof in self._proofs(flow):
             try:
@@ -74,9 +77,12 @@ class Auto:
             except (UnprovedError, ModalError) as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            if named is None or (proved.error <= self._allowed(flow)).all():
+            held = proved if held is None or _gap(proved) < _gap(held) else held
+            if self._close(proved, flow):
                 return _noted(proved, "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
+        if held is not None and named is None:
+            return _noted(held, "; ".join([f"{held.method} succeeded", *reasons]))
         why = f"unproved: {'; '.join(reasons)}"
         try:
             search = Search(self.tolerance, seed=self.seed)
@@ -97,11 +103,30 @@ class Auto:
         elif share and flow.relative:
             dual = replace(dual, gap=share, peaks=share)
             few = FEW if BRANCHED[0] <= share < BRANCHED[1] else FEW - 1
-        return (proof, dual) if inputs <= few else (dual,)
+        both = (proof, dual) if inputs <= few else (dual, proof)
+        return both if inputs <= max(few, FEW) else (dual,)
+
+    def _close(self, proved: Envelope, flow: UnitFlow) -> bool:
+        """Whether a proof is as near as asked; only of few inputs are peaks asked to be near."""
+        if self.tolerance is None:
+            return True
+        if not self.peaks:
+            return bool((proved.error <= self._allowed(flow)).all())
+        few = flow.relative and len(flow.boxes.names) <= FEW
+        return not few or _gap(proved) <= 2 * self.tolerance
 
     def _allowed(self, flow: UnitFlow) -> Array:
         """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""
         return (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
+
+
+def _gap(proved: Envelope) -> float:
+    """Greatest gap of a peak, as a share of it."""
+    assert proved.inner is not None
+    ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
+    most = np.maximum(*(outer.max(1) for outer, _ in ends))
+    gaps = [outer.max(1) - inner.max(1) for outer, inner in ends]
+    return float((np.maximum(*gaps) / np.maximum(most, 1e-300)).max())
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:

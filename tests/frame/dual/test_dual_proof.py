@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import Auto, StoreyFrame, envelope
 from alphacut.frame.dual import dual_function as kernel
 from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.methods import auto
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -237,6 +238,31 @@ def test_it_agrees_with_the_branch_and_bound():
     for one, other in ((dual, box), (box, dual)):
         assert (one.upper >= other.inner.upper - slack).all()
         assert (one.lower <= other.inner.lower + slack).all()
+
+
+@pytest.mark.parametrize(
+    ("share", "gaps", "method", "why"),
+    [
+        (1e-2, {}, "dual", "dual succeeded"),
+        (1e-3, {}, "proof", "proof succeeded"),
+        (
+            1e-2,
+            {"dual": 1.0, "proof": 0.5},
+            "proof",
+            "proof succeeded; dual: its gap is wider than the tolerance; proof: its gap is wider"
+            " than the tolerance",
+        ),
+    ],
+)
+def test_auto_takes_the_cheaper_proof_that_is_near_enough(share, gaps, method, why, monkeypatch):
+    own = auto._gap
+    monkeypatch.setattr(auto, "_gap", lambda proved: gaps.get(proved.method, own(proved)))
+    model = storeys(4, damping_ratio=0.03, v0=(0.0, 0.0, 0.0, 0.3), outputs=("drift1",))
+    fuzzy = {f"k{z + 1}": near(1.2e8, 0.04) for z in range(4)}
+    way = Auto(share, peaks=True)
+    given = {"duration": 1.0, "step": 0.05, "alpha": (0,), "progress": False, "relative": True}
+    found = envelope(model, fuzzy, method=way, **given)
+    assert (found.method, found.notes[0]) == (method, why)
 
 
 def test_thirteen_inputs_of_six_storeys_are_proved():
