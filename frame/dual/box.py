@@ -87,7 +87,7 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
     inputs, d = Expansion.inputs(centre[active], radius[active]), len(active)
     own = {name: float(x) for name, x in zip(names, centre, strict=True)}
     p = {name: Expansion.constant(x, d) for name, x in {**system.parameters, **own}.items()}
-    p |= {names[i]: inputs[place] for place, i in enumerate(active.tolist())}
+    p |= {names[int(i)]: inputs[place] for place, i in enumerate(active)}
     return classical(system, p)
 
 
