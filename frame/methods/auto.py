@@ -107,7 +107,7 @@ class Auto:
         return both if inputs <= max(few, FEW) else (dual,)
 
     def _close(self, proved: Envelope, flow: UnitFlow) -> bool:
-        """Whether a gap is as narrow as asked, of peaks with many inputs whatever it is."""
+        """True where a gap is as narrow as asked, and of peaks with many inputs."""
         if self.tolerance is None:
             return True
         if not self.peaks:
