@@ -66,8 +66,7 @@ class Box:
 
     def part(self, output: int, nodes: Rows, low: Array, high: Array) -> Level:
         """Models of one output at some nodes over the part between unit coordinates (d,)."""
-        ends = self.inputs(low), self.inputs(high)
-        whole = over_box(self.system, self.names, *ends)
+        whole = over_box(self.system, self.names, self.inputs(low), self.inputs(high))
         one = slice(output, output + 1)
         structure = replace(
             whole, rows=whole.rows[one], factor=whole.factor[one], order=whole.order[one]

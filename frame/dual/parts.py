@@ -28,7 +28,7 @@ PIECES = (0.5, 0.25)
 EFFORTS = (1, 24)
 """Slabs of a bound over what may be taken away."""
 HOPE = 0.8
-"""Share of an even fall of the gap, over the most parts allowed, below which the effort ends."""
+"""The effort ends where the gap has fallen by less than this share of an even fall."""
 LITTLE = 0.5
 """Shares taken away of all inputs, in sum, below which a part is halved besides."""
 SLABS, STEPS = 240, 40
@@ -119,7 +119,8 @@ class Peak:
 
     def _part(self, low: Array, high: Array, known: Array) -> Part:
         """A part expanded, with bounds at nodes whose bounds known are above the peak."""
-        part = Part(low, high, *self._problem(self.expanded(low, high)))
+        level = self.expanded(low, high)
+        part = Part(low, high, level, self._problem(level))
         part.problem.out[0] = known
         part.problem.run(np.flatnonzero(known > self.top + self.enough), SLABS, STEPS, 1.0, 0.0)
         at = part.whole(part.problem.at)
@@ -129,12 +130,12 @@ class Peak:
         self.top = max(self.top, float(self.value.max()))
         return part
 
-    def _problem(self, level: Level) -> tuple[Level, Problem]:
-        return level, Problem.of(level, 0, self.side, self.enough, self.top)
+    def _problem(self, level: Level) -> Problem:
+        return Problem.of(level, 0, self.side, self.enough, self.top)
 
     def _of_piece(self, part: Part, piece: tuple[Array, Array], slabs: int) -> Array:
         """Bounds over a piece of a part, shape (J,), until one is above the peak."""
-        problem = self._problem(part.level.within(*piece))[1]
+        problem = self._problem(part.level.within(*piece))
         problem.out[0] = part.bound
         for node in np.argsort(-part.bound):
             if part.bound[node] > self.top + self.enough:

@@ -95,6 +95,14 @@ def test_what_is_taken_away_is_bounded(box, monkeypatch, little):
     assert left.all()
 
 
+def test_the_largest_bound_of_what_is_taken_away_is_kept(box, monkeypatch):
+    peak, nodes = peak_of(box, 0.05)
+    part = peak._part(-np.ones(7), np.ones(7), peak.outer)
+    falling = iter(np.linspace(peak.top, 0, 99))
+    monkeypatch.setattr(Peak, "_of_piece", lambda *_: np.full(len(nodes), next(falling)))
+    assert (peak._shaved(part)[1] >= 0.999 * peak.top).all()
+
+
 def within(unit, low, high):
     """Which points lie in a part."""
     return ((low <= unit) & (unit <= high)).all(1)
