@@ -12,20 +12,20 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("stochastic", "rve", "fuzzy", "frame", "alphacut")
 TEXTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
 BOUNDS = {
-    "lines of the packages": 27_000,
-    "files of the packages": 220,
+    "lines of the packages": 33_500,
+    "files of the packages": 235,
     "lines of C": 700,
     "files of C": 1,
     "places of fmt: skip": 10,
     "files in the largest folder": 14,
     "public names of a package": 30,
-    "lines of tests": 14_000,
-    "lines of benchmarks": 4_000,
-    "lines of README, CHANGELOG and docs": 2_600,
+    "lines of tests": 15_500,
+    "lines of benchmarks": 3_000,
+    "lines of README, CHANGELOG and docs": 2_800,
     "commands": 8,
     "options of a command": 12,
-    "case keys": 90,
-    "places that raise": 300,
+    "case keys": 118,
+    "places that raise": 350,
 }
 
 
