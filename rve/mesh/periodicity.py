@@ -11,8 +11,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.mesh.triangulation import Triangulation
+
+SAME_PLACE = 1e-8
+"""Distance of two nodes that are one, in halves of the side: far above the noise of Gmsh's
+coordinates (3e-13), far below the shortest edge (1e-4). More would join nodes of tiny elements."""
+
+
+class MeshError(FailedError):
+    """A mesh of the cell is not sound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +58,45 @@ def unknowns(points: Array) -> Rows:
         points: Positions, shape (n, 2).
 
     Raises:
-        RuntimeError: A node of a side has no partner.
+        MeshError: A node of a side has no partner.
     """
-    side = 10**8
-    keys = np.round(points * side).astype(np.int64)
-    folded = np.where(keys == side, -side, keys)
-    _, first, label = np.unique(folded, axis=0, return_index=True, return_inverse=True)
-    label = label.ravel()
-    sides = (abs(keys) == side).sum(axis=1)
-    if (np.bincount(label)[label] != 2**sides).any():
-        raise RuntimeError("a node of a side has no partner on the opposite side: mesh both alike")
-    corner = (abs(keys[first]) == side).all(axis=1)
-    order = np.argsort(np.where(corner, -1, first))
-    return np.asarray(np.argsort(order)[label] - 1)
+    on_side = abs(abs(points) - 1) <= SAME_PLACE
+    representative: Rows = np.arange(len(points))
+    for axis in (0, 1):
+        first, second = partners(points, on_side[:, axis], axis)
+        representative[first] = representative[second] = np.minimum(first, second)
+    free = ~on_side.all(axis=1)
+    unknown: Rows = np.full(len(points), -1)
+    unknown[free] = np.unique(representative[free], return_inverse=True)[1]
+    return unknown
+
+
+def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
+    """Nodes of the side x = −1 and, in the same order, their nearest nodes of the side x = 1.
+
+    Along a side there is one coordinate, so that the nearest nodes are those of the same rank.
+
+    Args:
+        points: Positions, shape (n, 2).
+        on_side: Whether a node lies on either side, shape (n,).
+        axis: 0 for the sides x1 = ±1, 1 for x2 = ±1.
+
+    Raises:
+        MeshError: A node has no partner within `SAME_PLACE`.
+    """
+    along = points[:, 1 - axis]
+    sides = [
+        nodes[np.argsort(along[nodes])]
+        for nodes in (np.flatnonzero(on_side & (sign * points[:, axis] > 0)) for sign in (-1, 1))
+    ]
+    count = min(map(len, sides))
+    gaps = abs(along[sides[0][:count]] - along[sides[1][:count]])
+    if len(sides[0]) != len(sides[1]) or (gaps > SAME_PLACE).any():
+        lone = int(np.argmax(np.append(gaps > SAME_PLACE, True)))
+        longer = max(sides, key=len)
+        place = f"x{axis + 1} = ±1 at x{2 - axis} = {along[longer[lone]]:.6g}"
+        raise MeshError(
+            f"a node of the sides {place} has no partner on the opposite side",
+            "mesh opposite sides alike",
+        )
+    return sides[0], sides[1]

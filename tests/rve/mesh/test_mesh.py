@@ -8,7 +8,7 @@ pytest.importorskip("dolfinx")
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
 from alphacut.rve.mesh.outline import Ellipse, area, circle, is_round
-from alphacut.rve.mesh.periodicity import identify, unknowns
+from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, moved
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.stochastic import HermiteMap
@@ -62,8 +62,21 @@ def test_a_node_without_a_partner_is_refused():
     points = plane.points.copy()
     side = np.flatnonzero((points[:, 0] == 1) & (abs(points[:, 1]) < 0.9))
     points[side[0], 1] += 1e-3
-    with pytest.raises(RuntimeError, match="has no partner"):
+    with pytest.raises(MeshError, match=r"sides x1 = ±1 at x2 = .* has no partner"):
         unknowns(points)
+    with pytest.raises(MeshError, match="has no partner"):
+        unknowns(np.delete(plane.points, side[1], axis=0))
+
+
+def test_partners_are_found_where_noise_straddles_a_tie_of_rounding():
+    """Gmsh's coordinates of opposite nodes differ by 3e-13; at half a unit of any rounding too."""
+    points = np.array(
+        [[-1, 0.5], [1, 0.5], [0.3, -1], [0.3, 1], [-1, -1], [1, -1], [1, 1], [-1, 1]]
+    )
+    for tie in 10.0 ** -np.arange(2, 16):
+        nearly = points + 3e-13 * np.array([[0, -1], [0, 1], [-1, 0], [1, 0], *[[0, 0]] * 4])
+        nearly[:4] += tie / 2 * np.array([[0, 1], [0, 1], [1, 0], [1, 0]])
+        assert unknowns(nearly).tolist() == [0, 0, 1, 1, -1, -1, -1, -1]
 
 
 @pytest.mark.parametrize("outline", OUTLINES)
