@@ -68,7 +68,7 @@ class Study:
             RefusedError: More than `MOST_CAPPED` of the area lies in cells tighter than that.
         """
         reach = self.shape.reach
-        if self.limits or self.shape is SPHERES:
+        if self.limits or self.shape == SPHERES:
             return sample
         share = 1 - float(sample.cdf(reach))
         value = f"{share:.1%} of the area in cells tighter than r_n = {reach:g}"
@@ -154,7 +154,7 @@ def _sections(
     source = case.source
     if not isinstance(source, Simulated):
         return [section_of(source.read())]
-    if case.shape is not SPHERES:
+    if case.shape != SPHERES:
         return source.sections(case.seed, executor=executor, progress=progress)
     goal = source.packing.fraction
     best, off, fraction = [], np.inf, goal
@@ -193,7 +193,7 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
         resamples=RESAMPLES,
         generator=np.random.default_rng(streams[1]),
     )
-    pbox = least_pbox(fit, kept, band, hold=slopes if case.shape is DISCS else None)
+    pbox = least_pbox(fit, kept, band, hold=slopes if case.shape == DISCS else None)
     return kept, pbox, slopes, band
 
 

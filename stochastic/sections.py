@@ -46,7 +46,7 @@ class Section:
 
 def section_of(particles: Particles) -> Section:
     """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
-    if particles.shape is not DISCS:
+    if particles.shape != DISCS:
         every = np.arange(len(particles), dtype=np.intp)
         return Section(particles, every, cell_volumes(particles), np.ones(len(particles)))
     diagram = apollonius(particles)

@@ -142,7 +142,7 @@ def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
 def natures(summary: Document) -> Iterator[str]:
     """A line on the nature of the peaks."""
     each = {name: Nature(one["nature"]) for name, one in summary.get("envelopes", {}).items()}
-    words = [f"all {nature}" for nature in set(each.values())]
+    words = [f"all {nature}" for nature in dict.fromkeys(each.values())]
     if len(words) > 1:
         words = [f"{nature} ({name})" for name, nature in each.items()]
     if each:

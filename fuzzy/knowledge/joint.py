@@ -68,7 +68,7 @@ def _common(claimed: Mapping[str, Claimed]) -> str:
 def _require_apart(claimed: Mapping[str, Claimed]) -> None:
     for (name, one), (other, two) in combinations(claimed.items(), 2):
         cure = f"{name} and {other} rest on the same values"
-        require(one.number is not two.number and one != two, "independent", True, "False", cure)
+        require(one.number != two.number, "independent", True, "False", cure)
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:

@@ -51,7 +51,7 @@ class Ellipse:
 
 def is_round(outline: Outline) -> bool:
     """True for the circle."""
-    return outline is circle or bool(np.ptp(outline(_ANGLES)) < _ROUND)
+    return bool(np.ptp(outline(_ANGLES)) < _ROUND)
 
 
 def area(outline: Outline) -> float:

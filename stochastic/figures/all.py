@@ -41,7 +41,7 @@ Figures = dict[str, Callable[[], "Figure"]]
 def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
     """Draws every figure into `folder`; name of each figure to its files."""
     figures = of_map(result)
-    if result.study.shape is DISCS:
+    if result.study.shape == DISCS:
         figures |= of_discs(result)
     with style():
         return {name: save(figure(), folder / name) for name, figure in sorted(figures.items())}

@@ -76,7 +76,7 @@ class Packing:
             require(few, f"packing.{self.shape.particles}", self.number, least, cure)
             radii = np.append(radii, self.radii.sample(self.number, generator))
             whole = float(self.shape.measure(radii).sum()) / self.fraction
-            side = float(np.sqrt(whole) if self.shape is DISCS else np.cbrt(whole))
+            side = float(np.sqrt(whole) if self.shape == DISCS else np.cbrt(whole))
         return radii, side
 
     def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:

@@ -1,7 +1,8 @@
 """Packings of discs and spheres: what comes out meets the specification."""
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor
 from itertools import product
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -54,14 +55,17 @@ def test_a_packing_meets_its_specification(law, fraction, shape):
         assert stats.kstest(packing.radii, law.cdf).pvalue > 1e-4
 
 
-def test_one_seed_gives_one_packing_whatever_the_workers():
-    source = Simulated(Packing(60, 0.3, TENFOLD), 5)
-    with ThreadPoolExecutor(3) as pool:
-        shared = source.sections(5, executor=pool)
-    alone, more = source.sections(5), Simulated(source.packing, 6).sections(5)
-    for a, b, c in zip(alone, shared, more[:5], strict=True):
-        assert (a.particles.centres == b.particles.centres).all()
-        assert (a.particles.centres == c.particles.centres).all()
+@pytest.mark.parametrize("shape", [DISCS, SPHERES], ids=lambda shape: shape.particles)
+def test_one_seed_gives_one_packing_in_any_process(shape):
+    source = Simulated(Packing(60, 0.2, TENFOLD, shape), 3)
+    alone, more = source.sections(5), Simulated(source.packing, 4).sections(5)
+    for start in ("spawn", "fork"):
+        with ProcessPoolExecutor(2, get_context(start)) as pool:
+            shared = source.sections(5, executor=pool)
+        for a, b, c in zip(alone, shared, more[:3], strict=True):
+            assert (a.particles.centres == b.particles.centres).all()
+            assert (a.cells == b.cells).all()
+            assert (a.particles.centres == c.particles.centres).all()
     assert not np.isclose(alone[0].particles.centres, alone[1].particles.centres).any()
 
 
