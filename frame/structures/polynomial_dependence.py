@@ -25,7 +25,18 @@ that everything is computed in.
 
 
 class UnprovedError(FailedError):
-    """A property that a proof needs does not hold, or is not known to hold."""
+    """A property that a proof needs does not hold, or is not known to hold.
+
+    Args:
+        what: The property.
+        cure: What the caller can change.
+        along: Input, by its place among those of the box, whose bisection is most likely to help;
+            None where none stands out.
+    """
+
+    def __init__(self, what: str, cure: str = "", along: int | None = None) -> None:
+        super().__init__(what, cure)
+        self.along = along
 
 
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
