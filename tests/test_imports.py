@@ -71,7 +71,7 @@ def test_imports_point_one_way(package):
 
 
 ROOMS = {
-    "alphacut": ("io", "case", "stages", "export", "figures", "report", "commands"),
+    "alphacut": ("io", "records", "case", "stages", "export", "figures", "report", "commands"),
     "fuzzy": ("sets", "knowledge", "campaign", "plans"),
     "frame": ("calculus", "structures", "dynamics", "modal", "certificate", "methods"),
     "rve": ("mesh", "planar", "slices", "series", "table"),

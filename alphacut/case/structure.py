@@ -16,8 +16,8 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, chosen, require
-from alphacut.io.measured import accelerogram
 from alphacut.io.problem import suggestion
+from alphacut.records.read import read_recording
 
 Mass = Annotated[FuzzyNumber, Quantity("kg", above=0, fuzzy=True)]
 Span = Annotated[FuzzyNumber, Quantity("m", above=0, fuzzy=True)]
@@ -118,7 +118,7 @@ class Structure:
 
 
 def _record(value: object, info: ValidationInfo) -> Accelerogram:
-    return accelerogram(case_file(value, info))
+    return read_recording(case_file(value, info)).accelerogram()
 
 
 class Frame(Section):
@@ -162,7 +162,7 @@ class Frame(Section):
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
     accelerogram: Annotated[Accelerogram, text(_record)] | None = Field(
         default=None,
-        description="CSV or AT2 file of the ground's acceleration; motion is relative to it",
+        description="file of the ground's acceleration; motion is relative to it",
     )
     outputs: tuple[str, ...] = Field(
         default=(), description="observed quantities: q1, v1, a1, drift1, shear1 …, base_shear"

@@ -1,0 +1,76 @@
+"""Records in CSV files: a column of times, a column of accelerations, their units in the head."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import require
+from alphacut.io.quantity import factor
+from alphacut.records.recording import Recording
+from alphacut.records.text_file import TextFile, acceleration_factor
+from alphacut.stochastic.particles.csv_columns import NUMBER
+
+HEAD = re.compile(r"(time|t)\s*[\[(](.+)[\])]|(acceleration|acc|a)\s*[\[(](.+)[\])]", re.IGNORECASE)
+ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
+UNEVEN = 0.05
+"""Share of a step by which a time may miss its place, as times that are rounded do."""
+
+
+def read_csv_record(file: TextFile) -> Recording:
+    """Recording of a CSV file with even steps from t = 0.
+
+    Raises:
+        RefusedError: A unit is wrong, a row is no pair of numbers, or the steps are not even.
+    """
+    (_, head), *rows = _rows(file)
+    time_factor, unit, size = _units(file, head)
+    table = np.array([[_number(file, place, cells, k) for k in (0, 1)] for place, cells in rows])
+    step = _even_step(file, time_factor * table[:, 0], [place for place, _ in rows])
+    return Recording("CSV", unit, step, size * table[:, 1])
+
+
+def _rows(file: TextFile) -> list[tuple[int, list[str]]]:
+    """Lines from 0 that are neither empty nor comments, cut at the head's separator."""
+    lines = [(place, line) for place, line in enumerate(file.lines)]
+    lines = [(place, line) for place, line in lines if line.strip() and not line.startswith("#")]
+    allowed = "a header with units, and rows of numbers below it"
+    require(len(lines) > 1, file.name, f"{len(lines)} lines", allowed)
+    separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
+    return [(place, next(csv.reader([line], delimiter=separator))) for place, line in lines]
+
+
+def _units(file: TextFile, head: list[str]) -> tuple[float, str, float]:
+    """Size of the unit of time in s; unit of acceleration, and its size in m/s²."""
+    matches = [HEAD.fullmatch(cell.strip()) for cell in head]
+    if len(matches) == 2 and matches[0] and matches[0][2] and matches[1] and matches[1][4]:
+        unit = matches[1][4]
+        try:
+            size = acceleration_factor(unit) or float(factor(unit, "m/s^2"))
+            return float(factor(matches[0][2], "s")), unit, size
+        except ValueError:
+            pass
+    raise file.refusal(0, ",".join(head)[:80], ALLOWED)
+
+
+def _number(file: TextFile, place: int, cells: Sequence[str], column: int) -> float:
+    text = cells[column].strip() if column < len(cells) else ""
+    if not NUMBER.fullmatch(text) or not np.isfinite(float(text)):
+        what = f"{text[:40]!r} in column {column + 1}"
+        raise file.refusal(place, what, "numbers such as 1.25 or 1e-3")
+    return float(text)
+
+
+def _even_step(file: TextFile, time: Array, places: list[int]) -> float:
+    """The step of times that are even from 0."""
+    even = np.linspace(0, time[-1], len(time))
+    off = np.abs(time - even)
+    worst = int(off.argmax())
+    if not (len(time) > 1 and time[-1] > 0 and off[worst] <= UNEVEN * even[1]):
+        value, allowed = f"time {time[worst]:g} s", "even steps from 0 s"
+        raise file.refusal(places[worst], value, allowed, "resample to even steps")
+    return float(even[1])

@@ -1,0 +1,43 @@
+"""Recordings from files as they are downloaded; the format is that of the content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from alphacut.records.cosmos import is_cosmos, read_cosmos
+from alphacut.records.csv_record import read_csv_record
+from alphacut.records.esm import is_esm, read_esm
+from alphacut.records.knet import is_knet, read_knet
+from alphacut.records.peer import is_peer, read_peer
+from alphacut.records.recording import Recording
+from alphacut.records.text_file import TextFile
+
+FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (
+    (is_knet, read_knet),
+    (is_esm, read_esm),
+    (is_peer, read_peer),
+)
+"""Formats of one channel: what tells a file of it, and its reader."""
+
+
+def read_recording(path: Path, channel: str = "") -> Recording:
+    """Recording of a file of PEER, K-NET, ESM or COSMOS, or of a CSV file.
+
+    Args:
+        path: The file.
+        channel: Channel of a COSMOS file with several.
+
+    Raises:
+        RefusedError: The file cannot be read, is of another format, or its head and its samples
+            do not fit; the message names the line.
+    """
+    file = TextFile.read(path)
+    if is_cosmos(file):
+        return read_cosmos(file, channel)
+    for is_format, read in FORMATS:
+        if is_format(file):
+            return read(file)
+    if path.suffix.lower() == ".at2":
+        return read_peer(file)  # refuses, and says what a head has
+    return read_csv_record(file)

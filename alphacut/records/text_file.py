@@ -1,0 +1,112 @@
+"""Text of a downloaded file: its lines, numbers by place, and refusals that name the line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.quantity import factor
+
+NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?")
+"""A number as C, Python or FORTRAN writes it; D stands for E."""
+GRAVITY_UNIT = re.compile(r"g(?:'s|s)?", re.IGNORECASE)
+PER_SECOND_SQUARED = re.compile(
+    r"(cm|m)\s*/\s*(?:s(?:ec)?\s*/\s*s(?:ec)?|s(?:ec)?\s*(?:\^|\*\*)?\s*(?:2|²))", re.IGNORECASE
+)
+ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
+
+
+@dataclass(frozen=True)
+class TextFile:
+    """The lines of a text file.
+
+    Args:
+        name: Name of the file, for messages.
+        lines: Its lines without their ends.
+    """
+
+    name: str
+    lines: tuple[str, ...]
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """The lines of a file in UTF-8 or Latin-1.
+
+        Raises:
+            RefusedError: The file cannot be read, or holds bytes that no text has.
+        """
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            reason = str(error.strerror or "unreadable").lower()
+            raise RefusedError(str(path), reason, "a text file") from None
+        if b"\0" in content:
+            raise RefusedError(path.name, "no text", "a text file with a record")
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+        return cls(path.name, tuple(re.split(r"\r\n|\r|\n", text)))
+
+    def refusal(self, line: int, value: object, allowed: str, cure: str = "") -> RefusedError:
+        """Error about a line, counted from 0."""
+        return RefusedError(f"{self.name}, line {line + 1}", str(value)[:80], allowed, cure)
+
+    def numbers(self, first: int, last: int, *, width: int = 0) -> Array:
+        """All numbers from line `first` up to, but not with, line `last`.
+
+        Args:
+            first: Line from 0.
+            last: Line from 0.
+            width: Columns of one number in files of fixed columns; 0 where spaces part them.
+
+        Raises:
+            RefusedError: Something there is no finite number.
+        """
+        values: list[float] = []
+        for place in range(first, min(last, len(self.lines))):
+            for word in _words(self.lines[place], width):
+                values.append(self._number(place, word))
+        return np.array(values)
+
+    def _number(self, line: int, word: str) -> float:
+        value = float(re.sub("[dD]", "e", word)) if NUMBER.fullmatch(word) else np.nan
+        if not isfinite(value):
+            raise self.refusal(line, repr(word), "finite numbers such as -.1394908E-02")
+        return value
+
+    def require_count(self, samples: Array, count: int, line: int) -> None:
+        """Refuses another number of samples than the head states.
+
+        Raises:
+            RefusedError: There are more or fewer.
+        """
+        if len(samples) != count:
+            what = f"{count} samples, and {len(samples)} follow"
+            raise self.refusal(line, what, "as many samples as the head states", "load it anew")
+
+
+def acceleration_factor(unit: str) -> float | None:
+    """Size in m/s² of a unit of acceleration as files of records write it; None of others."""
+    text = unit.strip().strip("()[]").strip()
+    if GRAVITY_UNIT.fullmatch(text):
+        return float(factor("g", "m/s^2"))
+    if text.lower() in ("gal", "gals"):
+        return float(factor("gal", "m/s^2"))
+    match = PER_SECOND_SQUARED.fullmatch(text)
+    return None if match is None else {"cm": 0.01, "m": 1.0}[match[1].lower()]
+
+
+def _words(line: str, width: int) -> Sequence[str]:
+    if not width:
+        return line.split()
+    cells = (line[place : place + width].strip() for place in range(0, len(line.rstrip()), width))
+    return [cell for cell in cells if cell]
