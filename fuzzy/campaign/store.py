@@ -3,8 +3,9 @@
 Samples are keyed by what they depend on: the identity of the model (case, mesh options, versions:
 whatever the caller names) and the values of all inputs. Each row carries a checksum over all of it,
 and a batch is one transaction: a killed process or a power cut loses what was not yet written.
-Opening a store reads and checks every row. A file that is damaged is set aside, what is whole of it
-goes into a new one, and a warning says so in one line; what is lost is computed anew.
+Opening a store reads and checks every row. Of a damaged file the whole rows go into a new one, and
+a warning says so in one line; what is lost is computed anew. A store is told by the application id
+of SQLite. Links, devices, pipes and data bases of other programs are refused untouched.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+import stat
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
@@ -27,8 +29,13 @@ from alphacut.fuzzy.refused import FailedError, require
 
 Identity = Mapping[str, object]
 _PATIENCE = 60.0  # seconds to wait for another campaign's write
-_TABLE = """create table if not exists sample
+_APPLICATION = 0x616C7068
+"""Application id in the head of each store: "alph" in ASCII."""
+_TABLE = """CREATE TABLE sample
 (model blob, point text, layout text, outputs blob, checksum blob, primary key (model, point))"""
+_SCHEMA = "select sql from sqlite_master where sql is not null"
+_HEAD = 72
+"""Bytes of the head of an SQLite file that end with its application id."""
 _TROUBLE = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
 _COLUMNS = "model, point, layout, outputs, checksum"
 
@@ -90,23 +97,26 @@ class Store:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         self._rows: dict[tuple[bytes, str], Row] = {}
-        cure = "move it away, or name another path"
+        allowed, cure = (
+            "a file of samples that may be written",
+            "move it away, or name another path",
+        )
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            start = self.path.open("rb").read(16) if self.path.exists() else b""
+            is_store = _is_store(self.path)
         except OSError as error:
-            start, cure = b"unknown", str(error)
-        own = start in (b"", b"SQLite format 3\0")
-        require(own, "store", self.path, "a file of samples that may be written", cure)
+            is_store, cure = False, str(error)
+        require(is_store, "store", self.path, allowed, cure)
         self._connection = self._opened()
 
     def _opened(self) -> sqlite3.Connection:
         """The file with its rows read, mended if it is damaged."""
-        connection = self._connected()
+        connection = self._connected(self.path)
         with self.reported():
             try:
                 _prepare(connection)
                 damaged = connection.execute("pragma quick_check").fetchone() != ("ok",)
+                damaged |= connection.execute(_SCHEMA).fetchall() != [(_TABLE,)]
             except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
                 name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
                 if any(word in name for word in _TROUBLE):  # locks, space or rights: no damage
@@ -129,26 +139,27 @@ class Store:
         return whole
 
     def _mended(self, connection: sqlite3.Connection) -> sqlite3.Connection:
-        """A new file with the rows that are whole; the damaged one is kept beside it."""
+        """A new file with the rows that are whole; the damaged one stays beside it if it can."""
         self._read(connection, "desc")  # up to the damage from its other side
         connection.close()
         aside = self.path.with_name(f"{self.path.name}.damaged")
         with suppress(FileNotFoundError):
             os.remove(f"{self.path}-journal")
-        os.replace(self.path, aside)
-        fresh = self._connected()
+        if os.path.lexists(aside):  # of an earlier damage, or of somebody else
+            os.remove(self.path)
+        else:
+            os.rename(self.path, aside)
+        fresh = self._connected(self.path)
         with self.reported():
             _prepare(fresh)
         self._write(fresh, self._rows.values())
         said = f"{len(self._rows)} samples are whole, the others are run anew"
-        warnings.warn(
-            f"the store {self.path} was damaged: {said}; it is kept as {aside}", stacklevel=2
-        )
+        warnings.warn(f"the store {self.path} was damaged: {said}", stacklevel=2)
         return fresh
 
-    def _connected(self) -> sqlite3.Connection:
+    def _connected(self, path: Path) -> sqlite3.Connection:
         with self.reported():
-            return sqlite3.connect(self.path, timeout=_PATIENCE)
+            return sqlite3.connect(path, timeout=_PATIENCE)
 
     def get(self, model: bytes, point: str) -> Sample | None:
         """The sample of a model at a point; None where there is none."""
@@ -187,8 +198,48 @@ class Store:
 
 
 def _prepare(connection: sqlite3.Connection) -> None:
+    """Marks the file as a store and adds its table, where it is new or of an older version."""
     connection.execute("pragma synchronous = full")
-    connection.execute(_TABLE)
+    if connection.execute("pragma application_id").fetchone() != (_APPLICATION,):
+        connection.execute(f"pragma application_id = {_APPLICATION}")
+    if not connection.execute("select 1 from sqlite_master where name = 'sample'").fetchall():
+        connection.execute(_TABLE)
+
+
+def _is_store(path: Path) -> bool:
+    """True for a store, an empty file, or where there is nothing; none of them a link.
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    beside = (path.with_name(f"{path.name}{end}") for end in ("-journal", "-wal", "-shm"))
+    if not all(_is_regular(one, missing=True) for one in (path, *beside)):
+        return False
+    if not os.path.lexists(path):
+        return True
+    with path.open("rb") as file:
+        head = file.read(_HEAD)
+    if not head.startswith(b"SQLite format 3\0"):
+        return not head
+    application = int.from_bytes(head[_HEAD - 4 :], "big")
+    return application == _APPLICATION or (application == 0 and _is_older(path))
+
+
+def _is_regular(path: Path, *, missing: bool) -> bool:
+    """True for a regular file, which no link, device or pipe is."""
+    try:
+        return stat.S_ISREG(os.lstat(path).st_mode)
+    except FileNotFoundError:
+        return missing
+
+
+def _is_older(path: Path) -> bool:
+    """True for a file whose only table is that of a store, before stores had an id."""
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as base:
+            return base.execute(_SCHEMA).fetchall() == [(_TABLE,)]
+    except (sqlite3.Error, UnicodeDecodeError):
+        return False
 
 
 def model_key(identity: Identity) -> bytes:

@@ -3,10 +3,12 @@
 import os
 import random
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 import warnings
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -249,3 +251,86 @@ def test_forty_kills_with_free_seeds(tmp_path, workers):
     seed = int(os.environ.get("SEED", random.randrange(10**9)))
     print("seed", seed)
     check_kills(tmp_path, 20, random.Random(seed), workers)
+
+
+def device(path):
+    path.symlink_to("/dev/null")
+
+
+def database_of_another_program(path):
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("create table book (title text)")
+        base.commit()
+
+
+def database_with_our_table_and_another(path):
+    run(path)
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("pragma application_id = 0")
+        base.execute("create table book (title text)")
+        base.commit()
+
+
+def link(path):
+    run(path.with_name("real.db"))
+    path.symlink_to(path.with_name("real.db"))
+
+
+def journal_that_is_a_link(path):
+    run(path)
+    path.with_name(f"{path.name}-journal").symlink_to("/dev/null")
+
+
+FOREIGN = (
+    device,
+    os.mkfifo,
+    os.mkdir,
+    link,
+    database_of_another_program,
+    database_with_our_table_and_another,
+    journal_that_is_a_link,
+)
+
+
+@pytest.mark.parametrize("made", FOREIGN, ids=lambda made: made.__name__)
+def test_what_is_nobodys_store_is_refused_and_not_touched(tmp_path, made):
+    path = tmp_path / "s.db"
+    made(path)
+
+    def state():
+        files = sorted(tmp_path.iterdir())
+        return [(x.name, x.lstat(), x.read_bytes() if x.is_file() else b"") for x in files]
+
+    before = state()
+    with pytest.raises(RefusedError, match="a file of samples"):
+        run(path)
+    assert [(name, text) for name, _, text in state()] == [(x, text) for x, _, text in before]
+    for (_, now, _), (_, then, _) in zip(state(), before, strict=True):
+        assert (now.st_mode, now.st_ino, now.st_mtime_ns) == (
+            then.st_mode,
+            then.st_ino,
+            then.st_mtime_ns,
+        )
+
+
+def test_a_store_without_an_id_is_taken_and_marked(tmp_path):
+    path = tmp_path / "s.db"
+    run(path)
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("pragma application_id = 0")
+    for _ in range(2):
+        run(path)
+        assert not calls
+    assert path.read_bytes()[68:72] == b"alph"
+
+
+def test_a_second_damage_leaves_the_copy_of_the_first(tmp_path):
+    path = tmp_path / "s.db"
+    for stored in ("first", "second"):
+        run(path)
+        with closing(sqlite3.connect(path)) as base:
+            base.execute("update sample set layout = ? where rowid = 1", (stored,))
+            base.commit()
+        with pytest.warns(UserWarning, match="54 samples are whole"):
+            run(path)
+    assert b"first" in (tmp_path / "s.db.damaged").read_bytes()
