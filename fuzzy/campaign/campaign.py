@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -73,7 +73,7 @@ class Campaign:
 
     Attributes:
         failed: Samples left out.
-        layout: Names and shapes of the outputs, as the first sample had them.
+        layout: Names and shapes of the outputs, as the first sample of the design has them.
 
     Raises:
         RefusedError: The budget is no positive whole number, or a fact names no input.
@@ -152,10 +152,17 @@ class Campaign:
         for row, outcome in batch.outcomes.items():
             if isinstance(outcome, Sample):
                 array[row] = outcome.row
-        return array
+        return array if self._rows else self._arranged(array, batch.layouts)
+
+    def _arranged(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
+        """The first batch with outputs in the order of its first row, whichever ended first."""
+        values = Values(self.layout, array)
+        self.layout = layouts[min(layouts)]
+        columns = [values.output(name).reshape(len(array), -1) for name, _ in self.layout]
+        return np.concatenate(columns, axis=1)
 
     def in_order(self, outcome: Outcome) -> Outcome:
-        """The outcome with its outputs in the order of the first sample's."""
+        """The outcome with its outputs in the order of `layout`."""
         if isinstance(outcome, Failure) or outcome.layout == self.layout:
             return outcome
         if not self.layout:
@@ -181,6 +188,7 @@ class _Batch:
     def __init__(self, campaign: Campaign, points: Array) -> None:
         self.campaign, self.points = campaign, points
         self.outcomes: dict[int, Outcome] = {}
+        self.layouts: dict[int, Layout] = {}  # as the function returned them
         self._gathered: dict[str, Sample] = {}
         self._written, self._cost = perf_counter(), 0.0
 
@@ -208,7 +216,7 @@ class _Batch:
         for row in range(len(self.points)):
             sample = campaign.store.get(campaign.model, self._key(row))
             if sample is not None:
-                self.outcomes[row] = campaign.in_order(sample)
+                self._keep(row, sample)
 
     def _tasks(self) -> Iterator[Task]:
         """Calls to be made, without samples that are stored."""
@@ -216,9 +224,14 @@ class _Batch:
             if rows := [row for row in group if row not in self.outcomes]:
                 yield rows, self.points[rows]
 
+    def _keep(self, row: int, outcome: Outcome) -> None:
+        self.outcomes[row] = self.campaign.in_order(outcome)
+        if isinstance(outcome, Sample) and isinstance(self.outcomes[row], Sample):
+            self.layouts[row] = outcome.layout
+
     def _record(self, row: int, outcome: Outcome) -> None:
-        outcome = self.outcomes[row] = self.campaign.in_order(outcome)
-        if self.campaign.store and isinstance(outcome, Sample):
+        self._keep(row, outcome)
+        if self.campaign.store and isinstance(outcome, Sample) and row in self.layouts:
             self._gathered[self._key(row)] = outcome
 
     def _write(self, *, now: bool = False) -> None:
