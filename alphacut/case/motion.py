@@ -110,7 +110,12 @@ class Envelope(Section):
 class Identify(Section):
     """Measured natural modes, from which inputs are identified."""
 
-    measured: CaseFile = Field(description="CSV file mode,frequency [Hz],q1,q2 …")
+    measured: CaseFile = Field(
+        description="CSV file mode,frequency [Hz],q1,q2 …, or a universal file"
+    )
+    floors: dict[str, Annotated[int, Quantity(least=1, whole=True)]] = Field(
+        default={}, description='floor of each unknown of a universal file, as {"12.x" = 1}'
+    )
     learn: Names = Field(description="inputs that are identified, as c or k1")
     held_out: tuple[Annotated[int, Quantity(least=1, whole=True)], ...] = Field(
         default=(), description="modes that are predicted and not learned from"

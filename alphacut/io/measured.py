@@ -1,8 +1,9 @@
-"""Measured natural modes from files."""
+"""Measured natural modes from a CSV file."""
 
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,8 +13,15 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.stochastic.particles.csv_columns import fields, number
 
-MODES_HEAD = re.compile(r"mode\s*,\s*frequency(\s*\[Hz\])?(\s*,\s*q[1-9]\d*)*\s*")
-MODES = "mode,frequency [Hz],q1,q2 … with the floors that were measured"
+HEAD = re.compile(
+    r"mode\s*,\s*frequency(\s*\[Hz\])?"
+    r"(?P<frequency>\s*,\s*frequency_std(\s*\[Hz\])?)?(?P<shape>\s*,\s*shape_std)?"
+    r"(?P<floors>(\s*,\s*q[1-9]\d*)*)\s*"
+)
+ALLOWED = (
+    "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
+    " shape_std may stand before q1"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,47 +32,87 @@ class ModeRows:
         mode: Its number.
         frequencies: In Hz, shape (rows,).
         amplitudes: By floor, each of shape (rows,), to any scale.
+        frequency_deviation: Standard deviation of a frequency as a share of the mean; None where
+            the file states none.
+        shape_deviation: Standard deviation of an amplitude as a share of the mode's largest; None
+            where the file states none.
     """
 
     mode: int
     frequencies: Array
     amplitudes: dict[int, Array]
+    frequency_deviation: float | None = None
+    shape_deviation: float | None = None
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Places of the columns that a file may have."""
+
+    frequency_std: int | None
+    shape_std: int | None
+    floors: dict[int, int]
 
 
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     """The measurements of each mode, by rising number, from ``mode,frequency [Hz],q1,q2``.
 
-    An empty amplitude was not measured.
+    An empty amplitude was not measured. Standard deviations, which operational modal analysis
+    states beside the modes, may stand in columns of their own.
 
     Raises:
         RefusedError: The file is missing, its header or a row is wrong, or a mode has some
             amplitudes in one row and not in another.
     """
     (_, head), *rows = fields(path)
-    floors = (
-        [int(cell.strip()[1:]) for cell in head[2:]] if MODES_HEAD.fullmatch(",".join(head)) else []
-    )
-    whole = len(set(floors)) == len(head) - 2
-    require(whole, f"{path.name}, header", ",".join(head)[:80], MODES)
-    modes: dict[int, list[list[float]]] = {}
+    columns = _columns(path, head)
+    modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
-        mode, frequency = (number(path, row, cells, k) for k in (0, 1))
-        allowed = "a mode from 1 and a frequency above 0"
-        right = mode >= 1 and mode % 1 == 0 and frequency > 0
-        require(right, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
-        shape = [
-            number(path, row, cells, k) if cells[k : k + 1] != [""] else np.nan
-            for k in range(2, len(head))
+        values = [
+            number(path, row, cells, place) if cells[place : place + 1] != [""] else np.nan
+            for place in range(len(head))
         ]
-        modes.setdefault(int(mode), []).append([frequency, *shape])
-    return tuple(_mode(mode, np.array(modes[mode]), floors, path) for mode in sorted(modes))
+        mode, frequency = values[:2]
+        allowed = "a mode from 1, a frequency above 0, and deviations above 0"
+        deviations = [values[k] for k in (columns.frequency_std, columns.shape_std) if k]
+        right = mode >= 1 and mode % 1 == 0 and all(x > 0 for x in (frequency, *deviations))
+        require(right, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
+        modes[int(mode)].append(values)
+    return tuple(_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes))
 
 
-def _mode(mode: int, values: Array, floors: list[int], path: Path) -> ModeRows:
-    """The measurements of one mode, shape (rows, 1 + floors)."""
-    missing = np.isnan(values[:, 1:])
-    if (missing.any(axis=0) != missing.all(axis=0)).any():
+def _columns(path: Path, head: list[str]) -> _Columns:
+    match = HEAD.fullmatch(",".join(head))
+    names = [cell.strip() for cell in head]
+    floors = {int(name[1:]): place for place, name in enumerate(names) if name.startswith("q")}
+    known = match is not None and len(floors) == sum(name.startswith("q") for name in names)
+    require(known, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
+    assert match is not None
+    frequency_std = 2 if match["frequency"] else None
+    shape_std = (3 if match["frequency"] else 2) if match["shape"] else None
+    return _Columns(frequency_std, shape_std, floors)
+
+
+def _mode(path: Path, mode: int, values: Array, columns: _Columns) -> ModeRows:
+    """The measurements of one mode from its rows, shape (rows, columns)."""
+    amplitudes = {floor: values[:, place] for floor, place in columns.floors.items()}
+    missing = {floor: np.isnan(row) for floor, row in amplitudes.items()}
+    if any(gaps.any() and not gaps.all() for gaps in missing.values()):
         allowed = "an amplitude of a floor in every row of a mode, or in none"
         raise RefusedError(f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
-    shape = {floor: values[:, k] for k, floor in enumerate(floors, 1) if not missing[0, k - 1]}
-    return ModeRows(mode, values[:, 0], shape if len(shape) > 1 else {})
+    shape = {floor: row for floor, row in amplitudes.items() if not missing[floor].all()}
+    frequencies, largest = values[:, 1], max((abs(x).mean() for x in shape.values()), default=0.0)
+    return ModeRows(
+        mode,
+        frequencies,
+        shape if len(shape) > 1 else {},
+        _share(values, columns.frequency_std, float(frequencies.mean())),
+        _share(values, columns.shape_std, float(largest)) if len(shape) > 1 else None,
+    )
+
+
+def _share(values: Array, column: int | None, size: float) -> float | None:
+    """Root mean square of a column of deviations as a share; None without the column."""
+    if column is None:
+        return None
+    return float(np.sqrt((values[:, column] ** 2).mean())) / size

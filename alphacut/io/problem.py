@@ -78,7 +78,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 ELEMENTS = ("dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py")
-EXTRAS = {"skimage": "particles", **dict.fromkeys(ELEMENTS, "cell")}
+EXTRAS = {"skimage": "particles", "pyuff": "uff", **dict.fromkeys(ELEMENTS, "cell")}
 
 
 def missing(error: ImportError) -> str:

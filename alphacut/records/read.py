@@ -12,6 +12,7 @@ from alphacut.records.knet import is_knet, read_knet
 from alphacut.records.peer import is_peer, read_peer
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import TextFile
+from alphacut.records.uff import ENDINGS, read_uff_record
 
 FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]], ...] = (
     (is_knet, read_knet),
@@ -22,16 +23,18 @@ FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]
 
 
 def read_recording(path: Path, channel: str = "") -> Recording:
-    """Recording of a file of PEER, K-NET, ESM or COSMOS, or of a CSV file.
+    """Recording of a file of PEER, K-NET, ESM or COSMOS, of a universal or a CSV file.
 
     Args:
         path: The file.
-        channel: Channel of a COSMOS file with several.
+        channel: Channel of a COSMOS or universal file with several.
 
     Raises:
         RefusedError: The file cannot be read, is of another format, or its head and its samples
             do not fit; the message names the line.
     """
+    if path.suffix.lower() in ENDINGS:
+        return read_uff_record(path, channel)
     file = TextFile.read(path)
     if is_cosmos(file):
         return read_cosmos(file, channel)

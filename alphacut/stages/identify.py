@@ -14,6 +14,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 from alphacut.io.files import Document
 from alphacut.io.measured import ModeRows, mode_rows
+from alphacut.records.uff import ENDINGS, uff_mode_rows
 
 
 def learned(
@@ -30,7 +31,7 @@ def learned(
         RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
     require(alpha[0] > 0, "envelope.alpha", list(alpha), "levels above 0")
-    rows = {row.mode: row for row in mode_rows(section.measured)}
+    rows = {row.mode: row for row in _rows(section)}
     some, held = f"some of modes {[*rows]}, not all", section.held_out
     require(set(held) < set(rows), "identify.held_out", ", ".join(map(str, held)), some)
     used = [_measured(section, row) for mode, row in rows.items() if mode not in held]
@@ -47,14 +48,25 @@ def learned(
     return document, replace(structure, numbers={**structure.numbers, **after.numbers})
 
 
+def _rows(section: Identify) -> tuple[ModeRows, ...]:
+    """Measurements of all modes, from a CSV or a universal file."""
+    universal = section.measured.suffix.lower() in ENDINGS
+    allowed = "the floors of its unknowns" if universal else "left out beside a CSV file"
+    given = bool(section.floors)
+    require(given == universal, "identify.floors", section.floors or None, allowed)
+    if universal:
+        return uff_mode_rows(section.measured, section.floors)
+    return mode_rows(section.measured)
+
+
 def _measured(section: Identify, row: ModeRows) -> MeasuredMode:
     shapes = {floor: [*map(float, values)] for floor, values in row.amplitudes.items()}
     return measured_mode(
         row.mode,
         row.frequencies,
         shapes,
-        frequency_deviation=section.frequency_deviation,
-        shape_deviation=section.shape_deviation,
+        frequency_deviation=row.frequency_deviation or section.frequency_deviation,
+        shape_deviation=row.shape_deviation or section.shape_deviation,
     )
 
 
