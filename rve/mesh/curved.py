@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot
+from functools import partial
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.outline import Outline, circle, extents, require_fit
+from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading, particle_grading
+from alphacut.rve.mesh.jacobian import LEAST_RATIO, jacobian_ratios
+from alphacut.rve.mesh.outline import Outline, circle, is_round, require_fit
 from alphacut.rve.settings import require_mesh_size
 
 _CLOSEST = 0.9995
-_COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
+COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
+
+ORDERS = 2, 3, 4, 5
+"""Polynomial degrees for which meshes about particles that are not round are sound."""
 
 
 @dataclass(frozen=True)
@@ -47,38 +53,46 @@ def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> Plan
 
     Raises:
         RefusedError: A value out of range, or particles nearly touch: the mesh between them would
-            have no end.
+            have no end; or an outline is so sharp that elements fold however short they are.
     """
     require_mesh_size(size)
     require_fit(outline, radius, _CLOSEST)
-    size, (wide, high, least) = min(size, _COARSEST), (radius * one for one in extents(outline))
+    size, local = min(size, COARSEST), particle_grading(outline, radius)
+    if is_round(outline):
+        return _graded(radius, size, outline, local)
+    for refinement in REFINEMENTS:
+        bend = bend_grading(outline, radius, refinement)
+        sizes = partial(_smaller, local, bend)
+        mesh = _graded(radius, size, outline, sizes)
+        if all(is_sound(mesh, order) for order in ORDERS):
+            return mesh
+    raise RefusedError(
+        "outline",
+        "so sharp that curved elements fold",
+        f"outlines with det J > {LEAST_RATIO} of its mean",
+        "round its corners, or take an image of it as the cell",
+    )
+
+
+def is_sound(mesh: PlaneMesh, order: int) -> bool:
+    """True if det J of all elements of an order exceeds `LEAST_RATIO` of its mean."""
+    ratios = jacobian_ratios(*curved_nodes(mesh, order), order)
+    return bool((ratios > LEAST_RATIO).all())
+
+
+def _smaller(first: Sizes, second: Sizes, x: float, y: float) -> float:
+    return min(first(x, y), second(x, y))
+
+
+def _graded(radius: float, size: float, outline: Outline, sizes: Sizes) -> PlaneMesh:
+    """Mesh with edges of `size` times `sizes`, the vertices of the interface on the outline."""
     points, triangles, inside = square.triangles(
-        size, radius, outline, lambda x, y: size * _grading(x, y, wide, high, least)
+        size, radius, outline, lambda x, y: size * sizes(x, y)
     )
     shared = np.intersect1d(triangles[inside], triangles[~inside])
     x, y = points[shared].T  # Gmsh's splines are near the outline only
     points[shared] *= (radius * outline(np.arctan2(y, x)) / np.hypot(x, y))[:, None]
     return PlaneMesh(points, np.sort(triangles, axis=1), inside, radius, outline)
-
-
-def _grading(x: float, y: float, wide: float, high: float, least: float) -> float:
-    """Local edge length over the nominal one, less near the particle and in gaps.
-
-    The factors spread the error evenly over radii from 0.1 to 0.98. Gmsh calls this for every
-    point, hence no NumPy.
-
-    Args:
-        x: First coordinate.
-        y: Second coordinate.
-        wide: Greatest |x1| of the particle.
-        high: Greatest |x2|.
-        least: Least distance of its outline from the centre.
-    """
-    x, y = abs(x), abs(y)
-    near = 1.4 * max(hypot(x, y), least)
-    beside = 1 - wide + y * y / (2 * wide) + max(0.0, wide - x)
-    above = 1 - high + x * x / (2 * high) + max(0.0, high - y)
-    return min(1.0, near, 4 * beside, 4 * above)
 
 
 def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:

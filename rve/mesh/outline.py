@@ -13,6 +13,7 @@ from alphacut.fuzzy.refused import RefusedError
 Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
 _ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
+_BENDS = 720
 _ROUND = 1e-12
 
 
@@ -84,3 +85,25 @@ def require_fit(outline: Outline, radius: float, most: float = 1.0) -> None:
     if not radius > 0 or radius * reach(outline) >= most:
         allowed = f"values in (0, {most / reach(outline):.4g}), in halves of the cell's side"
         raise RefusedError("radius", f"{radius:g}", allowed)
+
+
+def bend_radii(outline: Outline) -> tuple[Array, Array]:
+    """Points x(φ) of an outline of ρ = 1 and how sharply it bends there.
+
+    The measure is |x'|²/|x''|: the radius of curvature where the angle φ runs evenly along the
+    outline, and less where it does not. Edges that are short beside it have their nodes, which are
+    even in φ, nearly even along the arc.
+
+    Returns:
+        Shapes (n, 2) and (n,).
+    """
+    angles: Array = np.asarray(np.arange(_BENDS) * (2 * np.pi / _BENDS), float)
+    points = outline(angles)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    before, after, step = (
+        np.roll(points, 1, axis=0),
+        np.roll(points, -1, axis=0),
+        2 * np.pi / _BENDS,
+    )
+    speed = (after - before) / (2 * step)
+    turn = (after - 2 * points + before) / step**2
+    return points, np.asarray((speed**2).sum(axis=1) / np.maximum(np.hypot(*turn.T), 1e-12))

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.rve.mesh.outline import Outline, is_round
+from alphacut.rve.mesh.outline import Outline, bend_radii, is_round
 
 Triangles = tuple[Array, Rows, Mask]
 Sizes = Callable[[float, float], float]
 EDGES = ((1, 2), (0, 2), (0, 1))
 """Of a triangle by their vertices, in Basix's order."""
-_ARC = np.linspace(0, np.pi / 2, 17)[1:-1]  # of a quarter of an outline
+SPLINE_STEPS = 16, 128
+"""Fewest and most steps of the spline through a quarter of an outline; four a radian of its turn,
+so that the spline keeps lobes apart. Vertices are put on the outline itself afterwards."""
 
 
 def triangles(
@@ -104,6 +106,13 @@ def _square(geo: Any, size: float) -> tuple[int]:
     return (surface,)
 
 
+def _spline_steps(outline: Outline) -> int:
+    """Steps of the spline through a quarter of an outline."""
+    points, bends = bend_radii(outline)
+    sharpest = float((np.hypot(*points.T) / bends).max())
+    return int(np.clip(4 * np.ceil(sharpest), *SPLINE_STEPS))
+
+
 def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[int, int]:
     """Cell with its particle bounded by four curves: surfaces of particle and matrix."""
     import gmsh
@@ -120,7 +129,8 @@ def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[i
         arcs = [geo.addCircleArc(poles[k], centre, poles[(k + 1) % 4]) for k in range(4)]
     else:
         poles = [point(angle) for angle in quarters]
-        between = [[point(angle + turn) for turn in _ARC] for angle in quarters]
+        turns = np.linspace(0, np.pi / 2, _spline_steps(outline) + 1)[1:-1]
+        between = [[point(angle + turn) for turn in turns] for angle in quarters]
         arcs = [geo.addSpline([poles[k], *between[k], poles[(k + 1) % 4]]) for k in range(4)]
     loop = geo.addCurveLoop(arcs)
     particle, matrix = geo.addPlaneSurface([loop]), geo.addPlaneSurface([_sides(geo, size), loop])

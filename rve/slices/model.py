@@ -6,9 +6,10 @@ with radius r(θ).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import STRAIN, AnyPhase, Cell, axial_moduli, square_moduli
 from alphacut.rve.certificate import certified
-from alphacut.rve.mesh.outline import Outline, circle
+from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import (
     require_compressible,
@@ -25,8 +26,12 @@ from alphacut.rve.settings import (
     require_parts,
     require_points,
 )
+from alphacut.rve.slices.outline_slice import ACCURATE, JUDGE, OutlineSlice, second_size
 from alphacut.rve.slices.theta_error import DIGITS, theta_error
 from alphacut.stochastic import RadiusMap, gauss_rule
+
+if TYPE_CHECKING:
+    from alphacut.rve.slices.plane_cell import PlaneCell
 
 _FADE = 0.03  # least share of the last change that is taken to be left by order 4
 _ORDERS = 2, 3, 4
@@ -34,7 +39,7 @@ _ROUND_OFF = 1e-13
 _CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
 _COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
-_ELONGATED = 1.5  # safety of particles that are not round, whose ends bend more
+_AXES = 1.5  # safety where the moduli along both axes differ
 _SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
 
 
@@ -81,10 +86,7 @@ class SlicesModel:
         solved = np.concatenate([radius_map(rule.nodes), [every.min(), every.max()]])
         radii, places = np.unique(np.round(solved, DIGITS), return_inverse=True)
         nodes = places[: rule.nodes.size]
-        slices = [
-            solve_slice(r, matrix, inclusions, mesh_size=self.mesh_size, outline=self.outline)
-            for r in radii
-        ]
+        slices = [self._slice(radius, matrix, inclusions) for radius in radii]
         seconds = {"total": perf_counter() - start}
         results = []
         for m, inclusion in enumerate(inclusions):
@@ -97,7 +99,7 @@ class SlicesModel:
                 curve=curve,
                 method=self.name,
                 solver="cholesky",
-                unknowns=max(one.unknowns[_ORDERS.index(self.order)] for one in slices),
+                unknowns=max(one.unknowns[self.order] for one in slices),
                 seconds=seconds,
                 errors={
                     "space": mean_errors(curve, error[nodes], square=cell.square),
@@ -109,6 +111,17 @@ class SlicesModel:
             )
             results.append(certified(result))
         return results
+
+    def _slice(
+        self, radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+    ) -> Slice | OutlineSlice:
+        """One plane cell by what tells its error."""
+        size, outline = self.mesh_size, self.outline
+        if is_round(outline):
+            return solve_slice(radius, matrix, inclusions, mesh_size=size, outline=outline)
+        return solve_outline_slice(
+            radius, matrix, inclusions, mesh_size=size, outline=outline, order=self.order
+        )
 
 
 def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
@@ -132,14 +145,14 @@ class Slice:
 
     Args:
         by_order: Stiffness by order, in Pa, shape (3, m, 3, 3).
-        unknowns: Of each order's linear system.
+        unknowns: Of the linear system, by order.
         mesh_size: Edge length of the mesh, in halves of the cell's side.
         cancelled: Relative round-off that a stiff particle's forces leave of each inclusion where
             they cancel, shape (m, 1).
     """
 
     by_order: Array
-    unknowns: tuple[int, ...]
+    unknowns: Mapping[int, int]
     mesh_size: float
     cancelled: Array
 
@@ -159,7 +172,7 @@ class Slice:
         """
         moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 3)
         own = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
-        gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2) * (1 if square else _ELONGATED)
+        gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2) * (1 if square else _AXES)
         return np.asarray((1 + own) * (1 + self._error_of_highest(gaps)) - 1)
 
     def _error_of_highest(self, gaps: Array) -> Array:
@@ -189,14 +202,55 @@ def solve_slice(
     from alphacut.rve.slices.plane_cell import PlaneCell
 
     mesh = plane_mesh(radius, size=mesh_size, outline=outline)
-    cells = [PlaneCell(mesh, order) for order in _ORDERS]
-    stiffness = [
-        [cell.stiffness((matrix.stiffness, one.stiffness)) for one in inclusions] for cell in cells
-    ]
-    contrast = [[one.stiffness[2, 2] / matrix.stiffness[2, 2]] for one in inclusions]
+    cells = {order: PlaneCell(mesh, order) for order in _ORDERS}
+    stiffness = [_stiffness(cell, matrix, inclusions) for cell in cells.values()]
     return Slice(
         np.array(stiffness),
-        tuple(cell.unknowns for cell in cells),
+        {order: cell.unknowns for order, cell in cells.items()},
         mesh_size,
-        _CANCELLED * radius * np.array(contrast),
+        _cancelled(radius, matrix, inclusions),
     )
+
+
+def solve_outline_slice(
+    radius: float,
+    matrix: AnyPhase,
+    inclusions: Sequence[AnyPhase],
+    *,
+    mesh_size: float,
+    outline: Outline,
+    order: int = ACCURATE,
+) -> OutlineSlice:
+    """Solve one plane cell with a particle that is not round, on two meshes.
+
+    Args:
+        radius: Of the particle.
+        matrix: Phase outside it.
+        inclusions: Phases of the particle, m of them.
+        mesh_size: Edge length of the mesh of the result, in halves of the cell's side.
+        outline: Of the particle.
+        order: Of the result.
+    """
+    from alphacut.rve.mesh.curved import plane_mesh
+    from alphacut.rve.slices.plane_cell import PlaneCell
+
+    mesh = plane_mesh(radius, size=mesh_size, outline=outline)
+    second = plane_mesh(radius, size=second_size(mesh_size), outline=outline)
+    cells = {one: PlaneCell(mesh, one) for one in {order, ACCURATE, JUDGE}}
+    return OutlineSlice(
+        by_order={one: _stiffness(cell, matrix, inclusions) for one, cell in cells.items()},
+        on_second_mesh=_stiffness(PlaneCell(second, JUDGE), matrix, inclusions),
+        unknowns={one: cell.unknowns for one, cell in cells.items()},
+        round_off=_ROUND_OFF + _cancelled(radius, matrix, inclusions),
+    )
+
+
+def _stiffness(cell: PlaneCell, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:
+    """Homogenised stiffness for all inclusions, shape (m, 3, 3), in Pa."""
+    return np.array([cell.stiffness((matrix.stiffness, one.stiffness)) for one in inclusions])
+
+
+def _cancelled(radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:
+    """Relative round-off where a stiff particle's forces cancel, shape (m, 1)."""
+    contrast = [[one.stiffness[2, 2] / matrix.stiffness[2, 2]] for one in inclusions]
+    return np.asarray(_CANCELLED * radius * np.array(contrast))

@@ -9,6 +9,7 @@ from alphacut.rve.cell import AREA
 from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
+from alphacut.rve.mesh.jacobian import quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.solver.krylov import ConvergenceError, solve
 from alphacut.rve.solver.numbering import map_of, reduced, zero_matrix
@@ -22,7 +23,7 @@ class PlaneCell:
 
     Args:
         mesh: Triangles of the cell.
-        order: Polynomial degree of field and geometry, 1 to 4.
+        order: Polynomial degree of field and geometry, 1 or more.
 
     Attributes:
         unknowns: Unknowns after elimination.
@@ -35,7 +36,9 @@ class PlaneCell:
         plane = mesh_of(MPI.COMM_SELF, cells, len(nodes), element)
         plane.geometry.x[:, :2] = nodes[plane.geometry.input_global_indices]
         space = fem.functionspace(plane, element)
-        dx = ufl.Measure("dx", domain=plane, metadata={"quadrature_degree": 2 * order + 1})
+        dx = ufl.Measure(
+            "dx", domain=plane, metadata={"quadrature_degree": quadrature_degree(order)}
+        )
         self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), [dx])
         self._form.density.x.array[:] = 1.0
         self._form.share.x.array[:] = mesh.inside[plane.topology.original_cell_index]

@@ -6,7 +6,9 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
+from alphacut.rve.mesh.jacobian import jacobian_ratios
 from alphacut.rve.mesh.outline import Ellipse, area, circle, is_round
 from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
 from alphacut.rve.mesh.prism_grid import PrismGrid, moved
@@ -90,6 +92,45 @@ def test_curved_elements_lie_on_the_outline(outline, order):
     assert np.hypot(x, y) == pytest.approx(0.6 * outline(np.arctan2(y, x)), abs=1e-9)
     edges = sum(np.isin(t, shared).sum() == 2 for t in mesh.triangles[mesh.inside])
     assert len(shared) == order * edges
+
+
+SHARP = [
+    (Ellipse(3.3849, 30.0), 0.2),
+    (lambda angle: 1 + 0.15 * np.cos(7 * angle), 0.4),
+    (lambda angle: 1 + 0.3 * np.cos(7 * angle), 0.4),
+    (lambda angle: 1 + 0.3 * np.cos(3 * angle) ** 9, 0.6),
+]
+
+
+@pytest.mark.parametrize(("outline", "size"), SHARP)
+@pytest.mark.parametrize("radius", [0.05, 0.3])
+def test_curved_elements_about_a_sharp_outline_are_sound(outline, size, radius):
+    """Without regard to its bends, order 4 inverts 2 of 596 triangles at the ellipse's ends."""
+    mesh = plane_mesh(radius, size=size, outline=outline)
+    for order in (2, 3, 4, 5):
+        assert jacobian_ratios(*curved_nodes(mesh, order), order).min() > 0.2
+
+
+def test_the_ratio_of_jacobians_is_that_of_the_map():
+    """x = ξ + t ξ², y = η: det J is 1 + 2 t ξ, its mean 1 + 2 t / 3."""
+    corners = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
+    for stretch in (-0.8, -0.3, 0.0):
+        nodes = corners + stretch * corners[:, :1] ** 2 * [1, 0]
+        points = basix.make_quadrature(basix.CellType.triangle, 5)[0]
+        right = (1 + 2 * stretch * points[:, 0]).min() / (1 + 2 * stretch / 3)
+        ratio = jacobian_ratios(nodes, np.arange(6)[None], 2)
+        assert ratio == pytest.approx([right], abs=1e-12)
+
+
+def test_a_corner_that_no_edge_length_makes_sound_is_refused():
+    with pytest.raises(RefusedError, match="outline is so sharp that curved elements fold"):
+        plane_mesh(0.4, size=0.3, outline=lambda angle: 1 + 0.4 * (angle % 2 > 1))
+
+
+def test_meshes_of_round_particles_stay_as_they_were():
+    mesh = plane_mesh(0.3, size=0.4)
+    assert (len(mesh.points), len(mesh.triangles), int(mesh.triangles.sum())) == (73, 124, 14556)
+    assert (mesh.points**2).sum() == pytest.approx(41.55259703641136, rel=1e-12)
 
 
 def test_the_sign_of_z_marks_the_cone():
