@@ -73,7 +73,7 @@ def test_imports_point_one_way(package):
 ROOMS = {
     "alphacut": ("io", "records", "case", "stages", "export", "figures", "report", "commands"),
     "fuzzy": ("sets", "knowledge", "campaign", "plans"),
-    "frame": ("calculus", "structures", "dynamics", "modal", "certificate", "methods"),
+    "frame": ("calculus", "structures", "response", "dynamics", "modal", "certificate", "methods"),
     "rve": ("mesh", "planar", "slices", "series", "table"),
 }
 """Rooms of each package, in the order in which they may import: each those before it."""

@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numba
 import numpy as np
 
 from alphacut.frame.dual.expansion import Expansion
 from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
-from alphacut.frame.dual.waves import ALONE, phases_of, step_integrals
+from alphacut.frame.dual.waves import Grid, Oscillators
+from alphacut.frame.response.duhamel import responses_at_named_nodes
 from alphacut.frame.structures.linear import LinearSystem, evaluate
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 PIECE = 4000
@@ -79,6 +80,25 @@ class Box:
         pieces = np.array_split(np.arange(len(unit)), -(-len(unit) // PIECE))
         return np.concatenate([_motions(self, unit[i], node[i], output[i]) for i in pieces])
 
+    def crisp_stray(self) -> Array:
+        """Bound of how far the motion at the centre strays from straight lines, shape (T, m).
+
+        Raises:
+            UnprovedError: A mode does not oscillate there.
+        """
+        modes = _modal(self, np.zeros((1, len(self.active))))
+        every, order = np.arange(len(self.structure.order)), self.structure.order
+        read = modes.read(np.zeros(len(order), int), every)
+        stray: Array = np.zeros((len(self.time), len(order)))
+        for k, sigma in enumerate(modes.sigma[0]):
+            grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
+            oscillator = Oscillators(grid, self.system.ground, self.time)
+            for source, share in modes.share.items():
+                for o in every:
+                    wave = oscillator.waves(source, int(order[o]))
+                    stray[:, o] += abs(read[o, k] * share[0, k]) * wave.stray
+        return stray
+
 
 def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:
     """The structure over a box of its inputs."""
@@ -97,60 +117,67 @@ def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
     return tuple(name for name, is_there in present.items() if is_there)
 
 
-def _motions(box: Box, unit: Array, node: Rows, output: Rows) -> Array:
+@dataclass(frozen=True, eq=False)
+class Modal:
+    """Modes of a structure at S points.
+
+    Args:
+        structure: The structure over the box.
+        seen: Rows of all outputs on the state, shape (S, m, 2 n).
+        shape: Displacements of the modes, each of unit mass, shape (S, n, n).
+        sigma: Exponents −g + iω, shape (S, n), in 1/s.
+        share: What each source, by its name, puts into the modes, shape (S, n).
+    """
+
+    structure: Classical
+    seen: Array
+    shape: Array
+    sigma: Array
+    share: dict[str, Array]
+
+    def read(self, point: Rows, output: Rows) -> Array:
+        """What outputs (N,) take of the modes at points (N,), shape (N, n)."""
+        n, order = self.shape.shape[-1], self.structure.order[output][:, None]
+        rows = self.seen[point, output]
+        row = np.where(order == 1, rows[:, n:], rows[:, :n])
+        row = np.where(order == 2, self.structure.rows[output], row)
+        return np.asarray(np.einsum("si,sik->sk", row, self.shape[point]))
+
+
+def _modal(box: Box, unit: Array) -> Modal:
+    """Modes at unit coordinates (S, d).
+
+    Raises:
+        UnprovedError: One does not oscillate.
+    """
     system, structure = box.system, box.structure
     matrices, seen = evaluate(system, box.names, box.inputs(unit), derivatives=False)
     M, K = matrices.mass.value, matrices.stiffness.value
-    n = M.shape[-1]
     below = np.linalg.inv(np.linalg.cholesky(M))
     squared, U = np.linalg.eigh(below @ K @ below.swapaxes(-1, -2))
     shape = below.swapaxes(-1, -2) @ U
     a, b = structure.rayleigh.at(unit).T[:, :, None]
-    decay = (a + b * squared) / 2 + structure.ratio.at(unit) * np.sqrt(squared)
+    positive = np.maximum(squared, 0.0)
+    decay = (a + b * squared) / 2 + structure.ratio.at(unit) * np.sqrt(positive)
+    if not (positive > decay**2).all():
+        raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
     sigma = -decay + 1j * np.sqrt(squared - decay**2)
-    every, order = np.arange(len(unit)), structure.order[output]
-    row = np.where(
-        (order == 1)[:, None], seen.value[every, output, n:], seen.value[every, output, :n]
-    )
-    row = np.where((order == 2)[:, None], structure.rows[output], row)
-    read = np.einsum("si,sik->sk", row, shape)
-    power = sigma ** order[:, None]
-    start = [np.einsum("sij,sjk->sik", M, x.value)[..., 0] for x in (matrices.q0, matrices.v0)]
-    q, v = (np.einsum("sik,si->sk", shape, x) for x in start)
-    free = power * np.exp(sigma * box.time[node][:, None])
-    wave = (v + decay * q) * free.imag / sigma.imag + q * free.real
+    share = {}
     if system.ground is not None:
-        driven = np.einsum("sik,sij,j->sk", shape, M, matrices.rigid[:, 0])
-        wave = wave - driven * (power * _load(system, sigma, node, box.time)).imag / sigma.imag
-    return np.asarray((read * wave).sum(-1))
+        share["load"] = np.einsum("sik,sij,j->sk", shape, M, matrices.rigid[:, 0])
+    for name, x in (("start", matrices.q0.value), ("velocity", matrices.v0.value)):
+        share[name] = np.einsum("sik,sij,sj->sk", shape, M, x[..., 0])
+    return Modal(structure, seen.value, shape, sigma, share)
 
 
-def _load(system: LinearSystem, sigma: Array, node: Rows, time: Array) -> Array:
-    """ρ(σ; t) at one node for each point, shape (S, n)."""
-    assert system.ground is not None
-    left, right, last, phases, which = phases_of(system.ground, time)
-    out = np.empty(sigma.shape, complex)
-    with ALONE:
-        _march(sigma, left, right, system.ground.step, phases[which][node], last[node], out)
-    return out
-
-
-@numba.njit(cache=True, parallel=True)
-def _march(
-    sigma: Array, left: Array, right: Array, h: float, phase: Array, last: Rows, out: Array
-) -> None:
-    """Writes ρ at the node of each point, by recursion over the record."""
-    for s in numba.prange(len(sigma)):
-        J = np.empty(4, np.complex128)
-        for k in range(sigma.shape[1]):
-            step_integrals(sigma[s, k], h, J)
-            turn = np.exp(sigma[s, k] * h)
-            at_end, by_slope = J[0], -J[1] / h
-            rho = 0.0 + 0.0j
-            for i in range(last[s]):
-                rho = turn * rho + right[i] * at_end + (right[i] - left[i]) * by_slope
-            x = phase[s]
-            step_integrals(sigma[s, k], x, J)
-            slope = (right[last[s]] - left[last[s]]) / h
-            rho = np.exp(sigma[s, k] * x) * rho + (left[last[s]] + slope * x) * J[0] - slope * J[1]
-            out[s, k] = rho
+def _motions(box: Box, unit: Array, node: Rows, output: Rows) -> Array:
+    system, modes = box.system, _modal(box, unit)
+    sigma, share = modes.sigma, modes.share
+    power = sigma ** modes.structure.order[output][:, None]
+    free = power * np.exp(sigma * box.time[node][:, None])
+    wave = share["start"] * free.real
+    wave += (share["velocity"] - sigma.real * share["start"]) * free.imag / sigma.imag
+    if system.ground is not None:
+        rho = responses_at_named_nodes(sigma, system.ground, box.time, node, 0)[0][0]
+        wave -= share["load"] * (power * rho).imag / sigma.imag
+    return np.asarray((modes.read(np.arange(len(unit)), output) * wave).sum(-1))

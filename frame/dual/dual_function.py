@@ -19,8 +19,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
+LARGEST = 1e100
+"""Magnitude of models, tables and multipliers at most: no sum of their products overflows."""
 PATIENCE = 12
 """Steps without half the expected gain after which less is expected."""
 EXPECTED = 0.5
@@ -73,8 +76,20 @@ class Data(NamedTuple):
     group_quadratic: Array
 
 
+def require_in_range(data: Data) -> None:
+    """Refuse models and tables out of the range in which the dual function cannot overflow.
+
+    Raises:
+        UnprovedError: A number is not finite or larger than `LARGEST`.
+    """
+    for name, values in data._asdict().items():
+        if not (np.abs(values) <= LARGEST).all():
+            raise UnprovedError(f"dual function: {name} is not finite or above {LARGEST:g}")
+
+
 compiled = njit(cache=True, nogil=True, error_model="numpy")
-loops = njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
+# bounds of rounding hold for any order of a sum, with fused products too; NaN and infinity stay
+loops = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 
 
 @loops
@@ -154,8 +169,9 @@ def dual(
 ) -> float:
     """D(μ) without its constants, a subgradient, and the inputs u at which its second line is met.
 
-    `slab` holds, for each mode, the first and last place along ω and along q that its table is read
-    at, shape (K, 4).
+    Data are in the range of `require_in_range`, and so are the multipliers: |μ| ≤ `LARGEST`. `slab`
+    holds, for each mode, the first and last place along ω and along q that its table is read at,
+    shape (K, 4).
     """
     modes, sources = data.share.shape
     gradient[:] = 0.0
@@ -281,7 +297,11 @@ def minimise(
 
 @loops
 def deflected(mu: Array, gradient: Array, direction: Array, gain: float) -> bool:
-    """Move μ against the gradient and what is left of the last direction; False without one."""
+    """Move μ against the gradient and what is left of the last direction.
+
+    Returns:
+        False where there is no direction, or a multiplier leaves the range of `dual`.
+    """
     length = along = 0.0
     for z in range(len(mu)):
         along += gradient[z] * direction[z]
@@ -295,4 +315,6 @@ def deflected(mu: Array, gradient: Array, direction: Array, gain: float) -> bool
         return False
     for z in range(len(mu)):
         mu[z] -= gain / length * direction[z]
+        if not abs(mu[z]) <= LARGEST:
+            return False
     return True

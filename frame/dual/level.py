@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.frame.dual.dual_function import EXPECTED, Data
+from alphacut.frame.dual.dual_function import EXPECTED, Data, require_in_range
 from alphacut.frame.dual.eigenpairs import modes
 from alphacut.frame.dual.expansion import ROUND_OFF, Expansion
 from alphacut.frame.dual.homogeneous import monomials, packed
@@ -26,6 +26,8 @@ POINTS = (8, 80), (3, 12)
 """Least and most of them along ω and along g/ω."""
 HUGE = 1e300
 """Less than this is no value."""
+LEAST_SPREAD = 1e-30
+"""Radius in SI units of a variable that does not vary, so that scaled ones stay finite."""
 LOOSE = 0.1
 """Gap that suffices far below the peak, as a share of how far."""
 AT_PEAKS = 6
@@ -194,11 +196,14 @@ class Level:
             (AT_PEAKS * slabs, steps, 1.0, FLOORS[1]),
         )
         with ThreadPoolExecutor(workers) as pool:
-            for effort in passes:
+            for slabs, steps, loose, floor in passes:
+                # what a pass compares with is fixed before its first block: no result depends on
+                # which thread ends first
+                efforts = [problem.effort(slabs, steps, loose, floor) for problem in problems]
                 jobs = [
-                    pool.submit(problem.run, own, *effort)
-                    for problem in problems
-                    for own in _blocks(problem.left(effort[2]))
+                    pool.submit(problem.improve, nodes, effort)
+                    for problem, effort in zip(problems, efforts, strict=True)
+                    for nodes in _blocks(problem.left(loose))
                 ]
                 for job in jobs:
                     job.result()
@@ -250,6 +255,7 @@ class Problem:
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
         data = Data(*_tables(level, o), *_models(level, o), *group)
+        require_in_range(data)
         out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
         at = np.zeros((total, data.linear.shape[1]))
         return cls(side, enough, constant, data, out, at, attained)
@@ -265,9 +271,16 @@ class Problem:
         return np.flatnonzero(self.out[0] - self.out[1] > allowed)
 
     def run(self, nodes: Rows, slabs: int, steps: int, loose: float, floor: float) -> None:
-        """Improve the bounds at nodes, with an effort."""
+        """Improve the bounds at nodes, with an effort compared with the values so far."""
+        self.improve(nodes, self.effort(slabs, steps, loose, floor))
+
+    def effort(self, slabs: int, steps: int, loose: float, floor: float) -> Effort:
+        """An effort that is compared with the largest value so far."""
+        return Effort(slabs, steps, self.enough, self.top, loose, floor)
+
+    def improve(self, nodes: Rows, effort: Effort) -> None:
+        """Improve the bounds at nodes; those of other nodes are not read."""
         out, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
-        effort = Effort(slabs, steps, self.enough, self.top, loose, floor)
         bounds(nodes, self.side, effort, self.constant, self.data, out, at)
         better = out[1] > self.out[1, nodes]
         self.at[nodes[better]] = at[better]
@@ -336,7 +349,7 @@ def _stacked(rows: Sequence[tuple[Array, ...]]) -> list[Array]:
 
 
 def _spread(x: Expansion) -> float:
-    return max(float(x.spread()), 1e-9 * abs(float(x.parts[0])), 1e-300)
+    return max(float(x.spread()), 1e-9 * abs(float(x.parts[0])), LEAST_SPREAD)
 
 
 def _scaled(x: Expansion, radius: float) -> tuple[Array, ...]:

@@ -59,7 +59,7 @@ class DualProof:
             is parted.
         slabs: Most parts of the modes' ranges for a bound.
         steps: Most evaluations of the dual function for each of them.
-        workers: Threads, which hardly change the result; all cores unless given.
+        workers: Threads, which do not change the result; all cores unless given.
 
     Raises:
         RefusedError: A value is not positive.
@@ -133,7 +133,8 @@ class DualProof:
             value = flow.values(low[None])[0]
             both = np.stack([-value, value], -1)
             at = np.broadcast_to(low, (*both.shape, len(low))).copy()
-            return _Bounded(both + margin, both - margin, at, np.zeros_like(value), len(value))
+            stray = Box(flow.system, cuts.names, flow.time, low, high).crisp_stray()
+            return _Bounded(both + margin, both - margin, at, stray, len(value))
         box = Box(flow.system, cuts.names, flow.time, low, high)
         level, workers = box.level(), self.workers or os.cpu_count() or 1
         outer, unit = level.bounds(self.gap * peak, self.slabs, self.steps, workers)

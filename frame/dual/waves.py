@@ -19,19 +19,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb, perm
-from threading import Lock
 
-import numba
 import numpy as np
 
+from alphacut.frame.response.duhamel import require_decaying, responses_at_nodes
+from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.fuzzy.arrays import Array, Rows
-
-TERMS = 40
-"""Terms of a power series in σ h; at |σ h| ≤ `LONGEST` they leave less than round-off."""
-LONGEST = 6.0
-ALONE = Lock()
-"""Held by the one thread that is in a parallel loop of Numba, which not all its layers share."""
+from alphacut.fuzzy.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +36,7 @@ class Waves:
         omega: Frequencies, shape (W,), in rad/s.
         quotient: g/ω, shape (Q,).
         value: Responses, shape (T, Q, W).
-        error: What they stray from bilinear interpolation at most, shape (T,).
+        error: What they stray from bilinear interpolation at most, with rounding, shape (T,).
         stray: What they stray from straight lines in the step to each node at most, shape (T,).
     """
 
@@ -72,12 +66,14 @@ class Oscillators:
     def __init__(self, grid: Grid, ground: Accelerogram | None, time: Array) -> None:
         self.grid, self.ground, self.time = grid, ground, time
         sigma = grid.sigma.ravel()
+        require_decaying(sigma, float(time[-1]))
         self.free = np.exp(sigma * time[:, None])
+        self.free_error = UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(self.free)
         decay = float((grid.quotient[:, None] * grid.omega).min())
         fade = np.exp(-decay * time)
         self.free_bounds = np.stack([time**n * fade for n in range(5)])
         if ground is not None:
-            self.load = loaded(sigma, ground, time)
+            self.load, self.load_error = responses_at_nodes(sigma, ground, time, 2)
             self.load_bounds = absolute_moments(decay, ground, time)
 
     def waves(self, source: str, order: int) -> Waves:
@@ -85,20 +81,26 @@ class Oscillators:
         g = self.grid
         sigma = g.sigma.ravel()
         if source == "load":
-            rho, bounds = self.load, self.load_bounds
+            rho, bounds, rounding = self.load, self.load_bounds, self.load_error
         else:
             t = self.time[:, None]
             rho, bounds = np.stack([self.free, t * self.free, t * t * self.free]), self.free_bounds
+            rounding = self.free_error
         G = _with_power(sigma, rho, order)
         omega, quotient = np.abs(sigma.imag), -sigma.real / sigma.imag
+        # of the power and of what is read off
+        rounding = np.abs(sigma) ** order * rounding
+        rounding += 2 * (order + 3) * UNIT_ROUNDOFF * np.abs(G[0])
         if source == "start":
             value = G[0].real + quotient * G[0].imag
+            rounding *= 1 + quotient
         else:
             value = G[0].imag / omega * (-1.0 if source == "load" else 1.0)
+            rounding /= omega
         shape = (len(self.time), len(g.quotient), len(g.omega))
         error, size = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
         stray = self._stray(size, source, order)
-        return Waves(g.omega, g.quotient, value.reshape(shape), error, stray)
+        return Waves(g.omega, g.quotient, value.reshape(shape), error + rounding.max(-1), stray)
 
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool
@@ -188,84 +190,3 @@ def _moved(state: Array, decay: float, h: float, size: float) -> Array:
         for n in range(5)
     ]
     return np.array(turned)
-
-
-def phases_of(ground: Accelerogram, time: Array) -> tuple[Array, Array, Rows, Array, Rows]:
-    """The record and the nodes within it.
-
-    Returns:
-        Accelerations at both ends of all intervals, (I,) each; the interval of each node, (T,);
-        all different times since a node's interval began, in s, (P,), and which is a node's, (T,).
-    """
-    a, h = np.asarray(ground.acceleration, float), ground.step
-    last = (time / h * (1 + 1e-12)).astype(np.int64)
-    count = int(last.max()) + 1
-    left: Array = np.zeros(count)
-    right: Array = np.zeros(count)
-    left[: len(a) - 1], right[: len(a) - 1] = a[:-1][:count], a[1:][:count]
-    since: Array = np.maximum(time - last * h, 0.0)
-    since[since < 1e-9 * h] = 0.0
-    phases, which = np.unique(np.round(since / h, 9), return_inverse=True)
-    return left, right, last, np.asarray(phases * h), which
-
-
-def loaded(sigma: Array, ground: Accelerogram, time: Array) -> Array:
-    """ρ(σ; t) and its two derivatives by σ at nodes, shape (3, T, S)."""
-    left, right, last, phases, which = phases_of(ground, time)
-    out = np.empty((3, len(time), len(sigma)), complex)
-    with ALONE:
-        _march(sigma, left, right, ground.step, phases, which, last, out)
-    return out
-
-
-@numba.njit(cache=True)
-def step_integrals(sigma: complex, h: float, out: Array) -> None:
-    """∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3."""
-    z = sigma * h
-    for n in range(4):
-        term = 1.0 + 0.0j
-        total = term / (n + 1)
-        for k in range(1, TERMS):
-            term *= z / k
-            total += term / (n + 1 + k)
-        out[n] = total * h ** (n + 1)
-
-
-@numba.njit(cache=True, parallel=True)
-def _march(
-    sigma: Array,
-    left: Array,
-    right: Array,
-    h: float,
-    phases: Array,
-    which: Rows,
-    last: Rows,
-    out: Array,
-) -> None:
-    """Writes ρ and two derivatives at nodes, by recursion over the record."""
-    for s in numba.prange(len(sigma)):
-        whole = np.empty(4, np.complex128)
-        step_integrals(sigma[s], h, whole)
-        turn = np.exp(sigma[s] * h)
-        parts = np.empty((len(phases), 4), np.complex128)
-        turns = np.empty(len(phases), np.complex128)
-        for j in range(len(phases)):
-            step_integrals(sigma[s], phases[j], parts[j])
-            turns[j] = np.exp(sigma[s] * phases[j])
-        r0 = r1 = r2 = 0.0 + 0.0j
-        node = 0
-        for i in range(len(left)):
-            a, slope = left[i], (right[i] - left[i]) / h
-            while node < len(last) and last[node] == i:
-                j = which[node]
-                x, J, w = phases[j], parts[j], turns[j]
-                end = a + slope * x
-                out[0, node, s] = w * r0 + end * J[0] - slope * J[1]
-                out[1, node, s] = w * (r1 + x * r0) + end * J[1] - slope * J[2]
-                out[2, node, s] = w * (r2 + 2 * x * r1 + x * x * r0) + end * J[2] - slope * J[3]
-                node += 1
-            end = right[i]
-            J = whole
-            r2 = turn * (r2 + 2 * h * r1 + h * h * r0) + end * J[2] - slope * J[3]
-            r1 = turn * (r1 + h * r0) + end * J[1] - slope * J[2]
-            r0 = turn * r0 + end * J[0] - slope * J[1]

@@ -1,0 +1,208 @@
+"""Duhamel integral of an oscillator under a record that is linear between its samples.
+
+ρ(σ; t) = ∫₀ᵗ exp(σ τ) a(t − τ) dτ is exact over an interval h in which the record runs linearly,
+at the slope s, to a₁ (piecewise linear load: Clough, Penzien 1993, chapter 7):
+
+    ρ(t + h) = exp(σ h) ρ(t) + a₁ J₀ − s J₁,   J_n = ∫₀ʰ τⁿ exp(σ τ) dτ,
+
+and so are its derivatives by σ. Nodes lie anywhere, samples need not be nodes. All responses to a
+record are walked by the one kernel here, at all nodes for each σ or at a named node for each row of
+σ. Rounding is bounded beside the values (running error analysis: Higham 2002, section 3.3).
+"""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, prange
+
+from alphacut.frame.response.step_integrals import (
+    UNIT_ROUNDOFF,
+    error_of_integrals,
+    require_step_in_range,
+    step_integrals,
+)
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.fuzzy.arrays import Array, Rows
+
+PARALLEL_LOOP = Lock()
+"""Held by the thread that is in a parallel loop of Numba, which not all its layers share."""
+SAME_TIME = 4 * UNIT_ROUNDOFF
+"""Distance of two times, as a share of the last node's, that is their rounding alone."""
+ERROR_OF_TURN = 8.0
+"""Rounding in u of one product exp(σ h) ρ besides |σ h|: 3 of exp, √5 of the product, 2 of sums."""
+
+
+Orders = tuple[int, ...]
+"""As many zeros as derivatives are wanted; a tuple's length is known when a kernel is compiled."""
+
+
+class Walk(NamedTuple):
+    """A record up to the last of some nodes, and where these lie.
+
+    Args:
+        first: Acceleration at the beginning of each interval between samples, shape (I,), in m/s².
+        last: Acceleration at its end; both are zero beyond the record.
+        step: Length of an interval, in s.
+        interval: Interval in which each node lies, rising, shape (T,).
+        phases: Different times from an interval's beginning to a node in it, shape (P,), in s.
+        phase: Which of them is each node's, shape (T,).
+        doubt: Rounding of each node's time since its interval began, shape (T,), in s.
+    """
+
+    first: Array
+    last: Array
+    step: float
+    interval: Rows
+    phases: Array
+    phase: Rows
+    doubt: Array
+
+
+def walk(ground: Accelerogram, time: Array) -> Walk:
+    """The record and nodes `time` (T,) in s, rising."""
+    samples, step = ground.acceleration, ground.step
+    same = SAME_TIME * float(time[-1])
+    interval = ((time + same) / step).astype(np.int64)
+    count = int(interval[-1]) + 1
+    first: Array = np.zeros(count)
+    last: Array = np.zeros(count)
+    within = min(count, len(samples) - 1)
+    first[:within], last[:within] = samples[:within], samples[1 : within + 1]
+    since: Array = np.maximum(time - interval * step, 0.0)
+    order = np.argsort(since, kind="stable")
+    is_new = np.diff(since[order], prepend=-np.inf) > same
+    phase = np.empty(len(time), np.int64)
+    phase[order] = np.cumsum(is_new) - 1
+    phases = since[order][is_new]
+    phases[phases <= same] = 0.0
+    doubt = np.abs(since - phases[phase]) + UNIT_ROUNDOFF * time
+    return Walk(first, last, step, interval, phases, phase, doubt)
+
+
+def responses_at_nodes(
+    sigma: Array, ground: Accelerogram, time: Array, derivatives: int
+) -> tuple[Array, Array]:
+    """ρ with derivatives by σ at all nodes, shape (1 + derivatives, T, S), for σ (S,).
+
+    Returns:
+        The responses, and bounds of the rounding of ρ, shape (T, S).
+
+    Raises:
+        UnprovedError: A σ is out of the kernel's range.
+    """
+    require_decaying(sigma, ground.step)
+    out = np.empty((1 + derivatives, len(time), len(sigma)), complex)
+    error = np.empty(out.shape[1:])
+    with PARALLEL_LOOP:
+        _walk_to_all(sigma, walk(ground, time), (0,) * derivatives, out, error)
+    return out, error
+
+
+def responses_at_named_nodes(
+    sigma: Array, ground: Accelerogram, time: Array, node: Rows, derivatives: int
+) -> tuple[Array, Array]:
+    """ρ with derivatives by σ, shape (1 + derivatives, S, n), for σ (S, n) at node (S,) of `time`.
+
+    Returns:
+        The responses, and bounds of the rounding of ρ, shape (S, n).
+
+    Raises:
+        UnprovedError: A σ is out of the kernel's range.
+    """
+    require_decaying(sigma, ground.step)
+    out = np.empty((1 + derivatives, *sigma.shape), complex)
+    error = np.empty(sigma.shape)
+    with PARALLEL_LOOP:
+        _walk_to_named(sigma, walk(ground, time), (0,) * derivatives, node, out, error)
+    return out, error
+
+
+def require_decaying(sigma: Array, step: float) -> None:
+    """Refuse exponents that grow, or are out of the range of a step's integrals.
+
+    Raises:
+        UnprovedError: One is so.
+    """
+    require_step_in_range(np.where(sigma.real > 0, np.inf, sigma), step)
+
+
+@njit(cache=True, parallel=True)
+def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Array) -> None:
+    """Walks each σ (S,) to all nodes and writes `out` (derivatives, T, S) and `error` (T, S)."""
+    for s in prange(len(sigma)):
+        nodes = walk.interval, walk.phase, walk.phases, walk.doubt
+        _walk_along(sigma[s], walk, orders, nodes, out[:, :, s], error[:, s])
+
+
+@njit(cache=True, parallel=True)
+def _walk_to_named(
+    sigma: Array, walk: Walk, orders: Orders, node: Rows, out: Array, error: Array
+) -> None:
+    """Walks each σ (S, n) to the node of its row and writes `out` (…, S, n) and `error`."""
+    for s in prange(len(sigma)):
+        here, own = slice(node[s], node[s] + 1), walk.phase[node[s]]
+        phases = walk.phases[own : own + 1]
+        nodes = walk.interval[here], np.zeros(1, np.int64), phases, walk.doubt[here]
+        for k in range(sigma.shape[1]):
+            _walk_along(sigma[s, k], walk, orders, nodes, out[:, s : s + 1, k], error[s : s + 1, k])
+
+
+@njit(cache=True)
+def _walk_along(
+    sigma: complex,
+    walk: Walk,
+    orders: Orders,
+    nodes: tuple[Rows, Rows, Array, Array],
+    out: Array,
+    error: Array,
+) -> None:
+    """Walks one σ over the record to nodes (interval, phase, phases, doubt).
+
+    Writes ρ and its derivatives, `out` (derivatives, N), and bounds of the rounding of ρ, (N,).
+    """
+    interval, phase, phases, doubt = nodes
+    h = walk.step
+    turns, parts = np.empty(len(phases), np.complex128), np.empty((len(phases), 4), np.complex128)
+    rounding = np.empty((len(phases), 3))  # shares of ρ and of a, and what is left of its error
+    rate = abs(sigma.real) + abs(sigma.imag)
+    for j in range(len(phases)):
+        x = phases[j]
+        turns[j] = np.exp(sigma * x)
+        step_integrals(sigma, x, parts[j])
+        rounding[j, 0] = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * x)
+        rounding[j, 1], rounding[j, 2] = error_of_integrals(sigma, x), abs(turns[j])
+    J, turn = np.empty(4, np.complex128), np.exp(sigma * h)
+    step_integrals(sigma, h, J)
+    of_turn, of_integrals = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * h), error_of_integrals(sigma, h)
+    fade = abs(turn)
+    r0 = r1 = r2 = 0.0 + 0.0j
+    wrong, node = 0.0, 0
+    for i in range(interval[-1] + 1):
+        slope = (walk.last[i] - walk.first[i]) / h
+        while node < len(interval) and interval[node] == i:
+            j = phase[node]
+            x, w, P = phases[j], turns[j], parts[j]
+            a = walk.first[i] + slope * x
+            moved = w * r0
+            value = moved + a * P[0] - slope * P[1]
+            own = rounding[j, 2] * wrong + rounding[j, 0] * (abs(moved.real) + abs(moved.imag))
+            own += rounding[j, 1] * (abs(a) + abs(slope) * x / 2)
+            own += doubt[node] * (rate * (abs(value.real) + abs(value.imag)) + abs(a))
+            out[0, node], error[node] = value, own
+            if len(orders) > 0:
+                out[1, node] = w * (r1 + x * r0) + a * P[1] - slope * P[2]
+            if len(orders) > 1:
+                out[2, node] = w * (r2 + 2 * x * r1 + x * x * r0) + a * P[2] - slope * P[3]
+            node += 1
+        a = walk.last[i]
+        if len(orders) > 1:
+            r2 = turn * (r2 + 2 * h * r1 + h * h * r0) + a * J[2] - slope * J[3]
+        if len(orders) > 0:
+            r1 = turn * (r1 + h * r0) + a * J[1] - slope * J[2]
+        r0 = turn * r0
+        wrong = fade * wrong + of_turn * (abs(r0.real) + abs(r0.imag))
+        wrong += of_integrals * (abs(a) + abs(slope) * h / 2)
+        r0 += a * J[0] - slope * J[1]

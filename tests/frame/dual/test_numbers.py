@@ -1,0 +1,166 @@
+"""Numbers of the dual proof: fast modes, crisp inputs, threads, and what is not finite."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.dual.dual_function import deflected, require_in_range
+from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.proof import DualProof
+from alphacut.frame.methods.proof import Proof
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy import Crisp, Triangular
+from tests.frame.dual.test_dual_proof import CASES, level_of
+
+
+def shear_motion(masses, springs, ratio, ground, parts):
+    """Roof of a shear frame, each interval of the record in equal parts, by one exponential."""
+    n, step = len(masses), ground.step / parts
+    K = np.diag(springs) + np.diag(np.append(springs[1:], 0))
+    K = K - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
+    root = np.sqrt(masses)
+    squared, U = np.linalg.eigh(K / root / root[:, None])
+    D = (root[:, None] * U) @ np.diag(2 * ratio * np.sqrt(squared)) @ (root[:, None] * U).T
+    A = np.zeros((2 * n + 2, 2 * n + 2))
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n, : 2 * n] = -np.hstack([K, D]) / masses[:, None]
+    A[n : 2 * n, 2 * n] = -1
+    A[2 * n, 2 * n + 1] = 1
+    advance, state, roof = expm(A * step), np.zeros(2 * n), [0.0]
+    a = ground.acceleration
+    for i in range(len(a) - 1):
+        z = np.r_[state, a[i], (a[i + 1] - a[i]) / ground.step]
+        for _ in range(parts):
+            z = advance @ z
+            roof.append(z[n - 1])
+        state = z[: 2 * n]
+    return np.array(roof)
+
+
+@pytest.mark.parametrize(
+    ("first", "step", "parts"), [(60e6, 0.25, 10), (60e9, 0.02, 1)], ids=["pulses", "stiff"]
+)
+def test_records_far_slower_than_the_modes_are_bounded(first, step, parts):
+    """The step of the record times the highest frequency is 26 and 35."""
+    masses, springs = np.full(4, 20e3), np.array([first, 60e6, 60e6, 60e6])
+    ground = Accelerogram(step, np.random.default_rng(7).normal(size=7))
+    frame = StoreyFrame(
+        masses=masses, stiffness=springs, damping_ratio=0.03, ground=ground, outputs=("q4",)
+    )
+    fuzzy = {f"k{z}": Triangular(*(springs[z - 1] * np.array([0.95, 1, 1.05]))) for z in (1, 2, 4)}
+    found = envelope(
+        frame,
+        fuzzy,
+        duration=6 * step,
+        step=step / parts,
+        alpha=(0,),
+        method=DualProof(slabs=2, peaks=0.5),
+        progress=False,
+    )
+    roof = shear_motion(masses, springs, 0.03, ground, parts)
+    slack = 1e-9 * np.abs(roof).max()
+    assert (roof <= found.upper[0, :, 0] + slack).all()
+    assert (roof >= found.lower[0, :, 0] - slack).all()
+    assert found.upper.max() < 3 * np.abs(roof).max()
+
+
+def oscillator(turn, duration, **values):
+    """A mass on a spring that starts at 1 m/s, and its inputs: a spring without a width."""
+    frame = StoreyFrame(masses=[1e3], stiffness=[1e3 * turn**2], outputs=("q1",), **values)
+    return frame, {"k1": Crisp(1e3 * turn**2)}, {"duration": duration, "alpha": (0, 1)}
+
+
+@pytest.mark.parametrize("method", [DualProof(), Proof()])
+def test_crisp_inputs_stray_between_nodes_as_stated(method):
+    frame, inputs, given = oscillator(20.0, 0.2, damping_ratio=0.02, v0=(1.0,))
+    found = envelope(frame, inputs, step=0.05, method=method, progress=False, **given)
+    time, fast = np.linspace(0, 0.2, 2001), 20 * np.sqrt(1 - 4e-4)
+    motion = np.exp(-0.4 * time) * np.sin(fast * time) / fast
+    nodes = motion[::500]
+    off = np.abs(motion - np.interp(time, time[::500], nodes))[1:].reshape(4, 500).max(1)
+    stray = found.between[1:, 0]
+    assert (off <= stray).all()
+    assert (stray <= 3 * off.max()).all()
+    assert (np.abs(found.upper[1, :, 0] - nodes) <= 2e-5).all()
+
+
+def test_a_crisp_record_strays_as_stated():
+    ground = Accelerogram(0.03, np.random.default_rng(3).normal(size=40))
+    frame, inputs, given = oscillator(20.0, 1.2, damping_ratio=0.05, ground=ground)
+    coarse, fine = (
+        envelope(frame, inputs, step=step, method=DualProof(), progress=False, **given)
+        for step in (0.1, 0.01)
+    )
+    motion = fine.upper[0, :, 0]
+    line = np.interp(fine.time, coarse.time, motion[::10])
+    off = np.abs(motion - line)[1:].reshape(12, 10).max(1)
+    assert (off <= coarse.between[1:, 0]).all()
+    assert coarse.between.max() < 12 * off.max()
+
+
+def test_crisp_modes_that_do_not_oscillate_are_refused():
+    frame, inputs, given = oscillator(20.0, 0.2, rayleigh=(50.0, 0.0), v0=(1.0,))
+    with pytest.raises(UnprovedError, match="a mode may not oscillate"):
+        envelope(frame, inputs, step=0.05, method=DualProof(), progress=False, **given)
+
+
+def test_threads_do_not_change_a_bit():
+    model, fuzzy = CASES["matrices"]
+    given = {"duration": 3.0, "step": 0.02, "alpha": (0,), "progress": False}
+    first, *others = (
+        envelope(model, fuzzy, method=DualProof(peaks=0.01, workers=workers), **given)
+        for workers in (1, 2, 3)
+    )
+    for other in others:
+        for name in ("lower", "upper", "lower_at", "upper_at", "between"):
+            assert (getattr(first, name) == getattr(other, name)).all()
+
+
+def test_a_pass_compares_with_what_is_known_when_it_begins():
+    """A peak found by one block while the pass runs does not change what another block does."""
+    model, fuzzy = CASES["matrices"]
+    level, _, _ = level_of(model, fuzzy, np.arange(0, 3.01, 0.1))
+    problem = Problem.of(level, 0, 1, 1e-6)
+    effort = problem.effort(4, 20, 1.0, 0.0)
+    problem.out[1, 5] = 99.0
+    assert problem.effort(4, 20, 1.0, 0.0).top == 99.0
+    assert effort.top == 0.0
+
+
+def problem_of_matrices():
+    model, fuzzy = CASES["matrices"]
+    return Problem.of(level_of(model, fuzzy, np.arange(0, 1.01, 0.1))[0], 0, 1, 1e-6)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e101])
+@pytest.mark.parametrize("name", ["table", "linear", "rest"])
+def test_models_that_are_not_finite_are_refused(name, wrong):
+    data = problem_of_matrices().data
+    values = getattr(data, name).copy()
+    values.flat[-1] = wrong
+    with pytest.raises(UnprovedError, match=f"{name} is not finite"):
+        require_in_range(data._replace(**{name: values}))
+
+
+@pytest.mark.parametrize("gain", [np.nan, np.inf, 1e300])
+def test_a_descent_ends_before_its_multipliers_overflow(gain):
+    mu, gradient = np.zeros(2), np.array([1e-6, 0.0])
+    assert not deflected(mu, gradient, np.zeros(2), gain)
+
+
+def test_a_descent_goes_on_with_ordinary_multipliers():
+    mu = np.zeros(2)
+    assert deflected(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1)
+    assert mu == pytest.approx([-0.08, -0.04])
+
+
+def test_a_level_with_a_table_of_nan_raises():
+    model, fuzzy = CASES["matrices"]
+    level, _, _ = level_of(model, fuzzy, np.arange(0, 1.01, 0.1))
+    value = {order: np.full_like(x, np.nan) for order, x in level.tables.value.items()}
+    with pytest.raises(UnprovedError, match="table is not finite"):
+        Problem.of(replace(level, tables=replace(level.tables, value=value)), 0, 1, 1e-6)

@@ -1,0 +1,163 @@
+"""The response to a record agrees with forty digits, and its rounding with its bound."""
+
+from itertools import pairwise
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from alphacut.frame.response.duhamel import responses_at_named_nodes, responses_at_nodes, walk
+from alphacut.frame.response.step_integrals import (
+    ERROR_OF_INTEGRALS,
+    FROM_RECURRENCE,
+    UNIT_ROUNDOFF,
+    error_of_integrals,
+    step_integrals,
+)
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+
+IDLE = 0.01
+"""Share of a bound of rounding that the largest of some errors reaches at least."""
+
+
+@pytest.fixture(autouse=True)
+def forty_digits():
+    with mp.workdps(40):
+        yield
+
+
+def exact_integrals(sigma, h):
+    """J_0 … J_3 by 40 digits: by series, or by parts where |σ h| is large."""
+    sigma, h = mp.mpc(complex(sigma)), mp.mpf(h)
+    z = sigma * h
+    if abs(z) < 20:
+        powers = [z**k / mp.factorial(k) for k in range(100)]
+        phi = [mp.fsum(power / (n + 1 + k) for k, power in enumerate(powers)) for n in range(4)]
+    else:
+        phi = [(mp.exp(z) - 1) / z]
+        for n in range(1, 4):
+            phi.append((mp.exp(z) - n * phi[-1]) / z)
+    return [value * h ** (n + 1) for n, value in enumerate(phi)]
+
+
+def error_at(z, h):
+    """Errors of the integrals at σ h = z, in units of u hⁿ⁺¹/(n + 1), and of their bound."""
+    sigma, out = complex(z) / h, np.empty(4, complex)
+    step_integrals(sigma, h, out)
+    off = [
+        float(abs(mp.mpc(complex(value)) - true))
+        for value, true in zip(out, exact_integrals(sigma, h), strict=True)
+    ]
+    bound = error_of_integrals(sigma, h)
+    scaled = [(n + 1) * x / h ** (n + 1) / UNIT_ROUNDOFF for n, x in enumerate(off)]
+    return scaled, max(off[0], 2 * off[1] / h) / bound
+
+
+@pytest.mark.parametrize("low", [-8, -1, 0, 1, 3])
+def test_integrals_of_a_step_agree_with_forty_digits(low):
+    """Both sides of the change of rule, and undamped, damped and overdamped exponents."""
+    rng, errors, shares = np.random.default_rng(low + 8), [], []
+    for _ in range(30):
+        angle = np.pi * rng.choice([0.5, rng.uniform(0.5, 1), 1])
+        size = 10 ** rng.uniform(low, low + 1 if low > -8 else -1)
+        z = 1j * size if angle == np.pi / 2 else size * np.exp(1j * angle)
+        scaled, share = error_at(z, rng.uniform(0.01, 1))
+        errors.append(scaled)
+        shares.append(share)
+    assert np.max(errors) <= ERROR_OF_INTEGRALS
+    assert IDLE <= np.max(shares) <= 1
+
+
+@pytest.mark.parametrize("beside", [-1e-12, 1e-12])
+@pytest.mark.parametrize("angle", [0.5, 0.6, 0.9, 1.0])
+def test_integrals_agree_where_the_rule_changes(beside, angle):
+    scaled, share = error_at((FROM_RECURRENCE + beside) * np.exp(1j * np.pi * angle), 0.3)
+    assert max(scaled) <= ERROR_OF_INTEGRALS
+    assert share <= 1
+
+
+def test_growing_exponents_are_scaled_by_their_growth():
+    out = np.empty(4, complex)
+    for z in (30 + 5j, 400 + 900j, 699 - 2j):
+        step_integrals(z, 1.0, out)
+        for value, true in zip(out, exact_integrals(z, 1.0), strict=True):
+            # of the exponential's own condition |z|
+            assert abs(mp.mpc(complex(value)) / true - 1) < 4 * abs(z) * UNIT_ROUNDOFF
+
+
+def exact_response(sigma, ground, time):
+    """ρ at one time by 40 digits, interval by interval."""
+    sigma, time, h = mp.mpc(complex(sigma)), mp.mpf(float(time)), mp.mpf(ground.step)
+    samples, total = [mp.mpf(float(x)) for x in ground.acceleration], mp.mpc(0)
+    for i, (a, b) in enumerate(pairwise(samples)):
+        low, high = i * h, min(time, (i + 1) * h)
+        if low >= time:
+            break
+        slope = (b - a) / h
+        for sign, end in ((1, high), (-1, low)):
+            value = (a + slope * (end - low)) / sigma + slope / sigma**2
+            total -= sign * mp.exp(sigma * (time - end)) * value
+    return total
+
+
+CASES = {
+    "nodes at samples": (20.0, 0.03, 0.02, 0.02),
+    "nodes between samples": (9.0, 0.02, 0.02, 0.0071),
+    "undamped, five samples a node": (14.0, 0.0, 0.02, 0.1),
+    "product above 15": (103.0, 0.03, 0.25, 0.025),
+    "product 340": (1700.0, 0.05, 0.2, 0.013),
+    "a third of a step": (5.0, 0.3, 0.3, 0.1),
+}
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_responses_are_off_by_their_rounding_at_most(case):
+    omega, quotient, step, node_step = CASES[case]
+    rng = np.random.default_rng(len(case))
+    ground = Accelerogram(step, rng.normal(size=40))
+    time = np.arange(61) * node_step
+    sigma = omega * np.array([0.3, 1.0, 1.01]) * (-quotient + 1j)
+    value, error = responses_at_nodes(sigma, ground, time, 2)
+    nodes = rng.choice(np.arange(1, 61), 8, replace=False)
+    shares = [
+        float(
+            abs(mp.mpc(complex(value[0, node, s])) - exact_response(sigma[s], ground, time[node]))
+        )
+        / error[node, s]
+        for node in nodes
+        for s in range(3)
+    ]
+    assert IDLE <= np.max(shares) <= 1
+    named = responses_at_named_nodes(np.tile(sigma, (8, 1)), ground, time, nodes, 2)
+    assert np.allclose(named[0], value[:, nodes], rtol=1e-13, atol=0)
+    assert np.allclose(named[1], error[nodes], rtol=1e-9, atol=0)
+
+
+def test_derivatives_are_those_of_the_response():
+    ground, time = Accelerogram(0.2, np.array([1.0, -2.0, 0.5, 3.0, 1.0])), np.arange(12) * 0.11
+    sigma, h = np.array([-0.6 + 20j]), 1e-5
+    value, _ = responses_at_nodes(sigma, ground, time, 2)
+    near = [responses_at_nodes(sigma + shift * h, ground, time, 0)[0][0] for shift in (-1, 0, 1)]
+    first, second = (near[2] - near[0]) / (2 * h), (near[0] - 2 * near[1] + near[2]) / h**2
+    assert np.allclose(value[1], first, rtol=1e-6, atol=1e-8)
+    assert np.allclose(value[2], second, rtol=1e-3, atol=1e-5)
+
+
+def test_nodes_stay_where_they_are():
+    """A node a billionth of a step beside a sample is not moved onto it; rounding of times is."""
+    ground = Accelerogram(0.1, np.ones(20))
+    time = np.array([0.0, 0.1 + 1e-10, 0.2 - 1e-10, 0.1 * 3, 0.7, 1.1])
+    found = walk(ground, time)
+    assert found.interval * 0.1 + found.phases[found.phase] == pytest.approx(time, abs=1e-15)
+    assert np.count_nonzero(found.phases == 0) == 1
+    assert found.interval.tolist() == [0, 1, 1, 3, 7, 11]
+
+
+@pytest.mark.parametrize("sigma", [np.nan, 1.0 + 3j, -1e12 + 1j, -1 + 1e10j])
+def test_exponents_out_of_range_are_refused(sigma):
+    ground, time = Accelerogram(0.1, np.ones(20)), np.arange(5) * 0.1
+    with pytest.raises(UnprovedError, match="take a shorter step of the record"):
+        responses_at_nodes(np.array([-1 + 2j, sigma]), ground, time, 0)
+    with pytest.raises(UnprovedError, match="allowed: up to 1e"):
+        responses_at_named_nodes(np.array([[sigma]]), ground, time, np.array([2]), 1)
