@@ -82,6 +82,12 @@ def slab_rule() -> tuple[Array, Array]:
     return points, np.outer(line_weights[order], planar_weights).ravel()
 
 
+def slice_weights() -> Array:
+    """Weights of the points of each slice of the reference prism, shape (3, 6), their sums 1/2."""
+    weights = slab_rule()[1].reshape(SLICES, -1)
+    return np.asarray(weights / (2 * weights.sum(axis=1, keepdims=True)))
+
+
 def vertices_and_midpoints() -> Array:
     """The 15 nodes of the reference prism, shape (15, 3)."""
     return np.concatenate([point for entity in _points_by_entity()[:2] for point in entity])

@@ -8,8 +8,10 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.fenicsx import MPI, at_points, basix, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm, strain
+from alphacut.rve.mesh.jacobian import LEAST_RATIO
+from alphacut.rve.mesh.outline import is_round
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import POINTS, SLICES, slab_rule, wedge
+from alphacut.rve.mesh.wedge import POINTS, SLICES, slab_rule, slice_weights, wedge
 from alphacut.stochastic import RadiusMap, layered_rule
 
 
@@ -83,12 +85,24 @@ class PrismForm:
             cure = "shorten the support, or take the series"
             raise RefusedError(place, f"{density.min():g}", "positive densities", cure)
         self.areas = self._areas()
-        if self.mesh.comm.allreduce(int((self.areas <= 0).any())):
+        self._require_sound()
+        self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
+        self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
+
+    def _require_sound(self) -> None:
+        """Refuse inverted elements, and about outlines that are not round nearly inverted ones.
+
+        Raises:
+            FoldedMeshError: There is one at a quadrature point.
+        """
+        determinants = self.areas / slice_weights()
+        means = determinants.mean(axis=(1, 2), keepdims=True)
+        least = 0.0 if is_round(self.grid.plane.outline) else LEAST_RATIO
+        bad = (means <= 0) | (determinants <= least * means)
+        if self.mesh.comm.allreduce(int(bad.any())):
             where = f"where it follows the radius through {self.grid.layers} layers in θ"
             cure = "take more layers or a smaller mesh size"
             raise FoldedMeshError(f"the mesh folds over {where}", cure)
-        self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
-        self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
 
     def _inside(self, positions: Array, radius: RadiusMap) -> Array:
         """Share of the particle at the quadrature points, shape (cells, points)."""
@@ -108,11 +122,9 @@ class PrismForm:
         return self._at_points(self._strain, 3)
 
     def _areas(self) -> Array:
-        weights = slab_rule()[1].reshape(SLICES, -1)
-        planar = weights / (2 * weights.sum(axis=1, keepdims=True))
         heights = np.diff(self._levels)[self.layer]
         volume = self._at_points(self._volume, 1)[..., 0]
-        return np.asarray(volume / heights[:, None, None] * planar)
+        return np.asarray(volume / heights[:, None, None] * slice_weights())
 
     def _at_points(self, expression: fem.Expression, size: int) -> Array:
         cells = np.arange(len(self.wedge), dtype=np.int32)

@@ -8,7 +8,7 @@ whole line of one periodic corner over θ.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from time import perf_counter
@@ -21,10 +21,12 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import LOADS, THREE_LOADS, AnyPhase, Cell, Phase
 from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
-from alphacut.rve.mesh.outline import Outline, circle
+from alphacut.rve.mesh.grading import REFINEMENTS
+from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import reference_radius, triangulate
 from alphacut.rve.prism.error_estimate import judged
+from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import Homogenised, StressCurve
@@ -122,10 +124,19 @@ class PrismModel:
             RefusedError: A radius does not fit into the cell.
         """
         radius = reference_radius(radius_map, self.outline)
-        conforming = self.interface == "conforming"
-        problem = _problem(
-            self.mesh_size, radius if conforming else 0.0, self.outline, self.layers, self.parallel
-        )
+        if self.interface != "conforming":
+            return self._moved(radius_map, 0.0, REFINEMENTS[0])
+        if is_round(self.outline):
+            return self._moved(radius_map, radius, REFINEMENTS[0])
+        for refinement in REFINEMENTS[:-1]:
+            with suppress(FoldedMeshError):
+                return self._moved(radius_map, radius, refinement)
+        return self._moved(radius_map, radius, REFINEMENTS[-1])
+
+    def _moved(self, radius_map: RadiusMap, radius: float, refinement: float) -> PrismProblem:
+        """The problem on a mesh made at a radius, moved to a map."""
+        size, layers = self.mesh_size, self.layers
+        problem = _problem(size, radius, self.outline, refinement, layers, self.parallel)
         problem.move(radius_map)
         return problem
 
@@ -214,9 +225,9 @@ def timed(seconds: Seconds, stage: str) -> Iterator[None]:
 
 @lru_cache(maxsize=2)
 def _problem(
-    size: float, radius: float, outline: Outline, layers: int, parallel: bool
+    size: float, radius: float, outline: Outline, refinement: float, layers: int, parallel: bool
 ) -> PrismProblem:
     """Mesh, form and numbering: they do not depend on the map, only on these."""
-    plane = triangulate(size=size, radius=radius, outline=outline)
+    plane = triangulate(size=size, radius=radius, outline=outline, refinement=refinement)
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     return PrismProblem(PrismGrid(plane, layers, radius > 0), comm)

@@ -10,6 +10,8 @@ from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Phase, VoigtPhase
 from alphacut.rve.certificate import CertificateError
 from alphacut.rve.mesh.outline import Ellipse
+from alphacut.rve.mesh.triangulation import triangulate
+from alphacut.rve.mesh.wedge import slice_weights
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.series.model import SeriesModel
@@ -208,6 +210,16 @@ def test_the_declared_error_covers_the_true_one(options, radius_map, particle):
     result = solve(radius_map, particle, **options)
     assert abs(result.modulus / exact - 1) <= result.estimated_error
     assert abs(result.modulus / exact - 1) > 0.5 * result.estimated_error
+
+
+def test_wedges_about_a_sharp_outline_are_sound_at_all_radii():
+    """On the first mesh that follows the bends, wedges at some radius are nearly inverted."""
+    model = PrismModel(0.6, 6, outline=lambda angle: 1 + 0.277 * np.cos(4 * angle))
+    problem = model.problem(HermiteMap(0.078, 0, 0.405, 0))
+    determinants = problem.form.areas / slice_weights()
+    assert (determinants > 0.2 * determinants.mean(axis=(1, 2), keepdims=True)).all()
+    first = triangulate(size=0.6, radius=problem.form.grid.plane.radius, outline=model.outline)
+    assert len(problem.form.grid.plane.triangles) > len(first.triangles)
 
 
 def test_a_mesh_that_folds_over_is_refused_with_its_cure():
