@@ -119,6 +119,8 @@ def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> in
     if "case" not in options:
         require_petsc(petsc, False)
     options.petsc = petsc
+    if options.json == "/dev/stdout":  # opened again, it would write over what a file holds
+        options.json = "-"
     check_destinations(made[options.command], options)
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
         warnings.showwarning = _warn

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def summary(result: Microstructure) -> dict[str, object]:
         "largest_radius": float(radii.max()),
         "share_capped": result.share_beyond,
     }
-    return numbers | _of_discs(result) | _of_map(result)
+    return numbers | _of_discs(result) | _of_map(result) | {"radius": radius_section(result)}
 
 
 def _of_discs(result: Microstructure) -> dict[str, object]:
@@ -77,26 +78,41 @@ def _of_map(result: Microstructure) -> dict[str, object]:
     }
 
 
-def fragment(result: Microstructure) -> str:
-    """The section [radius] of a case file, with as many digits as the fit has."""
+def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
+    """The section [radius] of a case, with as many digits as the fit has."""
     box, law = result.pbox, result.pbox.fit.distribution
     near = CRISP * (box.fit.a3 - box.fit.a1)
 
-    def triangle(ends: tuple[float, float, float]) -> str:
+    def triangle(ends: tuple[float, float, float]) -> list[float]:
         near_ends = (ends[1] if abs(end - ends[1]) <= near else end for end in ends)
-        return "[" + ", ".join(f"{end:.8g}" for end in near_ends) + "]"
+        return [float(f"{end:.8g}") for end in near_ends]
 
-    cells = result.study.shape.cells
-    return (
-        f"[radius]  # from {len(result.sample.values)} cells; the limits keep"
-        f" {result.share_kept:.4%} of their {cells}\n"
-        f"# {cells} fraction of this map at its modal values: {result.fraction_of_map:.4f}\n"
-        f"theta = [{law.lower:g}, {law.upper:g}]\n"
-        f"a1 = {box.fit.a1:.10g}\n"
-        f"a2 = {triangle(box.a2)}\n"
-        f"a3 = {box.fit.a3:.10g}\n"
-        f"a4 = {triangle(box.a4)}\n"
-    )
+    return {
+        "theta": [float(f"{end:g}") for end in (law.lower, law.upper)],
+        "a1": float(f"{box.fit.a1:.10g}"),
+        "a2": triangle(box.a2),
+        "a3": float(f"{box.fit.a3:.10g}"),
+        "a4": triangle(box.a4),
+    }
+
+
+def fragment(numbers: Mapping[str, Any]) -> str:
+    """The section [radius] of a case file.
+
+    Args:
+        numbers: Those of `summary`.
+    """
+    cells = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
+    lines = [
+        f"[radius]  # from {numbers['cells']} cells; the limits keep"
+        f" {numbers['share_kept']:.4%} of their {cells}",
+        f"# {cells} fraction of this map at its modal values:"
+        f" {numbers[f'mean_{cells}_fraction_of_map']:.4f}",
+    ]
+    for name, value in numbers["radius"].items():
+        ends = [f"{x:.10g}" for x in (value if isinstance(value, list) else [value])]
+        lines.append(f"{name} = [{', '.join(ends)}]" if len(ends) > 1 else f"{name} = {ends[0]}")
+    return "\n".join(lines) + "\n"
 
 
 def to_dataset(result: Microstructure) -> xarray.Dataset:

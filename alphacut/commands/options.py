@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn, TextIO
 
 from alphacut.case.load import Case, load
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import as_json, write_text
+from alphacut.io.files import alone, as_json, rank, require_writable, say, write_text
+from alphacut.io.manifest import MANIFEST, ResultsFolder
 from alphacut.io.problem import BadInput, Problem, suggestion
-from alphacut.stages.store import Store
+from alphacut.stages.store import StageStore
 
 PETSC_PREFIX = "-rve_"
 
@@ -118,16 +120,33 @@ def read(options: argparse.Namespace) -> Case:
     return case
 
 
-def opened(options: argparse.Namespace) -> tuple[Case, Store]:
-    """The case, and the folder of the results.
+@contextmanager
+def opened(options: argparse.Namespace, folder: str = "") -> Iterator[tuple[Case, StageStore]]:
+    """The case, and the store of its results, which no other run writes into meanwhile.
+
+    Args:
+        options: Of the command.
+        folder: Folder of the results where ``--out`` is left out; empty to write nothing.
 
     Raises:
         BadInput: The case has problems.
-        RefusedError: There are fewer than one worker.
+        RefusedError: There are fewer than one worker, or the folder is not this program's.
     """
     require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
-    case, folder = read(options), Path(options.out) if options.out else None
-    return case, Store(folder, case.text, quiet=options.quiet, workers=options.workers)
+    case, place = read(options), options.out or folder
+    fresh = getattr(options, "fresh", False)
+    store = StageStore(None, case.text, fresh, options.quiet, options.workers)
+    if not place:
+        yield case, store
+        return
+    require_writable("--out", place, folder=True)
+    with alone("--out", Path(place)) if rank() == 0 else nullcontext():
+        results = ResultsFolder.opened(Path(place))
+        if results.is_lost:
+            say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
+        if fresh and rank() == 0:
+            results.clear()
+        yield case, replace(store, folder=results)
 
 
 def answer(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Mapping
-from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
@@ -14,14 +12,17 @@ from alphacut.case.load import Case
 from alphacut.commands.options import Command, add_quiet, add_run, answer, opened
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.files import Document, alone, as_json, rank, require_writable, say, write_text
+from alphacut.io.files import Document, alone, as_json, say, write_text
+from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary
 from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.report.page import report as page_of
 from alphacut.report.tables import run_text, write_tables
 from alphacut.stages.chain import Chain
 from alphacut.stages.results import Results
-from alphacut.stages.store import Store
+from alphacut.stages.store import StageStore, put_text
+
+PAGE = "report.html"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -33,12 +34,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Computes, draws, reports."""
-    folder = Path(options.out or f"results/{Path(options.case).stem}")
-    case, store = opened(options)
-    store = replace(store, folder=folder, fresh=options.fresh)
-    require_writable("--out", str(folder), folder=True)
-    with alone("--out", folder) if rank() == 0 else nullcontext():
-        document = computed(case, store, folder, options.petsc, figures=not options.no_figures)
+    folder = options.out or f"results/{Path(options.case).stem}"
+    with opened(options, folder) as (case, store):
+        document = computed(case, store, options.petsc, figures=not options.no_figures)
     answer(options, document, out, run_text(document))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {document['seconds']:.0f} s")
@@ -48,13 +46,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     return 0
 
 
-def computed(
-    case: Case, store: Store, folder: Path, petsc: Mapping[str, str], *, figures: bool
-) -> Document:
+def computed(case: Case, store: StageStore, petsc: Mapping[str, str], *, figures: bool) -> Document:
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
-    for old in folder.glob("samples.db*") if store.fresh else ():
-        old.unlink()
     with pool(store.workers) as executor:
         results = Chain(Results(case.content), store, petsc, figures, executor).run()
         names = drawn(results, store, executor) if figures else []
@@ -70,9 +64,9 @@ def computed(
         "changes": list(case.changes),
         "figures": names,
         "seconds": time.perf_counter() - start,
-        "fingerprints": {x: data.attrs["fingerprint"] for x, data in results.datasets.items()},
+        "fingerprints": {name: result.fingerprint for name, result in results.stages.items()},
     }
-    write_text(folder / "summary.json", as_json(document, indent=2))
+    store.put_text("summary.json", as_json(document, indent=2))
     return document
 
 
@@ -88,10 +82,14 @@ def add_page(parser: argparse.ArgumentParser) -> None:
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
     """Writes the page, and the tables where they are requested."""
-    folder = Path(options.folder)
-    path = Path(options.out) if options.out else folder / "report.html"
+    folder = ResultsFolder.opened(Path(options.folder))
     page = page_of(folder)
-    write_text(path, page)
+    path = Path(options.out) if options.out else folder.path / PAGE
+    if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
+        with alone("FOLDER", folder.path):
+            put_text(ResultsFolder.opened(folder.path), PAGE, page)
+    else:
+        write_text(path, page)
     tables = []
     if options.csv:
         tables = write_tables(read_summary(folder), folder, Path(options.csv))

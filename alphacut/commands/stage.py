@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TextIO
 
 from alphacut.commands.options import Command, add_common, add_run, answer, opened, read
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.netcdf import document_of, read_dataset
+from alphacut.io.netcdf import read_dataset
 from alphacut.io.quantity import between
 from alphacut.report.results import ISOTROPIC, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
@@ -17,22 +18,23 @@ from alphacut.stages.chain import Chain
 from alphacut.stages.identify import learned
 from alphacut.stages.modulus import number_of
 from alphacut.stages.results import Results
+from alphacut.stochastic.microstructure_summary import fragment
 
 
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the map, writes it and prints the section [radius]."""
-    case, store = opened(options)
-    data = Chain(Results(case.content), store).particles()
-    fragment = str(data.attrs["radius"])
-    answer(options, document_of(data) | {"fragment": fragment}, out, fragment)
+    with opened(options) as (case, store):
+        numbers = Chain(Results(case.content), store).particles().document
+    text = fragment(numbers)
+    answer(options, numbers | {"fragment": text}, out, text)
     return 0
 
 
 def modulus(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the modulus of a round cell or of an image."""
-    case, store = opened(options)
-    results = Results(case.content)
-    Chain(results, store, options.petsc).material()
+    with opened(options) as (case, store):
+        results = Results(case.content)
+        Chain(results, store, options.petsc).material()
     document, words = results.document(), {"modulus": summary, "image": image}
     for name in document.keys() & words.keys():
         text = text_table(*tables(document)[name]) + words[name](document[name])
@@ -71,12 +73,12 @@ def add_envelope(parser: argparse.ArgumentParser) -> None:
 
 def envelope(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the envelope of [envelope]."""
-    case, store = opened(options)
-    chain = Chain(Results(case.content), store)
     number = None
     if options.modulus:
-        number = number_of(read_dataset(options.modulus, key="--modulus"), "--modulus")
-    chain.motion(chain.structure(number), studies=False)
+        number = number_of(read_dataset(Path(options.modulus), "--modulus"), "--modulus")
+    with opened(options) as (case, store):
+        chain = Chain(Results(case.content), store)
+        chain.motion(chain.structure(number), studies=False)
     document = chain.results.document()
     answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0

@@ -14,14 +14,12 @@ from alphacut.export.mesh import draw_mesh
 from alphacut.figures import envelope, follower, frame, material
 from alphacut.figures.style import save, style
 from alphacut.fuzzy.campaign.workers import submitted
-from alphacut.io.netcdf import dataset_of, document_of
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.cell import modal_cell
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, Store, Work
+from alphacut.stages.store import Stage, StageResult, StageStore, Work
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.figure import Figure
 
 PARTS = 6  # into which the figures are dealt out, so that no process waits long for the other
@@ -38,7 +36,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         if question.key in results.answers:
             yield question.key, partial(question.figure, results.answers[question.key])
     for task in results.tasks:
-        yield from envelope.drawings(task, results.envelopes[task.name])
+        yield from envelope.drawings(task, results.envelopes[task.name].arrays)
 
 
 def _material(results: Results) -> Iterator[Drawing]:
@@ -49,13 +47,13 @@ def _material(results: Results) -> Iterator[Drawing]:
     if map_of is not None:
         yield "fig14-cone", partial(material.cone, map_of)
     if (data := results.modulus) is not None:
-        yield "fig16-stress-curves", partial(material.stress_curves, data)
-        yield "fig17-mean-stress", partial(material.mean_stress, data)
+        yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)
+        yield "fig17-mean-stress", partial(material.mean_stress, data.arrays)
         yield "fig18-modulus", partial(material.fuzzy_modulus, data, results.content.frame)
         if results.is_paper:
-            yield "fig19-membership", partial(material.membership, data)
+            yield "fig19-membership", partial(material.membership, data.arrays)
     if results.image is not None:
-        yield "image", partial(material.image, results.image)
+        yield "image", partial(material.image, results.image.arrays)
 
 
 def _structure(results: Results) -> Iterator[Drawing]:
@@ -71,34 +69,30 @@ def _structure(results: Results) -> Iterator[Drawing]:
         yield "fig21-25-graph-follower", partial(follower.follower, results, richest)
 
 
-def drawn(results: Results, store: Store, executor: Executor | None) -> list[str]:
+def drawn(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
     """Draws every figure as SVG and PNG into figures/, unless they show the same already.
 
     Args:
         results: Of the run.
-        store: Folder of the results.
+        store: Store of the results.
         executor: Processes that draw side by side; None: this one draws.
 
     Returns:
         Names of the files, in the folder of the results.
     """
-    folder = store.folder or Path()
     inputs = [results.content, results.answers]
-    inputs += [sorted(x.attrs["fingerprint"] for x in results.datasets.values())]
+    inputs += [sorted(x.fingerprint for x in results.stages.values())]
     inputs += [version_of(name) for name in ("matplotlib", "pyvista")]
-    compute = partial(dataset, results, folder, executor)
-    data = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), compute))
-    if not all((folder / name).is_file() for name in document_of(data)["figures"]):
-        data = compute(Work())
-    every = [one for one in (results.microstructure, data) if one is not None]
-    names = (name for one in every for name in document_of(one)["figures"])
-    return [name for name in names if (folder / name).is_file()]
+    compute = partial(draw_all, results, executor)
+    figures = store.take(Stage("figures", inputs, (*NESTED, "alphacut"), compute))
+    before = [] if results.microstructure is None else results.microstructure.figures
+    return [*before, *figures.figures]
 
 
-def dataset(
-    results: Results, folder: Path, executor: Executor | None, work: Work
-) -> xarray.Dataset:
-    """Names of all figures, which are drawn in parts, as a document."""
+def draw_all(results: Results, executor: Executor | None, work: Work) -> StageResult:
+    """Draws all figures, in parts; the result has their names."""
+    assert work.folder is not None
+    folder = work.folder
     mesh = _mesh(results, folder, executor)
     parts = [submitted(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
@@ -107,7 +101,7 @@ def dataset(
         if work.tick:
             work.tick(count / PARTS)
     made = [name for name, future in mesh.items() if future.result()]
-    return dataset_of({"figures": [*sorted(names), *made]})
+    return StageResult({"figures": [*sorted(names), *made]})
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:

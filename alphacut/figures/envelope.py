@@ -75,7 +75,7 @@ def time_axes(axes: Axes, time: Array, output: str) -> None:
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
     task = next((one for one in results.tasks if len(one.fuzzy) > 1), results.tasks[0])
-    dataset, structure = results.envelopes[task.name].isel(alpha=0), results.structure
+    dataset, structure = results.envelopes[task.name].arrays.isel(alpha=0), results.structure
     assert structure is not None
     names = [str(name) for name in dataset["output"].values]
     output = names[-1 if "q" in names[-1] else 0]

@@ -11,8 +11,8 @@ from alphacut.case.material import RadiusMap
 from alphacut.case.structure import Frame
 from alphacut.figures import style as look
 from alphacut.fuzzy.arrays import Array
-from alphacut.io.netcdf import document_of
 from alphacut.stages.cell import GPA
+from alphacut.stages.store import StageResult
 from alphacut.stochastic import HermiteMap
 
 if TYPE_CHECKING:
@@ -142,12 +142,13 @@ def mean_stress(dataset: xarray.Dataset) -> Figure:
     return drawn
 
 
-def fuzzy_modulus(dataset: xarray.Dataset, frame: Frame | None) -> Figure:
+def fuzzy_modulus(result: StageResult, frame: Frame | None) -> Figure:
     """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes, and below it fuzzy ν."""
     import matplotlib.pyplot as plt
 
     size = (look.WIDTH, 1.75 * look.HEIGHT)
     drawn, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
+    dataset, average = result.arrays, result.document["average"]
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
     look.shaded_cuts(axes, alpha, *ends.T)
     if frame is not None and frame.modulus is not None:
@@ -156,7 +157,6 @@ def fuzzy_modulus(dataset: xarray.Dataset, frame: Frame | None) -> Figure:
         axes.plot(look.outline(*cuts.T), [0, 1, 1, 0], **line)
         axes.plot([], [], color=look.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
-    average = document_of(dataset)["average"]
     look.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
     look.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
     look.membership_axes(below, "effective Poisson's ratio ν of the same")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import secrets
 import shutil
 import sys
 import tempfile
@@ -46,20 +47,25 @@ def is_special(path: Path) -> bool:
 
 
 @contextmanager
-def whole_file(path: Path | str) -> Iterator[Path]:
+def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]:
     """Temporary name beside `path`, renamed to it once the block is through.
 
-    A link stays and its target is replaced; a device or a pipe is written to.
+    A device or a pipe is written to.
+
+    Args:
+        path: The file.
+        follow_links: Whether a link stays and its target is replaced; else the link is replaced.
     """
     path = Path(path)
-    if is_special(path):
+    if is_special(path) and follow_links:
         with tempfile.TemporaryDirectory() as folder:
             yield (partial := Path(folder) / path.name)
             path.write_bytes(partial.read_bytes())
         return
-    path = Path(os.path.realpath(path))
+    path = Path(os.path.realpath(path)) if follow_links else path
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # no link's target
     try:
         yield partial
         os.replace(partial, path)
@@ -71,9 +77,9 @@ def whole_file(path: Path | str) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
-def write_text(path: Path | str, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    with whole_file(path) as partial:
+def write_text(path: Path | str, text: str, *, follow_links: bool = True) -> None:
+    """Writes a text file, whole or not at all."""
+    with whole_file(path, follow_links=follow_links) as partial:
         partial.write_text(text, encoding="utf-8")
 
 

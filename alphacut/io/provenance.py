@@ -8,7 +8,7 @@ import os
 import platform
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel
 
-# 2: the bounds of a certified envelope are the proved ones; of the NetCDF files and of summary.json
-FORMAT = 2
+FORMAT = 3
+"""Format of a folder of results. 3: a manifest, and JSON files beside the NetCDF files."""
 PACKAGES: tuple[str, ...] = ("fenics-dolfinx", "fenics-basix", "petsc4py", "mpi4py", "gmsh")
 PACKAGES += ("numpy", "scipy", "xarray")
 NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their own
@@ -99,13 +99,18 @@ def command() -> str:
     return f"{name} {shlex.join(sys.argv[1:])}".strip()
 
 
-def attributes(case_text: str, key: str) -> Mapping[str, str | int]:
-    """Attributes that every NetCDF file carries."""
+def origin(case_text: str, key: str) -> dict[str, object]:
+    """Origin of a result, which its JSON file states.
+
+    Args:
+        case_text: The case file.
+        key: Fingerprint of the result.
+    """
     return {
         "format_version": FORMAT,
         "created_by": f"alphacut {own_version()}",
         "command": command(),
-        "versions": json.dumps(versions()),
+        "versions": versions(),
         "case": case_text,
         "fingerprint": key,
     }

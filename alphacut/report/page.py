@@ -7,16 +7,19 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
-from alphacut.io.files import Document
-from alphacut.io.netcdf import damaged, read_dataset, read_summary, require_own
+from alphacut.io.files import Document, say
+from alphacut.io.manifest import ResultsFolder
+from alphacut.io.netcdf import damaged, dataset_of, read_summary, require_same_run
+from alphacut.io.problem import Problem
 from alphacut.report.results import (
     ANSWERS,
     Row,
@@ -58,7 +61,7 @@ FIGURES: dict[str, str] = _TABLES["figures"] | {one.key: one.caption for one in 
 WORDS: dict[str, str] = _TABLES["words"]
 
 
-def report(folder: Path) -> str:
+def report(folder: ResultsFolder) -> str:
     """The page for the results in a folder.
 
     Raises:
@@ -66,13 +69,13 @@ def report(folder: Path) -> str:
     """
     summary = read_summary(folder)
     try:
-        require_own(summary, folder)
+        require_same_run(summary, folder)
         return page(summary, folder)
     except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
         raise damaged(folder, f"damaged ({type(error).__name__})") from error
 
 
-def page(summary: Document, folder: Path) -> str:
+def page(summary: Document, folder: ResultsFolder) -> str:
     """The page for a summary; all texts of it are escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -87,9 +90,9 @@ def page(summary: Document, folder: Path) -> str:
     )
 
 
-def plot(name: str, study: Document, folder: Path) -> Document:
+def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
     """One study of the interactive plot: bounds and error by level and output, in base64."""
-    dataset = read_dataset(folder / f"envelope_{name}.nc", key=str(folder))
+    dataset = dataset_of(folder.content(f"envelope_{name}.nc"))
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
     bands = {side: dataset[side] for side in ("lower", "upper")}
@@ -125,14 +128,14 @@ class Page:
 
     Args:
         summary: Its summary.
-        folder: Where its figures are.
+        folder: Its results.
     """
 
-    def __init__(self, summary: Document, folder: Path) -> None:
-        self.summary, self.tables = summary, tables(summary)
+    def __init__(self, summary: Document, folder: ResultsFolder) -> None:
+        self.summary, self.folder, self.tables = summary, folder, tables(summary)
         self.paper = any("fig" in name for name in summary.get("figures", ()))
-        pictures = [folder / name for name in summary["figures"] if name.endswith(".png")]
-        self.left = {path.stem: path for path in pictures}  # that no section has shown yet
+        pictures = [name for name in summary["figures"] if name.endswith(".png")]
+        self.left = {PurePosixPath(x).stem: x for x in pictures}  # that no section has shown yet
 
     def sections(self) -> Iterator[tuple[str, list[Piece]]]:
         """Title and pieces of all sections that the results allow, in reading order."""
@@ -192,7 +195,11 @@ class Page:
         for name in names:
             stems = [stem for stem in self.left if stem == name or stem.endswith(f"-{name}")]
             for stem in stems[:1]:
-                picture = base64.b64encode(self.left.pop(stem).read_bytes()).decode()
+                try:
+                    picture = base64.b64encode(self.folder.content(self.left.pop(stem))).decode()
+                except RefusedError as error:
+                    say(f"warning: a figure is left out: {Problem.of(error)}")
+                    continue
                 yield "figure", caption(stem, paper=self.paper), picture
 
     def _origin(self) -> Iterator[Piece]:

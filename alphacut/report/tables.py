@@ -12,7 +12,8 @@ from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
-from alphacut.io.netcdf import read_dataset
+from alphacut.io.manifest import ResultsFolder
+from alphacut.io.netcdf import dataset_of
 from alphacut.io.quantity import ends, engineering
 from alphacut.report.results import (
     Row,
@@ -43,12 +44,12 @@ def run_text(summary: Document) -> str:
     return "".join(text_table(*one) for one in shown) + "".join(f"{line}\n" for line in lines)
 
 
-def write_tables(summary: Document, results: Path, folder: Path) -> list[Path]:
+def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> list[Path]:
     """Writes the results of a run as CSV files.
 
     Args:
         summary: Of the run.
-        results: Its folder.
+        results: Its results.
         folder: Where the files go; made if it does not exist.
 
     Returns:
@@ -56,13 +57,13 @@ def write_tables(summary: Document, results: Path, folder: Path) -> list[Path]:
     """
     every = {name: table for name, table in tables(summary).items() if table[1]}
     for name, study in summary.get("envelopes", {}).items():
-        data = read_dataset(results / f"envelope_{name}.nc", key=str(results))
+        data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
             every[f"envelope_{name}-{output}"] = over_time(data, output)
     for name, (head, rows) in every.items():
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
-        write_text(folder / f"{name}.csv", text.getvalue())
+        write_text(folder / f"{name}.csv", text.getvalue(), follow_links=False)
     return [folder / f"{name}.csv" for name in every]
 
 

@@ -6,22 +6,17 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.netcdf import dataset_of, document_of
 from alphacut.questions.question import Motion, Question
 from alphacut.stages import cell, envelope, identify, image, microstructure, modulus, shares
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import Campaign
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, Store, Work
-
-if TYPE_CHECKING:
-    import xarray
+from alphacut.stages.store import Stage, StageResult, StageStore, Work
 
 
 @dataclass
@@ -30,14 +25,14 @@ class Chain:
 
     Args:
         results: Where the results go; of the stages before, what is there.
-        store: Folder of the results.
+        store: Store of the results.
         petsc: PETSc options that override the solver's.
         figures: Whether the particles are drawn.
         executor: Processes that compute envelopes side by side.
     """
 
     results: Results
-    store: Store
+    store: StageStore
     petsc: Mapping[str, str] = field(default_factory=dict)
     figures: bool = True
     executor: Executor | None = None
@@ -58,13 +53,13 @@ class Chain:
             self.material()
         if "envelope" in stages:
             data = results.modulus if results.image is None else results.image
-            self._motion(self.structure(None if data is None else modulus.number_of(data)))
+            self._motion(self.structure(None if data is None else modulus.number_of(data.arrays)))
         samples = self.campaign if results.modulus is not None else None
         richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
         results.shares = self.store.take(shares.stage(samples, results.structure, richest))
         return results
 
-    def particles(self) -> xarray.Dataset:
+    def particles(self) -> StageResult:
         """The particles and their radius map."""
         section = self.content.microstructure
         if section is None:
@@ -86,7 +81,7 @@ class Chain:
             results.image = self.store.take(stage)
             return
         results.modulus = data = self.store.take(modulus.stage(self.campaign))
-        cell.require_tolerance(document_of(data)["error"], section.tolerance)
+        cell.require_tolerance(data.document["error"], section.tolerance)
 
     def structure(self, number: FuzzyNumber | None) -> Structure:
         """The structure with a modulus in Pa, None for its own."""
@@ -125,12 +120,12 @@ class Chain:
             inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section]
             compute = partial(answered, section, structure, task)
             stage = Stage(key, inputs, ("fuzzy", "frame", "alphacut"), compute)
-            results.answers[key] = document_of(self.store.take(stage))
+            results.answers[key] = self.store.take(stage).document
 
 
 def answered(
     section: Question, structure: Structure, task: EnvelopeTask, work: Work
-) -> xarray.Dataset:
-    """The answer to a question about the motion of [envelope], as a document."""
+) -> StageResult:
+    """The answer to a question about the motion of [envelope]."""
     times = (task.section.alpha, task.duration, task.section.step)
-    return dataset_of(section.answer(Motion(structure, task.fuzzy, *times, work.tick)))
+    return StageResult(section.answer(Motion(structure, task.fuzzy, *times, work.tick)))

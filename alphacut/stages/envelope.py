@@ -5,21 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from alphacut import frame
 from alphacut.case.motion import Envelope, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import peaks
+from alphacut.frame.questions.peaks import Peaks, peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, say
-from alphacut.stages.store import Stage, Work
-
-if TYPE_CHECKING:
-    import xarray
+from alphacut.stages.store import Stage, StageResult, Work
 
 USUAL = {True: Tolerance(1e-4), False: Tolerance(1e-3, "")}
 """Tolerance where none is named: of displacements, or where there are none of each peak."""
@@ -64,11 +58,8 @@ class EnvelopeTask:
             return {}
         return {"tolerance": own * (self.section.gain if method in FOLLOWERS else 1.0)}
 
-    def compute(self, structure: Structure, work: Work) -> xarray.Dataset:
-        """The envelope with the fuzzy peak of each output's magnitude.
-
-        Variables besides those of the envelope: ``peak`` (alpha, bound, output), bounds of it at
-        the nodes, and ``peak_error`` (alpha, output), what it may lie outside them by.
+    def compute(self, structure: Structure, work: Work) -> StageResult:
+        """The envelope, and the fuzzy peak of each output's magnitude in its document.
 
         Raises:
             RefusedError: The structure or the method does not take these values.
@@ -85,18 +76,21 @@ class EnvelopeTask:
             progress=work.tick or False,
             **self.options(structure),
         )
-        return with_peaks(result)
+        return StageResult({"peak": by_output(peaks(result))}, result.to_dataset())
 
 
-def with_peaks(result: frame.Envelope) -> xarray.Dataset:
-    """The dataset of an envelope with its peaks."""
-    of = peaks(result)
-    words = {"units": "SI, by output", "long_name": "largest magnitude at the nodes"}
-    ends = np.stack([of.lower, of.upper], axis=1)
-    data = result.to_dataset().assign(peak=(("alpha", "bound", "output"), ends, words))
-    beyond = {"units": "SI, by output", "long_name": "distance by which peaks may lie outside"}
-    data = data.assign(peak_error=(("alpha", "output"), of.error, beyond))
-    return data.assign_coords(bound=["lower", "upper"])
+def by_output(peaks: Peaks) -> Document:
+    """Peaks of each output by its name, each with its ends on all levels, in SI."""
+    return {
+        name: {
+            "lower": peaks.lower[:, column],
+            "upper": peaks.upper[:, column],
+            "error": peaks.error[:, column],
+            "reached": peaks.reached[:, column],
+            "nature": str(peaks.natures[column]),
+        }
+        for column, name in enumerate(peaks.outputs)
+    }
 
 
 def tasks(section: Envelope, studies: Sequence[Study]) -> tuple[EnvelopeTask, ...]:
@@ -114,8 +108,9 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage:
     return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), compute)
 
 
-def document(data: xarray.Dataset, fuzzy: Sequence[str]) -> Document:
+def document(result: StageResult, fuzzy: Sequence[str]) -> Document:
     """Extremes over time at the lowest level, peaks, errors, cost, in SI."""
+    data = result.arrays
     lowest, facts = data.isel(alpha=0), ("trajectories", "seconds", "method", "nature")
     columns = {
         "min": lowest["lower"].min("time"),
@@ -124,24 +119,17 @@ def document(data: xarray.Dataset, fuzzy: Sequence[str]) -> Document:
         "error": lowest["error"].max("time"),
     }
     names = [*map(str, data["output"].values)]
-    peaks_of = {
-        name: {
-            **{end: data["peak"].sel(bound=end, output=name).values for end in ("lower", "upper")},
-            "error": data["peak_error"].sel(output=name).values,
-        }
-        for name in names
-    }
     return {
         "fuzzy": list(fuzzy),
         **{key: dict(zip(names, map(float, x.values), strict=True)) for key, x in columns.items()},
         "alpha": data["alpha"].values,
-        "peak": peaks_of,
+        "peak": result.document["peak"],
         **{name: data.attrs[name] for name in facts},
         "step": float(data["time"].values[1]),
     }
 
 
-def require_tolerance(data: xarray.Dataset, task: EnvelopeTask, structure: Structure) -> None:
+def require_tolerance(result: StageResult, task: EnvelopeTask, structure: Structure) -> None:
     """Requires declared errors within the tolerance, where the case names one.
 
     A Graph Follower takes the tolerance as the gain that it goes on for, and cannot promise it: its
@@ -152,12 +140,12 @@ def require_tolerance(data: xarray.Dataset, task: EnvelopeTask, structure: Struc
     """
     if task.section.tolerance is None:
         return
-    allowed = task.tolerance(structure)
-    errors = data["error"].max(("alpha", "time"))
-    if not allowed.unit:
-        errors = errors / data["peak"].sel(bound="upper").max("alpha")
-    for name, error in zip(map(str, data["output"].values), errors.values, strict=True):
+    allowed, data = task.tolerance(structure), result.arrays
+    errors = data["error"].max(("alpha", "time")).values
+    for name, error in zip(map(str, data["output"].values), errors, strict=True):
         meant = allowed.unit in ("", Output(name).unit)
+        if not allowed.unit:
+            error = error / max(result.document["peak"][name]["upper"])
         if meant and error > allowed.value * (1 + 1e-9):
             what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
             cure = "method auto, or a smaller envelope.step, reaches it"

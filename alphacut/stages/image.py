@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import require
-from alphacut.io.files import Document, as_json
+from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest
 from alphacut.rve.image.bounds import Ends
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -24,11 +23,8 @@ from alphacut.rve.image.moduli import ModuliInterval
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_phases
 from alphacut.stages.cell import AVERAGES, GPA
-from alphacut.stages.store import Stage, Work
+from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.segmentation import segmented
-
-if TYPE_CHECKING:
-    import xarray
 
 ACCURACY = 1e-5
 """Relative energy that the solver may leave."""
@@ -44,11 +40,13 @@ Ranges = Callable[[Level], tuple[Rows, Rows]]
 def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage:
     """The stage of an image, on some levels; E and ν are of an average of its stiffness."""
     inputs = [cell, alpha, average, file_digest(cell.image)]
-    compute = partial(dataset, cell, alpha, average)
+    compute = partial(compute_cuts, cell, alpha, average)
     return Stage("image", inputs, ("stochastic", "rve", "fuzzy"), compute)
 
 
-def dataset(cell: ImageCell, alpha: tuple[float, ...], average: str, work: Work) -> xarray.Dataset:
+def compute_cuts(
+    cell: ImageCell, alpha: tuple[float, ...], average: str, work: Work
+) -> StageResult:
     """α-cuts of E and of the stiffness, the picture of the phases, and what widens E.
 
     Raises:
@@ -85,7 +83,7 @@ def dataset(cell: ImageCell, alpha: tuple[float, ...], average: str, work: Work)
         "phase": (("y", "x"), study.ranges(None)[0].astype(np.float32)),
     }
     axes = {"alpha": list(alpha), "bound": ["lower", "upper"], "row": AXES, "column": AXES}
-    return xarray.Dataset(variables, axes, {"nature": NATURE, "document": as_json(facts)})
+    return StageResult(facts, xarray.Dataset(variables, axes, {"nature": NATURE}))
 
 
 def _widths(

@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-import tomllib
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from alphacut.case.material import RadiusMap
 from alphacut.case.particles import Microstructure as Section
 from alphacut.fuzzy.campaign.workers import pool
-from alphacut.io.files import as_json, write_text
+from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
-from alphacut.stages.store import Stage, Work
+from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.microstructure import Microstructure, study
 from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
-
-if TYPE_CHECKING:
-    import xarray
 
 
 def stage(section: Section, spheres: bool, figures: bool = True) -> Stage:
     """The stage of some particles; in a folder it writes radius.toml and figures as well."""
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
-    compute = partial(dataset, section, spheres, figures)
+    compute = partial(compute_map, section, spheres, figures)
     return Stage("microstructure", inputs, ("stochastic",), compute)
 
 
-def dataset(section: Section, spheres: bool, figures: bool, work: Work) -> xarray.Dataset:
+def compute_map(section: Section, spheres: bool, figures: bool, work: Work) -> StageResult:
     """The fuzzy radius map with its data; the same for any number of workers.
 
     Raises:
@@ -39,25 +34,25 @@ def dataset(section: Section, spheres: bool, figures: bool, work: Work) -> xarra
     """
     with pool(work.workers) as executor:
         map_of = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
-    names = [] if work.folder is None else write(map_of, work.folder, figures=figures)
-    facts = {"document": as_json(summary(map_of) | {"figures": names}), "radius": fragment(map_of)}
-    return to_dataset(map_of).assign_attrs(facts)
+    numbers = summary(map_of)
+    if work.folder is not None:
+        write(map_of, numbers, work.folder, figures=figures)
+    return StageResult(numbers, to_dataset(map_of))
 
 
-def radius_of(dataset: xarray.Dataset) -> RadiusMap:
+def radius_of(result: StageResult) -> RadiusMap:
     """The section [radius] that the particles give."""
-    return RadiusMap.model_validate(tomllib.loads(str(dataset.attrs["radius"]))["radius"])
+    return RadiusMap.model_validate(result.document["radius"])
 
 
-def write(map_of: Microstructure, folder: Path, *, figures: bool) -> list[str]:
-    """Writes the fragment of a case, the circles of an image, and figures; names of the figures."""
+def write(map_of: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:
+    """Writes the fragment of a case, the circles of an image, and figures."""
     from alphacut.stochastic.figures.all import draw
 
     drawn = draw(map_of, folder / "figures") if figures else {}
-    write_text(folder / "radius.toml", fragment(map_of))
+    write_text(folder / "radius.toml", fragment(numbers))
     if "image_circles" in drawn:
         write_text(folder / "circles.csv", _circles(map_of))
-    return [path.relative_to(folder).as_posix() for paths in drawn.values() for path in paths]
 
 
 def _circles(map_of: Microstructure) -> str:

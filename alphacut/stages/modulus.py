@@ -16,7 +16,7 @@ from alphacut.fuzzy.plans.design import Method as Plan
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds as Cuts
 from alphacut.fuzzy.sets.numbers import outer_steps
-from alphacut.io.files import Document, as_json
+from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import Homogenised
@@ -30,7 +30,7 @@ from alphacut.stages.cell import (
     references,
     solve,
 )
-from alphacut.stages.store import Stage, Work
+from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
 
 if TYPE_CHECKING:
@@ -160,19 +160,18 @@ class Campaign:
         shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
         return partial(propagate, task, alpha=self.modulus.alpha, shared=shared)
 
-    def run(self, work: Work) -> xarray.Dataset:
+    def run(self, work: Work) -> StageResult:
         """The α-cuts with all samples; a store beside them goes on after an interruption."""
-        store = None if work.folder is None else work.folder / "samples.db"
         result = self.propagation(
             self.inputs,
             PLANS[self.modulus.plan],
             workers=work.workers,
             progress=work.tick or False,
             known=self.known,
-            store=store,
-            identity=self.identity if store else None,
+            store=work.samples,
+            identity=self.identity if work.samples else None,
         )
-        return dataset(result, self)
+        return stage_result(result, self)
 
     @property
     def known(self) -> Known:
@@ -210,10 +209,10 @@ def stage(campaign: Campaign) -> Stage:
     """The stage of a round cell's samples."""
     plan, alpha = campaign.modulus.plan, campaign.modulus.alpha
     inputs = [campaign.identity, campaign.inputs, plan, alpha]
-    return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run)
+    return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run, has_samples=True)
 
 
-def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
+def stage_result(result: Cuts, campaign: Campaign) -> StageResult:
     """α-cuts of every quantity (alpha, bound), where reached, all samples, and a document."""
     import xarray
 
@@ -258,7 +257,7 @@ def dataset(result: Cuts, campaign: Campaign) -> xarray.Dataset:
         "checks": _largest(result, "check"),
         "references": references(campaign.radius, campaign.cell),
     }
-    return xarray.Dataset(variables, coordinates, {"document": as_json(document)})
+    return StageResult(document, xarray.Dataset(variables, coordinates))
 
 
 def _largest(result: Cuts, kind: str) -> dict[str, float]:

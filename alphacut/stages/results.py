@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,21 +11,18 @@ from alphacut.case.structure import Structure
 from alphacut.frame import StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.io.files import Document
-from alphacut.io.netcdf import document_of
 from alphacut.io.quantity import STANDARD_GRAVITY
 from alphacut.stages import envelope
 from alphacut.stages.envelope import EnvelopeTask
-
-if TYPE_CHECKING:
-    import xarray
+from alphacut.stages.store import StageResult
 
 NAMES = ("microstructure", "modulus", "image", "shares")
-"""Stages with a document in one dataset."""
+"""Stages with one result."""
 
 
 @dataclass
 class Results:
-    """Datasets of a run; None or empty where the case has no such stage.
+    """Results of a run; None or empty where the case has no such stage.
 
     Args:
         content: Sections of the case.
@@ -35,22 +31,22 @@ class Results:
         image: Proved modulus of an image.
         structure: The structure with its modulus, and with what was learned.
         tasks: The studies.
-        envelopes: Their datasets by name.
+        envelopes: Their envelopes by name.
         learned: Inputs after measured modes.
         answers: Answers to the questions of the case, by their keys.
         shares: Shares of the inputs in the widths.
     """
 
     content: Content
-    microstructure: xarray.Dataset | None = None
-    modulus: xarray.Dataset | None = None
-    image: xarray.Dataset | None = None
+    microstructure: StageResult | None = None
+    modulus: StageResult | None = None
+    image: StageResult | None = None
     structure: Structure | None = None
     tasks: tuple[EnvelopeTask, ...] = ()
-    envelopes: dict[str, xarray.Dataset] = field(default_factory=dict)
+    envelopes: dict[str, StageResult] = field(default_factory=dict)
     learned: Document | None = None
     answers: dict[str, Document] = field(default_factory=dict)
-    shares: xarray.Dataset | None = None
+    shares: StageResult | None = None
 
     @property
     def is_paper(self) -> bool:
@@ -58,8 +54,8 @@ class Results:
         return any(task.figures for task in self.tasks)
 
     @property
-    def datasets(self) -> dict[str, xarray.Dataset]:
-        """Every dataset by the name of its file without ending."""
+    def stages(self) -> dict[str, StageResult]:
+        """Every result by the name of its stage."""
         every = {name: getattr(self, name) for name in NAMES}
         every |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
         return {name: data for name, data in every.items() if data is not None}
@@ -67,7 +63,7 @@ class Results:
     def document(self) -> Document:
         """Everything in numbers, for summary.json."""
         every = {name: getattr(self, name) for name in NAMES}
-        numbers = {name: document_of(data) for name, data in every.items() if data is not None}
+        numbers = {name: one.document for name, one in every.items() if one is not None}
         if self.structure is not None and self.structure.frame is not None:
             numbers["structure"] = sizes(self.structure, self.structure.frame)
         of = {task.name: task for task in self.tasks}

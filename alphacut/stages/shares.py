@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from alphacut import frame
 from alphacut.case.structure import Structure
@@ -20,14 +20,10 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Reduced
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.propagation import Shares, width_shares
 from alphacut.io.files import Document, say
-from alphacut.io.netcdf import dataset_of
 from alphacut.io.provenance import NESTED
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import OUTPUTS, Campaign
-from alphacut.stages.store import Stage, Work
-
-if TYPE_CHECKING:
-    import xarray
+from alphacut.stages.store import Stage, StageResult, Work
 
 ACCURACY = 1e-2
 """Relative error of each peak that shares of two digits need."""
@@ -39,16 +35,16 @@ def stage(
     """The stage of the shares of a cell's inputs, and of those of the richest study."""
     cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
     motion = structure and [structure.model, structure.numbers, task]
-    compute = partial(dataset, campaign, structure, task)
+    compute = partial(compute_shares, campaign, structure, task)
     return Stage("shares", [cell, motion], (*NESTED, "alphacut"), compute)
 
 
-def dataset(
+def compute_shares(
     campaign: Campaign | None, structure: Structure | None, task: EnvelopeTask | None, work: Work
-) -> xarray.Dataset:
+) -> StageResult:
     """Shares of each input in the widths of E, ν and peaks, where there are two inputs or more.
 
-    They are of the lowest level, in a document: by result, then by input.
+    They are of the lowest level: by result, then by input.
     """
     each: Document = {}
     if campaign is not None and len(campaign.inputs) > 1:
@@ -62,7 +58,7 @@ def dataset(
         else:
             for column, name in enumerate(structure.outputs):
                 each[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
-    return dataset_of(each)
+    return StageResult(each)
 
 
 def _by_input(shares: Shares, values: Array) -> dict[str, float]:

@@ -1,52 +1,92 @@
-"""One mechanism for all stages: a dataset in a file, taken up again while its fingerprint holds."""
+"""Results of stages in files, taken from there while their fingerprint and digests hold."""
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.io.files import rank, whole_file
-from alphacut.io.netcdf import fingerprint_of, read_dataset
-from alphacut.io.provenance import attributes, fingerprint
+from alphacut.fuzzy.refused import require
+from alphacut.io.files import Document, as_json, rank, say, write_text
+from alphacut.io.manifest import ResultsFolder
+from alphacut.io.netcdf import dataset_of
+from alphacut.io.provenance import fingerprint, origin
 
 if TYPE_CHECKING:
     import xarray
 
+SAMPLES = "samples.db"
+"""Store of the samples of a campaign, beside the results."""
+
 
 @dataclass(frozen=True)
 class Work:
-    """Surroundings of one computation.
+    """Surroundings of a computation.
 
     Args:
-        folder: Folder for what is kept on the way; None to keep nothing.
+        folder: Empty folder for further files of the stage; None to write none.
+        samples: Store of samples; None for none.
         workers: Processes.
         tick: Takes the share done; None to show nothing.
     """
 
     folder: Path | None = None
+    samples: Path | None = None
     workers: int = 1
     tick: Progress | None = None
 
 
 @dataclass(frozen=True)
-class Stage:
-    """A function from objects to a dataset.
+class StageResult:
+    """Result of a stage.
 
     Args:
-        name: Its file is NAME.nc.
-        inputs: Everything that the dataset depends on.
+        document: Numbers and texts, as JSON holds them.
+        data: Arrays with their axes; None for none.
+        files: Names of all its files in the folder of results.
+        fingerprint: Digest of everything that it depends on.
+    """
+
+    document: Document
+    data: xarray.Dataset | None = None
+    files: tuple[str, ...] = ()
+    fingerprint: str = ""
+
+    @property
+    def arrays(self) -> xarray.Dataset:
+        """The arrays of a stage that has some."""
+        assert self.data is not None
+        return self.data
+
+    @property
+    def figures(self) -> list[str]:
+        """Names of the figures among its files."""
+        return [name for name in self.files if name.startswith("figures/")]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A function from objects to a result.
+
+    Args:
+        name: Its files are NAME.json and NAME.nc.
+        inputs: Everything that the result depends on.
         packages: Packages of this project whose source it depends on.
         compute: The function.
+        has_samples: Whether it stores samples on the way.
     """
 
     name: str
     inputs: object
     packages: tuple[str, ...]
-    compute: Callable[[Work], xarray.Dataset]
+    compute: Callable[[Work], StageResult]
+    has_samples: bool = False
 
     @property
     def key(self) -> str:
@@ -55,19 +95,19 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Store:
-    """Folder of the results of a run.
+class StageStore:
+    """The results of a run, in a folder or in memory alone.
 
     Args:
-        folder: The folder; None to keep nothing.
-        case_text: The case, which every file carries.
+        folder: The folder; None to write nothing.
+        case_text: The case, which every result states.
         fresh: Whether everything is computed anew.
         quiet: Whether nothing is shown.
         workers: Processes of a stage.
         taken: Names of the stages whose files were up to date.
     """
 
-    folder: Path | None
+    folder: ResultsFolder | None
     case_text: str
     fresh: bool = False
     quiet: bool = False
@@ -79,52 +119,106 @@ class Store:
         """True where progress is shown, by the first rank alone."""
         return not self.quiet and rank() == 0
 
-    def take(self, stage: Stage) -> xarray.Dataset:
-        """The dataset of a stage: from its file where that is up to date, else computed."""
-        if not self._current(stage):
-            if self.folder is not None:
-                self.folder.mkdir(parents=True, exist_ok=True)
-            with showing(self.shown) as tick:
-                data = stage.compute(Work(self.folder, self.workers, tick))
-            if self.folder is None:
-                return data
-            self._put(stage, data)
-        return read_dataset(self._file(stage))
+    def take(self, stage: Stage) -> StageResult:
+        """The result of a stage: from its files where these are up to date, else computed."""
+        return self._stored(stage) or self._computed(stage)
 
     def take_all(
         self, stages: Sequence[Stage], executor: Executor | None
-    ) -> dict[str, xarray.Dataset]:
-        """The datasets of several stages by their names, computed side by side by an executor.
+    ) -> dict[str, StageResult]:
+        """The results of several stages by their names, computed side by side by an executor.
 
         Args:
-            stages: Those that take longest first.
+            stages: Those that take longest first; they write no further files.
             executor: Processes; None where this one does everything.
         """
-        if executor is None or self.folder is None or len(stages) == 1:
-            return {stage.name: self.take(stage) for stage in stages}
-        work = Work(self.folder)
-        stale = [stage for stage in stages if not self._current(stage)]
-        under_way = {executor.submit(stage.compute, work): stage for stage in stale}
+        stored = {stage.name: self._stored(stage) for stage in stages}
+        results = {name: result for name, result in stored.items() if result is not None}
+        stale = [stage for stage in stages if stage.name not in results]
+        if executor is None or self.folder is None or len(stale) == 1:
+            return results | {stage.name: self._computed(stage) for stage in stale}
+        under_way = {executor.submit(stage.compute, Work()): stage for stage in stale}
         with showing(self.shown) as tick:
             for done, future in enumerate(as_completed(under_way), start=1):
-                self._put(under_way[future], future.result())
+                stage = under_way[future]
+                with TemporaryDirectory() as scratch:
+                    results[stage.name] = self._put(stage, future.result(), Path(scratch))
                 if tick:
                     tick(done / len(under_way))
-        return {stage.name: read_dataset(self._file(stage)) for stage in stages}
+        return results
 
-    def _file(self, stage: Stage) -> Path:
-        return (self.folder or Path()) / f"{stage.name}.nc"
+    def _stored(self, stage: Stage) -> StageResult | None:
+        """The result from the files of a stage; None where they are not up to date."""
+        if self.folder is None or self.fresh or stage.name not in self.folder.parts:
+            return None
+        part = self.folder.parts[stage.name]
+        if part.fingerprint != stage.key:
+            return None
+        if problem := self.folder.problem(stage.name):
+            say(f"warning: {problem}; {stage.name} is computed anew")
+            return None
+        self.taken.append(stage.name)
+        return self._read(stage.name)
 
-    def _put(self, stage: Stage, dataset: xarray.Dataset) -> None:
-        """Writes a stage's dataset, whole or not at all."""
-        with whole_file(self._file(stage)) as partial:
-            dataset.assign_attrs(attributes(self.case_text, stage.key)).to_netcdf(partial)
+    def _read(self, name: str) -> StageResult:
+        """The result in the files of a stage."""
+        assert self.folder is not None
+        part = self.folder.parts[name]
+        document = json.loads(self.folder.content(f"{name}.json"))["result"]
+        has_data = f"{name}.nc" in part.files
+        data = dataset_of(self.folder.content(f"{name}.nc")) if has_data else None
+        return StageResult(document, data, tuple(part.files), part.fingerprint)
 
-    def _current(self, stage: Stage) -> bool:
-        """True if the file of a stage may be taken."""
-        path = self._file(stage)
-        if self.folder is None or self.fresh or not path.is_file():
-            return False
-        current = fingerprint_of(path) == stage.key
-        self.taken.extend([stage.name] * current)
-        return current
+    def _computed(self, stage: Stage) -> StageResult:
+        """The result as it is computed now, and put into its files."""
+        if self.folder is None:
+            with showing(self.shown) as tick:
+                result = stage.compute(Work(workers=self.workers, tick=tick))
+            return replace(result, document=json.loads(as_json(result.document)))
+        self.folder.require_free(f"{stage.name}.json")
+        self.folder.require_free(f"{stage.name}.nc")
+        samples = self._samples(self.folder) if stage.has_samples else None
+        with TemporaryDirectory() as scratch:
+            with showing(self.shown) as tick:
+                result = stage.compute(Work(Path(scratch), samples, self.workers, tick))
+            return self._put(stage, result, Path(scratch))
+
+    def _samples(self, folder: ResultsFolder) -> Path:
+        """The store of samples, which the manifest lists before it is made.
+
+        Raises:
+            RefusedError: A store that is not listed would be used by a run that is fresh.
+        """
+        path, listed = folder.path / SAMPLES, SAMPLES in folder.parts
+        there = os.path.lexists(path)
+        cure = "move it away, or leave out --fresh"
+        require(
+            listed or not (there and self.fresh), str(path), "listed in no manifest", "none", cure
+        )
+        if rank() == 0 and not listed and not there:
+            folder.list_files(SAMPLES, "", {SAMPLES: "", f"{SAMPLES}-journal": ""})
+        return path
+
+    def _put(self, stage: Stage, result: StageResult, scratch: Path) -> StageResult:
+        """Writes a result into the files of its stage; returns it as it is read from there."""
+        assert self.folder is not None
+        document = {**origin(self.case_text, stage.key), "result": result.document}
+        if rank() != 0:
+            return replace(result, document=json.loads(as_json(document))["result"])
+        write_text(scratch / f"{stage.name}.json", as_json(document, indent=1))
+        if result.data is not None:
+            result.data.to_netcdf(scratch / f"{stage.name}.nc")
+        self.folder.put(stage.name, stage.key, scratch)
+        return self._read(stage.name)
+
+    def put_text(self, name: str, text: str) -> None:
+        """Writes a text file of the run itself, such as summary.json."""
+        if self.folder is not None and rank() == 0:
+            put_text(self.folder, name, text)
+
+
+def put_text(folder: ResultsFolder, name: str, text: str) -> None:
+    """Writes a text file into a folder of results, and lists it."""
+    with TemporaryDirectory() as scratch:
+        write_text(Path(scratch) / name, text)
+        folder.put(name, "", Path(scratch))

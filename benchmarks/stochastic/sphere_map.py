@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.stochastic.microstructure import Study, study
-from alphacut.stochastic.microstructure_summary import fragment
+from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     law = unfolded(circles, visible=1e-3, largest=1e-2)
     packing = Packing(options.spheres, FRACTION, law, shape=SPHERES)
     result = study(Study(Simulated(packing, options.packings), seed=options.seed))
-    print(fragment(result), end="")
+    print(fragment(summary(result)), end="")
     print(f"# share of the volume beyond r_n = {SPHERES.reach:g}: {result.share_beyond:.4f}")
 
 

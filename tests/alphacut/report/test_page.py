@@ -10,6 +10,7 @@ import pytest
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
+from alphacut.io.manifest import ResultsFolder
 from alphacut.report.page import report
 from alphacut.report.results import (
     answers,
@@ -17,6 +18,7 @@ from alphacut.report.results import (
     motion,
 )
 from alphacut.report.tables import run_text, write_tables
+from alphacut.stages.store import put_text
 
 
 def summary_of(folder):
@@ -28,32 +30,32 @@ def changed(results, folder, **keys):
     copy = folder / "copy"
     shutil.copytree(results, copy)
     text = json.dumps({**summary_of(results), **keys})
-    (copy / "summary.json").write_text(text, encoding="utf-8")
-    return copy
+    put_text(ResultsFolder.opened(copy), "summary.json", text)
+    return ResultsFolder.opened(copy)
 
 
 def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results):
-    page = report(results)
+    page = report(ResultsFolder.opened(results))
     assert not re.search(r'(src|href)="(?!data:)', page)
     drawn = [name for name in summary_of(results)["figures"] if name.endswith(".png")]
     assert page.count("data:image/png;base64,") == len(drawn) > 5
 
 
 def test_texts_of_the_case_are_no_markup(results):
-    page = report(results)
+    page = report(ResultsFolder.opened(results))
     assert "<script>alert" not in page
     assert "Two floors &lt;script&gt;" in page
 
 
 def test_every_question_has_its_answer_on_the_page(results):
-    page = report(results)
+    page = report(ResultsFolder.opened(results))
     for words in ("Can or must limits be exceeded?", "How far may tolerances go?", "How probable"):
         assert page.count(words) == 1
 
 
 def test_a_script_in_a_drawing_does_not_reach_the_page(results, tmp_path):
     copy = changed(results, tmp_path)
-    for drawing in (copy / "figures").glob("*.svg"):
+    for drawing in (copy.path / "figures").glob("*.svg"):
         drawing.write_text("<svg><script>stolen()</script></svg>", encoding="utf-8")
     assert "stolen" not in report(copy)
 
@@ -130,7 +132,7 @@ def tables(results, tmp_path_factory):
     folder = tmp_path_factory.mktemp("csv")
     return {
         file.stem: list(csv.reader(file.open(encoding="utf-8")))
-        for file in write_tables(summary_of(results), results, folder)
+        for file in write_tables(summary_of(results), ResultsFolder.opened(results), folder)
     }
 
 

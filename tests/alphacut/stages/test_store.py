@@ -1,5 +1,6 @@
 """One mechanism keeps every stage; the case reaches few files."""
 
+import json
 import re
 import sys
 from pathlib import Path
@@ -12,11 +13,12 @@ from alphacut.case.content import Content
 from alphacut.case.load import Case, load
 from alphacut.entry import main
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.io.netcdf import read_dataset, read_summary, require_own
+from alphacut.io.manifest import ResultsFolder
+from alphacut.io.netcdf import read_summary, require_same_run
 from alphacut.stages import envelope, modulus
 from alphacut.stages.chain import Chain
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, Store
+from alphacut.stages.store import Stage, StageResult, StageStore
 from tests.alphacut.small import CELL, FRAME, SMALLER, written
 
 ROOT = Path(alphacut.__file__).resolve().parents[1]
@@ -28,37 +30,43 @@ def counted():
 
     def compute(work):
         calls.append(work)
-        return xarray.Dataset({"x": ((), len(calls))})
+        return StageResult({"count": len(calls)}, xarray.Dataset({"x": ((), len(calls))}))
 
     return calls, lambda inputs: Stage("thing", inputs, ("fuzzy",), compute)
 
 
+def store_in(folder, **options):
+    """A store as a new process opens it."""
+    return StageStore(ResultsFolder.opened(folder), "the case", quiet=True, **options)
+
+
 def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
     calls, of = counted()
-    store = Store(tmp_path, "the case", quiet=True)
-    assert [int(store.take(of(value)).x) for value in (1, 1, 2, 2)] == [1, 1, 2, 2]
+    store = store_in(tmp_path)
+    results = [store.take(of(value)) for value in (1, 1, 2, 2)]
+    assert [int(result.arrays.x) for result in results] == [1, 1, 2, 2]
+    assert [result.document["count"] for result in results] == [1, 1, 2, 2]
     assert len(calls) == 2
-    assert int(Store(tmp_path, "the case", fresh=True, quiet=True).take(of(2)).x) == 3
-    assert read_dataset(tmp_path / "thing.nc").attrs["case"] == "the case"
+    assert int(store_in(tmp_path, fresh=True).take(of(2)).arrays.x) == 3
+    assert json.loads((tmp_path / "thing.json").read_text())["case"] == "the case"
 
 
 @pytest.mark.parametrize("damage", [b"", b"no NetCDF", None])
 def test_a_damaged_file_is_computed_anew(tmp_path, damage):
     calls, of = counted()
-    store = Store(tmp_path, "the case", quiet=True)
-    store.take(of(1))
+    store_in(tmp_path).take(of(1))
     path = tmp_path / "thing.nc"
     path.write_bytes(path.read_bytes()[:200] if damage is None else damage)
-    assert int(store.take(of(1)).x) == len(calls) == 2
+    assert int(store_in(tmp_path).take(of(1)).arrays.x) == len(calls) == 2
 
 
 def test_a_file_of_another_format_is_left_alone(tmp_path):
     _, of = counted()
-    store = Store(tmp_path, "the case", quiet=True)
-    data = store.take(of(1)).assign_attrs(format_version=99)
-    data.to_netcdf(tmp_path / "thing.nc")
+    store_in(tmp_path).take(of(1))
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    (tmp_path / "manifest.json").write_text(json.dumps({**manifest, "format_version": 99}))
     with pytest.raises(RefusedError, match="format 99"):
-        store.take(of(1))
+        store_in(tmp_path)
 
 
 def test_a_stage_that_fails_leaves_no_file(tmp_path):
@@ -66,7 +74,7 @@ def test_a_stage_that_fails_leaves_no_file(tmp_path):
         raise RuntimeError("no convergence")
 
     with pytest.raises(RuntimeError, match="no convergence"):
-        Store(tmp_path, "", quiet=True).take(Stage("thing", 1, ("fuzzy",), compute))
+        store_in(tmp_path).take(Stage("thing", 1, ("fuzzy",), compute))
     assert not list(tmp_path.iterdir())
 
 
@@ -88,8 +96,8 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
         'masses = ["[9, 10, 11] t"]', '[frame]\nmasses = ["[9, 10, 11] t"]'
     )
     content = load(written(tmp_path, text)).content
-    results = Chain(Results(content), Store(tmp_path / "out", text, quiet=True)).run()
-    number = modulus.number_of(results.modulus)
+    results = Chain(Results(content), store_in(tmp_path / "out")).run()
+    number = modulus.number_of(results.modulus.arrays)
     assert results.structure.numbers["E"] == number
     assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
 
@@ -119,7 +127,7 @@ def test_the_case_reaches_few_files(tmp_path):
     finally:
         sys.monitoring.set_events(tool, 0)
         sys.monitoring.free_tool_id(tool)
-    names = {path.stem for path in tmp_path.glob("out/*.nc")}
+    names = {path.stem for path in tmp_path.glob("out/*.json")}
     assert names >= {"modulus", "envelope_E-5s", "envelope_E-m-30s", "shares"}
     assert 1 <= before[0] <= 6, files
     assert 6 < len(files) <= 18, files
@@ -136,11 +144,12 @@ def test_few_files_import_the_case():
 def test_a_borrowed_folder_is_not_believed(tmp_path):
     folder = tmp_path / "out"
     assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
-    summary = read_summary(folder)
-    require_own(summary, folder)
+    results = ResultsFolder.opened(folder)
+    summary = read_summary(results)
+    require_same_run(summary, results)
     with pytest.raises(RefusedError, match="of another run"):
-        require_own({**summary, "fingerprints": {"modulus": "other"}}, folder)
+        require_same_run({**summary, "fingerprints": {"modulus": "other"}}, results)
     for text in ("", "[]", "{}", "[" * 100_000, '{"case": 1}', "null"):
         (folder / "summary.json").write_text(text)
         with pytest.raises(RefusedError, match="damaged"):
-            read_summary(folder)
+            read_summary(ResultsFolder.opened(folder))

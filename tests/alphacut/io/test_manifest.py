@@ -1,0 +1,274 @@
+"""A folder of results: nothing there is believed, followed or removed that no manifest vouches for.
+
+Damages are drawn by a printed seed. Each ends in the numbers of the undamaged run, or in a line.
+"""
+
+import json
+import os
+import random
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from alphacut.entry import main
+from alphacut.io.manifest import ResultsFolder
+from tests.alphacut.small import CELL, written
+
+
+def run(case, folder, *options):
+    return main(["run", str(case), "--out", str(folder), "--quiet", *options])
+
+
+def numbers(folder):
+    """Numbers of a summary, without what differs between two runs."""
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    parts = ("modulus", "envelopes", "shares", "figures", "microstructure")
+    kept = {key: part for key, part in summary.items() if key in parts}
+
+    def without_seconds(part):
+        return {key: value for key, value in part.items() if key != "seconds"}
+
+    return json.loads(json.dumps(kept), object_hook=without_seconds)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A case, its results with figures and page, and results of the case before a change."""
+    folder = tmp_path_factory.mktemp("finished")
+
+    case = written(folder, CELL)
+    older, out = folder / "older", folder / "out"
+    assert run(case, older, "--set", "cell.matrix_poisson=0.2") == 0
+    assert main(["report", str(older)]) == 0
+    assert run(case, out) == 0
+    assert main(["report", str(out)]) == 0
+    return case, out, older
+
+
+def flip(file, draw, _):
+    content = bytearray(file.read_bytes())
+    for _ in range(draw.choice([1, 1, 30])):
+        content[draw.randrange(len(content))] ^= 1 << draw.randrange(8)
+    file.write_bytes(content)
+
+
+def cut(file, draw, _):
+    content = file.read_bytes()
+    file.write_bytes(content[: draw.choice([0, 1, draw.randrange(len(content))])])
+
+
+def swap(file, draw, _):
+    other = draw.choice([x for x in files_of(file.parent) if x != file])
+    content = file.read_bytes()
+    file.write_bytes(other.read_bytes())
+    other.write_bytes(content)
+
+
+def older_copy(file, draw, older):
+    source = next((x for x in older.rglob(file.name)), None)
+    if source is not None:
+        shutil.copyfile(source, file)
+
+
+def removal(file, draw, _):
+    file.unlink()
+
+
+def link(file, draw, _):
+    outside = file.parents[1] / f"outside-{file.name}"
+    outside.write_bytes(file.read_bytes() if draw.random() < 0.5 else b"precious")
+    file.unlink()
+    file.symlink_to(outside)
+
+
+def device(file, draw, _):
+    file.unlink()
+    file.symlink_to(draw.choice(["/dev/null", "/dev/zero", "/proc/self/mem"]))
+
+
+def pipe(file, draw, _):
+    file.unlink()
+    os.mkfifo(file)
+
+
+def foreign_database(file, draw, _):
+    file.unlink()
+    with sqlite3.connect(file) as base:
+        base.execute("create table book (title text)")
+    base.close()
+
+
+def folder_in_place(file, draw, _):
+    file.unlink()
+    file.mkdir()
+    (file / "precious").write_text("precious")
+
+
+CHANGES = (flip, flip, cut, swap, older_copy, removal)
+STRANGE = (link, link, device, pipe, foreign_database, folder_in_place)
+
+
+def files_of(folder):
+    return [x for x in sorted(folder.rglob("*")) if x.is_file() and not x.is_symlink()]
+
+
+def strange_state(folder):
+    """Everything that a run has to leave as it is."""
+    paths = [x for x in sorted(folder.rglob("*")) if "out" not in x.relative_to(folder).parts[:1]]
+    pipes = [x for x in (folder / "out").rglob("*") if x.is_fifo() or x.name == "precious"]
+    return [
+        (str(x), x.lstat().st_ino, x.lstat().st_mode, x.read_bytes() if x.is_file() else b"")
+        for x in (*paths, *pipes)
+    ]
+
+
+def damage(finished, place, seed, kinds):
+    """Damages a copy of the results; checks what a run and a report make of it."""
+    _, out, older = finished
+    draw, copy = random.Random(seed), place / "out"
+    shutil.copytree(out, copy)
+    kind = draw.choice(kinds)
+    ending = draw.choice(sorted({x.suffix for x in files_of(copy)}))
+    file = draw.choice([x for x in files_of(copy) if x.suffix == ending])
+    kind(file, draw, older)
+    label = f"seed {seed}: {kind.__name__} of {file.relative_to(copy)}"
+    return copy, label
+
+
+def check_damage(finished, place, seed, kinds, capfd):
+    copy, label = damage(finished, place, seed, kinds)
+    before, case = strange_state(place), finished[0]
+    statuses = []
+    for words in (["report", str(copy)], ["run", str(case), "--out", str(copy)]):
+        capfd.readouterr()
+        status = main(words)
+        _, err = capfd.readouterr()
+        assert status in (0, 1, 2), label
+        assert "Traceback" not in err, label
+        told = [line for line in err.splitlines() if line.startswith("alphacut: ")]
+        assert status == 0 or len(told) >= 1, label
+        assert all(len(line) <= 320 for line in told), label
+        statuses.append(status)
+    assert strange_state(place) == before, label
+    if statuses[1] == 0:
+        assert numbers(copy) == numbers(finished[1]), label
+        assert not ResultsFolder.opened(copy).is_lost, label
+        listed = ResultsFolder.opened(copy)
+        stages = listed.parts.keys() - {"report.html", "samples.db"}
+        assert not list(filter(None, map(listed.problem, stages))), label
+    return statuses, label
+
+
+@pytest.mark.parametrize("kinds", [CHANGES, STRANGE], ids=["changes", "strange"])
+def test_damaged_results_are_computed_anew_or_refused(finished, tmp_path, kinds, capfd):
+    seed = int(os.environ.get("SEED", random.randrange(10**9)))
+    for trial in range(int(os.environ.get("TRIALS", "4"))):
+        place = tmp_path / str(trial)
+        place.mkdir()
+        statuses, label = check_damage(finished, place, seed + trial, kinds, capfd)
+        print(statuses, label)
+
+
+def test_fresh_removes_what_is_listed_and_nothing_else(finished, tmp_path):
+    case, out, _ = finished
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    others = ["samples.db.mine", "notes.nc", "figures/photo.png", "summary.json~"]
+    for name in others:
+        (copy / name).write_text("precious")
+    before = {x.name for x in copy.iterdir()}
+    assert run(case, copy, "--fresh", "--no-figures") == 0
+    assert [(copy / name).read_text() for name in others] == ["precious"] * len(others)
+    assert {x.name for x in (copy / "figures").iterdir()} == {"photo.png"}
+    assert {x.name for x in copy.iterdir()} == before - {"report.html", "figures.json"}
+
+
+def test_fresh_does_not_use_a_store_that_it_may_not_remove(finished, tmp_path, capfd):
+    case, out, _ = finished
+    copy = tmp_path / "out"
+    copy.mkdir()
+    shutil.copy(out / "samples.db", copy)
+    assert run(case, copy, "--fresh") == 2
+    assert "listed in no manifest" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["modulus.nc", "summary.json", "figures/modulus.png"])
+def test_a_file_that_no_manifest_lists_is_not_replaced(tmp_path, name, capfd):
+    file = tmp_path / "out" / name
+    file.parent.mkdir(parents=True)
+    file.write_text("precious")
+    assert run(written(tmp_path, CELL), tmp_path / "out") == 2
+    assert file.read_text() == "precious"
+    assert "no manifest lists" in capfd.readouterr().err
+
+
+def test_a_manifest_of_another_program_is_left_alone(tmp_path, capfd):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "manifest.json").write_text('{"name": "a web page"}')
+    assert run(written(tmp_path, CELL), folder) == 2
+    assert (folder / "manifest.json").read_text() == '{"name": "a web page"}'
+    assert [x.name for x in folder.iterdir()] == ["manifest.json"]
+
+
+def test_a_folder_of_figures_that_is_a_link_is_refused(finished, tmp_path, capfd):
+    case, out, _ = finished
+    copy, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    shutil.copytree(out, copy)
+    (copy / "figures").rename(elsewhere)
+    (copy / "figures").symlink_to(elsewhere)
+    before = {x.name: x.read_bytes() for x in elsewhere.iterdir()}
+    assert run(case, copy, "--set", "title=other") == 2
+    assert main(["report", str(copy)]) == 0
+    assert "data:image/png" not in (copy / "report.html").read_text()
+    assert run(case, copy, "--fresh", "--no-figures") == 0
+    assert {x.name: x.read_bytes() for x in elsewhere.iterdir()} == before
+
+
+def test_the_folder_itself_may_be_a_link(finished, tmp_path):
+    case, out, _ = finished
+    copy, name = tmp_path / "out", tmp_path / "link"
+    shutil.copytree(out, copy)
+    name.symlink_to(copy)
+    assert run(case, name) == 0
+    assert main(["report", str(name)]) == 0
+    assert numbers(copy) == numbers(out)
+
+
+def test_the_page_does_not_embed_or_write_through_links(finished, tmp_path):
+    _, out, _ = finished
+    copy, secret = tmp_path / "out", tmp_path / "secret.png"
+    shutil.copytree(out, copy)
+    secret.write_bytes((copy / "figures" / "modulus.png").read_bytes())
+    (copy / "figures" / "modulus.png").unlink()
+    (copy / "figures" / "modulus.png").symlink_to(secret)
+    whole = (copy / "report.html").read_text().count("data:image/png")
+    (copy / "report.html").unlink()
+    (copy / "report.html").symlink_to(tmp_path / "outside.html")
+    (tmp_path / "outside.html").write_text("precious")
+    assert main(["report", str(copy)]) == 0
+    assert (copy / "report.html").read_text().count("data:image/png") == whole - 1
+    assert (tmp_path / "outside.html").read_text() == "precious"
+
+
+def test_a_modulus_is_taken_with_its_manifest_alone(finished, tmp_path, capfd):
+    _, out, _ = finished
+    frame = written(tmp_path)
+    copy = tmp_path / "out"
+    shutil.copytree(out, copy)
+    assert main(["envelope", str(frame), "--modulus", str(copy / "modulus.nc")]) == 0
+    content = bytearray((copy / "modulus.nc").read_bytes())
+    content[len(content) // 2] ^= 1
+    (copy / "modulus.nc").write_bytes(content)
+    assert main(["envelope", str(frame), "--modulus", str(copy / "modulus.nc")]) == 2
+    assert "was changed" in capfd.readouterr().err
+    alone = Path(shutil.copy(out / "modulus.nc", tmp_path))
+    assert main(["envelope", str(frame), "--modulus", str(alone)]) == 2
+    assert "manifest.json" in capfd.readouterr().err
+
+
+def test_json_goes_to_standard_output_by_its_device(tmp_path, capfd):
+    assert main(["check", str(written(tmp_path)), "--json", "/dev/stdout", "--quiet"]) == 0
+    assert "period_s" in json.loads(capfd.readouterr().out)
