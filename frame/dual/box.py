@@ -8,17 +8,22 @@ from functools import cached_property
 
 import numpy as np
 
+from alphacut.frame.dual.attained import (
+    Modal,
+    loads_at_named_nodes,
+    loads_at_nodes,
+    modes_at,
+    outputs_at,
+)
 from alphacut.frame.dual.expansion import Expansion
 from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
-from alphacut.frame.response.duhamel import responses_at_named_nodes
-from alphacut.frame.structures.linear import LinearSystem, evaluate
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array, Rows
 
-PIECE = 4000
-"""Points whose exact motions are computed together."""
+MOST_ENTRIES = 400_000
+"""Entries of the matrices of all points whose exact motions are computed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,26 +82,68 @@ class Box:
 
     def attained(self, unit: Array, node: Rows, output: Rows) -> Array:
         """Exact values of outputs at nodes for unit coordinates (S, d), each shape (S,)."""
-        pieces = np.array_split(np.arange(len(unit)), -(-len(unit) // PIECE))
-        return np.concatenate([_motions(self, unit[i], node[i], output[i]) for i in pieces])
+        return self.attained_with_error(unit, node, output)[0]
 
-    def crisp_stray(self) -> Array:
-        """Bound of how far the motion at the centre strays from straight lines, shape (T, m).
+    def attained_with_error(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
+        """Values of outputs at nodes for unit coordinates (S, d) and their rounding, each (S,)."""
+        pieces = np.array_split(np.arange(len(unit)), -(-len(unit) // self._points_at_once))
+        parts = [self._motions(unit[i], node[i], output[i]) for i in pieces]
+        values, errors = zip(*parts, strict=True)
+        return np.concatenate(values), np.concatenate(errors)
+
+    def reached(self, unit: Array, node: Rows, output: Rows, side: Rows | int) -> Array:
+        """What ± outputs exceed at nodes for unit coordinates (S, d), their rounding counted."""
+        value, error = self.attained_with_error(unit, node, output)
+        return np.asarray(side * value - error)
+
+    def centre_motion(self) -> tuple[Array, Array, Array]:
+        """Motion at the centre, its rounding, and how far it strays from straight lines.
+
+        Returns:
+            Three arrays of shape (T, m), the last two bounds.
 
         Raises:
             UnprovedError: A mode does not oscillate there.
         """
-        modes = _modal(self, np.zeros((1, len(self.active))))
-        every, order = np.arange(len(self.structure.order)), self.structure.order
-        read = modes.read(np.zeros(len(order), int), every)
-        stray: Array = np.zeros((len(self.time), len(order)))
-        for k, sigma in enumerate(modes.sigma[0]):
+        modal, (total, m) = self._modal(np.zeros((1, len(self.active)))), self._shape
+        ground, loads = self.system.ground, None
+        if ground is not None:
+            loads = loads_at_nodes(modal.sigma[0], ground, self.time)
+        once = np.zeros(total, int)
+        columns = [outputs_at(modal, once, once + o, self.time, loads) for o in range(m)]
+        value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
+        return value, error, self._stray(modal)
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        """Numbers of nodes and outputs."""
+        return len(self.time), len(self.structure.order)
+
+    @property
+    def _points_at_once(self) -> int:
+        return max(MOST_ENTRIES // len(self.structure.pattern) ** 2, 1)
+
+    def _modal(self, unit: Array) -> Modal:
+        return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
+
+    def _motions(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
+        modal, ground, loads = self._modal(unit), self.system.ground, None
+        if ground is not None:
+            loads = loads_at_named_nodes(modal.sigma, ground, self.time, node)
+        return outputs_at(modal, np.arange(len(unit)), output, self.time[node], loads)
+
+    def _stray(self, modal: Modal) -> Array:
+        """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
+        total, m = self._shape
+        stray, outputs = np.zeros((total, m)), np.arange(m)
+        read = np.abs(modal.read(np.zeros(m, int), outputs)[0])
+        for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
             oscillator = Oscillators(grid, self.system.ground, self.time)
-            for source, share in modes.share.items():
-                for o in every:
-                    wave = oscillator.waves(source, int(order[o]))
-                    stray[:, o] += abs(read[o, k] * share[0, k]) * wave.stray
+            for source, share in modal.share.items():
+                for o in outputs:
+                    wave = oscillator.waves(source, int(modal.order[o]))
+                    stray[:, o] += read[o, k] * abs(share[0, k]) * wave.stray
         return stray
 
 
@@ -115,69 +162,3 @@ def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
     moved = np.asarray(structure.start.size().any(-1))
     present = {"load": system.ground is not None, "velocity": moved[1], "start": moved[0]}
     return tuple(name for name, is_there in present.items() if is_there)
-
-
-@dataclass(frozen=True, eq=False)
-class Modal:
-    """Modes of a structure at S points.
-
-    Args:
-        structure: The structure over the box.
-        seen: Rows of all outputs on the state, shape (S, m, 2 n).
-        shape: Displacements of the modes, each of unit mass, shape (S, n, n).
-        sigma: Exponents −g + iω, shape (S, n), in 1/s.
-        share: What each source, by its name, puts into the modes, shape (S, n).
-    """
-
-    structure: Classical
-    seen: Array
-    shape: Array
-    sigma: Array
-    share: dict[str, Array]
-
-    def read(self, point: Rows, output: Rows) -> Array:
-        """What outputs (N,) take of the modes at points (N,), shape (N, n)."""
-        n, order = self.shape.shape[-1], self.structure.order[output][:, None]
-        rows = self.seen[point, output]
-        row = np.where(order == 1, rows[:, n:], rows[:, :n])
-        row = np.where(order == 2, self.structure.rows[output], row)
-        return np.asarray(np.einsum("si,sik->sk", row, self.shape[point]))
-
-
-def _modal(box: Box, unit: Array) -> Modal:
-    """Modes at unit coordinates (S, d).
-
-    Raises:
-        UnprovedError: One does not oscillate.
-    """
-    system, structure = box.system, box.structure
-    matrices, seen = evaluate(system, box.names, box.inputs(unit), derivatives=False)
-    M, K = matrices.mass.value, matrices.stiffness.value
-    below = np.linalg.inv(np.linalg.cholesky(M))
-    squared, U = np.linalg.eigh(below @ K @ below.swapaxes(-1, -2))
-    shape = below.swapaxes(-1, -2) @ U
-    a, b = structure.rayleigh.at(unit).T[:, :, None]
-    positive = np.maximum(squared, 0.0)
-    decay = (a + b * squared) / 2 + structure.ratio.at(unit) * np.sqrt(positive)
-    if not (positive > decay**2).all():
-        raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
-    sigma = -decay + 1j * np.sqrt(squared - decay**2)
-    share = {}
-    if system.ground is not None:
-        share["load"] = np.einsum("sik,sij,j->sk", shape, M, matrices.rigid[:, 0])
-    for name, x in (("start", matrices.q0.value), ("velocity", matrices.v0.value)):
-        share[name] = np.einsum("sik,sij,sj->sk", shape, M, x[..., 0])
-    return Modal(structure, seen.value, shape, sigma, share)
-
-
-def _motions(box: Box, unit: Array, node: Rows, output: Rows) -> Array:
-    system, modes = box.system, _modal(box, unit)
-    sigma, share = modes.sigma, modes.share
-    power = sigma ** modes.structure.order[output][:, None]
-    free = power * np.exp(sigma * box.time[node][:, None])
-    wave = share["start"] * free.real
-    wave += (share["velocity"] - sigma.real * share["start"]) * free.imag / sigma.imag
-    if system.ground is not None:
-        rho = responses_at_named_nodes(sigma, system.ground, box.time, node, 0)[0][0]
-        wave -= share["load"] * (power * rho).imag / sigma.imag
-    return np.asarray((modes.read(np.arange(len(unit)), output) * wave).sum(-1))

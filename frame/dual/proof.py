@@ -44,8 +44,6 @@ PARTS = 32
 """Most parts of the box over which the nodes above a peak are bounded."""
 HOPELESS = 0.1
 """Gap of a peak, as a share of it, above which so many parts do not close it."""
-ROUNDING = 1e-10
-"""Share of an output's peak by which its exact values may be off."""
 
 
 @dataclass(frozen=True)
@@ -128,29 +126,25 @@ class DualProof:
     ) -> _Bounded:
         """Bounds of one level; what the level inside it attains is attained here too."""
         low, high = cuts.lower[a], cuts.upper[a]
-        margin = ROUNDING * peak[:, None]
-        if not (high > low).any():
-            value = flow.values(low[None])[0]
-            both = np.stack([-value, value], -1)
-            at = np.broadcast_to(low, (*both.shape, len(low))).copy()
-            stray = Box(flow.system, cuts.names, flow.time, low, high).crisp_stray()
-            return _Bounded(both + margin, both - margin, at, stray, len(value))
         box = Box(flow.system, cuts.names, flow.time, low, high)
+        if not (high > low).any():
+            value, error, stray = box.centre_motion()
+            both, margin = np.stack([-value, value], -1), error[..., None]
+            at = np.broadcast_to(low, (*both.shape, len(low))).copy()
+            return _Bounded(both + margin, both - margin, at, stray, len(value))
         level, workers = box.level(), self.workers or os.cpu_count() or 1
         outer, unit = level.bounds(self.gap * peak, self.slabs, self.steps, workers)
         node, output, side = (x.ravel() for x in np.indices(outer.shape))
-        value = box.attained(unit.reshape(len(node), -1), node, output)
-        inner = (np.where(side, 1, -1) * value).reshape(outer.shape) - margin
-        self._parted(box, (outer, inner, unit), margin[:, 0], workers)
+        reached = box.reached(unit.reshape(len(node), -1), node, output, np.where(side, 1, -1))
+        inner = reached.reshape(outer.shape)
+        self._parted(box, (outer, inner, unit), workers)
         points = box.inputs(unit)
         if within is not None:
             better = within.inner > inner
             inner[better], points[better] = within.inner[better], within.at[better]
         return _Bounded(outer, inner, points, level.stray(), len(level.single))
 
-    def _parted(
-        self, box: Box, bounds: tuple[Array, Array, Array], margin: Array, workers: int
-    ) -> None:
+    def _parted(self, box: Box, bounds: tuple[Array, Array, Array], workers: int) -> None:
         """Improve bounds (outer, inner, unit) above peaks whose gap is too wide, over parts."""
         outer, inner, unit = bounds
         top = np.maximum(inner.max(0), 0.0)  # (m, 2)
@@ -158,10 +152,10 @@ class DualProof:
 
         def improve(o: int, s: int) -> None:
             nodes = np.flatnonzero(outer[:, o, s] > top[o, s] + enough[o, s])
-            every = np.full(len(nodes), o)
+            every, side = np.full(len(nodes), o), (-1, 1)[s]
             peak = Peak(
                 partial(box.part, o, nodes),
-                lambda unit: (-1, 1)[s] * box.attained(unit, nodes, every) - margin[o],
+                lambda unit: box.reached(unit, nodes, every, side),
                 unit.shape[-1],
                 s,
                 outer[nodes, o, s],

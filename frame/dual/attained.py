@@ -1,0 +1,275 @@
+"""Exact motions of a structure with classical modes at single inputs, and bounds of their rounding.
+
+An output is Σ_k r_k c_k e(λ_k), over modes of unit mass: r what the output reads of mode k, c what
+a source puts into it, e the response of its oscillator. Computed modes X and λ are the exact ones
+of a pencil that is near by: Xᵀ K X = diag λ + E and Xᵀ M X = I + F, whose entries are bounded by
+the computed residuals and their γ_n (Higham 2002, section 3.5). With G = |E| + |F| diag λ the
+outputs are off, to first order, by
+
+    Σ_jk |r_j| G_jk |e[λ_j, λ_k]| |c_k| + Σ_jk |r_j e_j| |F_jk| |c_k|,
+
+e[·, ·] a divided difference, which holds for close modes too. The entry of the slowest mode in G is
+some n ε ω_max², so that its frequency is off by a share of n ε (ω_max/ω₁)². Rounding of the
+response itself comes from the walk over the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.dual.structure import Classical
+from alphacut.frame.response.duhamel import responses_at_named_nodes, responses_at_nodes
+from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF
+from alphacut.frame.structures.linear import Accelerogram, LinearSystem, evaluate
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+
+ENTRY_ROUNDINGS = 8
+"""Roundings of an entry of M, K and of output rows, as a stiffness 12 c E I / l³ takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Modal:
+    """Modes of a structure at S points, with bounds of what rounding leaves of the pencil.
+
+    Args:
+        squared: λ, shape (S, n), rising, in 1/s².
+        sigma: Exponents −g + iω, shape (S, n), in 1/s.
+        turn: Bound of |dσ/dλ|, the same shape.
+        is_alike: Whether all modes of a point have one ratio of damping, shape (S,).
+        shape: Displacements of the modes, of unit mass, shape (S, n, n).
+        share: c of each source, by its name, shape (S, n).
+        share_error: Bounds of their rounding.
+        stiffness_error: G, shape (S, n, n).
+        mass_error: |F|, shape (S, n, n).
+        rows: Rows of all outputs on the state, shape (S, m, 2 n).
+        order: Which derivative of the displacements each output reads, shape (m,).
+        accelerated: What those of order 2 read of the accelerations, shape (m, n).
+    """
+
+    squared: Array
+    sigma: Array
+    turn: Array
+    is_alike: Mask
+    shape: Array
+    share: dict[str, Array]
+    share_error: dict[str, Array]
+    stiffness_error: Array
+    mass_error: Array
+    rows: Array
+    order: Array
+    accelerated: Array
+
+    def read(self, point: Rows, output: Rows) -> tuple[Array, Array]:
+        """What outputs (N,) read of the modes at points (N,), and its rounding, each (N, n)."""
+        n, order = self.shape.shape[-1], self.order[output][:, None]
+        rows, shape = self.rows[point, output], self.shape[point]
+        row = np.where(order == 1, rows[:, n:], rows[:, :n])
+        row = np.where(order == 2, self.accelerated[output], row)
+        size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
+        read = np.einsum("si,sik->sk", row, shape)
+        return read, gamma(n + ENTRY_ROUNDINGS) * size
+
+
+def gamma(count: int) -> float:
+    """γ_n = n u / (1 − n u), the relative error of n roundings (Higham 2002, lemma 3.1)."""
+    return count * UNIT_ROUNDOFF / (1 - count * UNIT_ROUNDOFF)
+
+
+def modes_at(
+    system: LinearSystem,
+    structure: Classical,
+    names: Sequence[str],
+    points: Array,
+    unit: Array,
+) -> Modal:
+    """Modes at inputs `points` (S, inputs) called `names`, whose unit coordinates are (S, d).
+
+    Raises:
+        UnprovedError: A mode does not oscillate.
+    """
+    matrices, rows = evaluate(system, names, points, derivatives=False)
+    M, K = matrices.mass.value, matrices.stiffness.value
+    below = np.linalg.inv(np.linalg.cholesky(M))
+    squared, U = np.linalg.eigh(below @ K @ below.swapaxes(-1, -2))
+    shape = below.swapaxes(-1, -2) @ U
+    a, b = structure.rayleigh.at(unit).T[:, :, None]
+    ratio, positive = structure.ratio.at(unit), np.maximum(squared, 1e-300)
+    decay = (a + b * squared) / 2 + ratio * np.sqrt(positive)
+    if not (squared > decay**2).all():
+        raise UnprovedError("a mode may not oscillate", "take less damping, and hold the structure")
+    omega, faster = np.sqrt(squared - decay**2), b / 2 + ratio / (2 * np.sqrt(positive))
+    turn = faster + np.abs(1 - 2 * decay * faster) / (2 * omega)
+    share, share_error, n = {}, {}, M.shape[-1]
+    moved = {"velocity": matrices.v0.value[..., 0], "start": matrices.q0.value[..., 0]}
+    if system.ground is not None:
+        moved["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
+    for name, x in moved.items():
+        share[name] = np.einsum("sik,sij,sj->sk", shape, M, x, optimize=True)
+        sizes = (np.abs(part) for part in (shape, M, x))
+        size = np.einsum("sik,sij,sj->sk", *sizes, optimize=True)
+        share_error[name] = gamma(2 * n + 2 * ENTRY_ROUNDINGS) * size
+    of_stiffness, of_mass = _residual(shape, K, squared), _residual(shape, M, np.ones_like(squared))
+    of_stiffness += of_mass * squared[:, None]
+    of_stiffness += gamma(8) * squared[:, None] * np.eye(n)  # of σ from λ
+    alike = (ratio == ratio[:, :1]).all(1)
+    return Modal(
+        squared,
+        -decay + 1j * omega,
+        turn,
+        alike,
+        shape,
+        share,
+        share_error,
+        of_stiffness,
+        of_mass,
+        rows.value,
+        structure.order,
+        structure.rows,
+    )
+
+
+def _residual(shape: Array, matrix: Array, diagonal: Array) -> Array:
+    """Bound of |Xᵀ A X − diag| for the exact A, with the rounding of its product, (S, n, n)."""
+    n, across = shape.shape[-1], shape.swapaxes(-1, -2)
+    residual = across @ matrix @ shape - diagonal[:, None] * np.eye(n)
+    size = np.abs(across) @ np.abs(matrix) @ np.abs(shape)
+    return np.asarray(np.abs(residual) + gamma(2 * n + ENTRY_ROUNDINGS) * size)
+
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Responses e of all modes to one source, at a node for each of N points, each (N, n).
+
+    Args:
+        value: e.
+        error: Bound of its rounding.
+        slope: Bound of |de/dλ| at the modes.
+        slope_anywhere: The same at any λ between two modes.
+    """
+
+    value: Array
+    error: Array
+    slope: Array
+    slope_anywhere: Array
+
+
+def _wave(
+    source: str, sigma: Array, turn: Array, order: Array, rho: tuple[Array, ...], most: Array
+) -> Waves:
+    """Responses of derivative `order` (N,) from ρ, ρ′ and the rounding of ρ, each (N, n).
+
+    `most` holds bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).
+    """
+    value, slope, error = rho
+    omega, order, size = sigma.imag, order[:, None], np.abs(sigma)
+    power, lower = sigma**order, order * size ** np.maximum(order - 1, 0)
+    G, steep = power * value, lower * np.abs(value) + size**order * np.abs(slope)
+    anywhere = lower * most[0][:, None] + size**order * most[1][:, None]
+    error = size**order * error + gamma(2 * order.max() + 6) * np.abs(G)
+    quotient = -sigma.real / omega
+    if source == "start":
+        of_quotient = turn * (1 + quotient) / omega
+        largest = size**order * most[0][:, None]
+        return Waves(
+            G.real + quotient * G.imag,
+            (1 + quotient) * error,
+            turn * (1 + quotient) * steep + of_quotient * np.abs(G),
+            turn * (1 + quotient) * anywhere + of_quotient * largest,
+        )
+    side = -1.0 if source == "load" else 1.0
+    largest = size**order * most[0][:, None]
+    return Waves(
+        side * G.imag / omega,
+        error / omega,
+        turn * (steep / omega + np.abs(G) / omega**2),
+        turn * (anywhere / omega + largest / omega**2),
+    )
+
+
+def outputs_at(
+    modal: Modal,
+    point: Rows,
+    output: Rows,
+    time: Array,
+    loads: tuple[Array, Array, Array] | None,
+) -> tuple[Array, Array]:
+    """Values of outputs and bounds of their rounding, each shape (N,).
+
+    Args:
+        modal: Modes at all points.
+        point: Point of each value, shape (N,).
+        output: Output of each value, shape (N,).
+        time: Node of each value, shape (N,), in s.
+        loads: ρ and ρ′ (2, N, n), the rounding of ρ (N, n), and ∫ |a| up to the node (N,); None
+            without a record.
+    """
+    sigma, turn, t = modal.sigma[point], modal.turn[point], time[:, None]
+    free = np.exp(sigma * t)
+    of_free = free, t * free, (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(free)
+    most = {"velocity": np.stack([np.ones_like(time), time])}
+    most["start"], rho = most["velocity"], {"velocity": of_free, "start": of_free}
+    if loads is not None:
+        rho["load"] = loads[0][0], loads[0][1], loads[1]
+        most["load"] = np.stack([loads[2], time * loads[2]])
+    read, read_error = modal.read(point, output)
+    total, error = np.zeros(len(point)), np.zeros(len(point))
+    for source, values in rho.items():
+        wave = _wave(source, sigma, turn, modal.order[output], values, most[source])
+        share, share_error = modal.share[source][point], modal.share_error[source][point]
+        total += (read * share * wave.value).sum(-1)
+        error += _error(modal, point, (read, read_error), (share, share_error), wave)
+    longest = (np.einsum("skk->sk", modal.stiffness_error[point]) * turn * t).max(-1)
+    # what is of second order in G is a share of `longest` of what is of first
+    return total, error / np.maximum(1 - longest, 1e-300)
+
+
+def _error(
+    modal: Modal,
+    point: Rows,
+    read: tuple[Array, Array],
+    share: tuple[Array, Array],
+    wave: Waves,
+) -> Array:
+    """Bound of the rounding of Σ r c e, shape (N,)."""
+    (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))
+    e, n = np.abs(wave.value), wave.value.shape[-1]
+    own = (r * c * wave.error + (r_error * c + r * c_error) * e).sum(-1)
+    own += gamma(n + 6) * (r * c * e).sum(-1)
+    squared, anywhere = modal.squared[point], wave.slope_anywhere
+    apart = np.abs(squared[:, :, None] - squared[:, None])
+    least = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
+    cap = least + np.maximum(anywhere[:, :, None], anywhere[:, None])
+    diagonal = np.eye(n, dtype=bool)
+    divided = np.minimum((e[:, :, None] + e[:, None]) / np.where(apart > 0, apart, 1e-300), cap)
+    divided = np.where(diagonal, wave.slope[:, None], divided)
+    couplings = modal.stiffness_error[point] * divided
+    own += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
+    own += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)
+    return np.asarray(own)
+
+
+def loads_at_named_nodes(
+    sigma: Array, ground: Accelerogram, time: Array, node: Rows
+) -> tuple[Array, Array, Array]:
+    """`loads` of `outputs_at` for σ (N, n) at node (N,) of `time`."""
+    rho, error = responses_at_named_nodes(sigma, ground, time, node, 1)
+    return rho, error, impulses(ground, time)[node]
+
+
+def loads_at_nodes(sigma: Array, ground: Accelerogram, time: Array) -> tuple[Array, Array, Array]:
+    """`loads` of `outputs_at` for σ (n,) at all nodes."""
+    rho, error = responses_at_nodes(sigma, ground, time, 1)
+    return rho, error, impulses(ground, time)
+
+
+def impulses(ground: Accelerogram, time: Array) -> Array:
+    """Bounds of ∫ |a| up to each node, shape (T,), in m/s."""
+    size = np.abs(ground.acceleration)
+    larger = np.append(np.maximum(size[1:], size[:-1]), 0.0)
+    whole = np.append(0.0, np.cumsum(larger * ground.step))
+    last = np.minimum((time / ground.step).astype(int) + 1, len(whole) - 1)
+    return np.asarray(whole[last])
