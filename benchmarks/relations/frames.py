@@ -1,0 +1,214 @@
+"""Random storey frames, and the relations of their envelopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
+from alphacut.frame.structures.quantities import Output
+from alphacut.frame.structures.storey import chain
+from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
+from alphacut.fuzzy.arrays import Array
+from benchmarks.relations.relation import Chance, Relation
+from benchmarks.relations.stated import Stated
+
+Units = tuple[int, int, int]  # powers of length, time and mass
+INPUTS: dict[str, Units] = {"k": (0, -2, 1), "m": (0, 0, 1), "rayleigh_stiffness": (0, 1, 0)}
+INPUTS |= {"rayleigh_mass": (0, -1, 0)}
+OUTPUTS: dict[str, Units] = {"m": (1, 0, 0), "m/s": (1, -1, 0), "m/s^2": (1, -2, 0)}
+OUTPUTS |= {"N": (1, -2, 1)}
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A storey frame with fuzzy inputs under a record, and how its envelopes are asked for.
+
+    Args:
+        stiffness: Of storeys, shape (n,), in N/m.
+        masses: Of floors, shape (n,), in kg.
+        damping: Ratio of all modes, or Rayleigh's factors of mass (1/s) and stiffness (s).
+        fuzzy: Half-widths of inputs by name, relative; 0 makes one crisp.
+        outputs: Names.
+        record: Ground acceleration, in m/s².
+        sampling: Its step, in s.
+        nodes: Number of steps.
+        step: Of the nodes, in s.
+        alpha: Levels.
+        method: proof, dual or search.
+        tolerance: As a share of each peak.
+        workers: Threads.
+        powers: Powers of two that the units of length, time and mass are smaller by.
+        matrices: Whether the frame is given as matrices.
+    """
+
+    stiffness: Array
+    masses: Array
+    damping: tuple[float, ...]
+    fuzzy: Mapping[str, float]
+    outputs: tuple[str, ...]
+    record: Array
+    sampling: float
+    nodes: int
+    step: float
+    alpha: tuple[float, ...] = (0.0, 0.6)
+    method: str = "proof"
+    tolerance: float = 1e-2
+    workers: int = 2
+    powers: Units = (0, 0, 0)
+    matrices: bool = False
+    RELATIVE: ClassVar[bool] = True
+
+    @classmethod
+    def drawn(cls, chance: Chance) -> Self:
+        """A frame of 1 to 3 storeys with 1 or 2 fuzzy inputs."""
+        n = int(chance.integers(1, 4))
+        masses, stiffness = chance.uniform(1e4, 3e4, n), chance.uniform(1e7, 4e7, n)
+        names = [f"{kind}{z + 1}" for kind in "km" for z in range(n)]
+        count = int(chance.integers(1, 3))
+        damping: tuple[float, ...] = (float(chance.uniform(0.01, 0.1)),)
+        names.append("zeta")
+        if chance.random() < 0.5:
+            damping = (float(chance.uniform(0.2, 0.8)), float(chance.uniform(5e-4, 3e-3)))
+            names[-1:] = ["rayleigh_mass", "rayleigh_stiffness"]
+        inputs = chance.choice(names, count, False)
+        kinds = [f"{kind}{z + 1}" for kind in ("q", "drift", "v", "a", "shear") for z in range(n)]
+        outputs = chance.choice(kinds, min(3, len(kinds)), False)
+        sampling, step = 0.02 * float(chance.choice([0.5, 1, 2.5])), 0.04
+        return cls(
+            stiffness,
+            masses,
+            damping,
+            {str(name): float(chance.uniform(0.01, 0.1)) for name in inputs},
+            tuple(map(str, outputs)),
+            _record(chance, int(0.6 / sampling)),
+            sampling,
+            nodes=20,
+            step=step,
+            method=str(chance.choice(["proof", "dual", "search"])),
+        )
+
+    def stated(self) -> Stated:
+        """Statements in SI units."""
+        units = {name: OUTPUTS[Output(name).unit] for name in self.outputs}
+        result = envelope(
+            self._as_matrices() if self.matrices else self._structure(),
+            {name: self._number(name) for name in self.fuzzy},
+            duration=self.nodes * self.step * self._unit((0, 1, 0)),
+            step=self.step * self._unit((0, 1, 0)),
+            alpha=self.alpha,
+            method=self._method(),
+            relative=self.RELATIVE,
+            progress=False,
+        )
+        factors = {name: 1 / self._unit(powers) for name, powers in units.items()}
+        return Stated.of_bounds(result).scaled(factors, 1 / self._unit((0, 1, 0)))
+
+    def _unit(self, powers: Units) -> float:
+        """Factor on numbers with a unit."""
+        return float(2.0 ** np.dot(self.powers, powers))
+
+    def _method(self) -> Proof | DualProof | str:
+        made = {"proof": Proof(tolerance=self.tolerance, workers=self.workers)}
+        return {**made, "dual": DualProof(workers=self.workers)}.get(self.method, self.method)
+
+    def _structure(self) -> StoreyFrame:
+        damping: dict[str, object] = {"damping_ratio": self.damping[0]}
+        if len(self.damping) == 2:
+            units = self._unit((0, -1, 0)), self._unit((0, 1, 0))
+            damping = {"rayleigh": tuple(np.multiply(self.damping, units))}
+        return StoreyFrame(
+            masses=tuple(self.masses * self._unit(INPUTS["m"])),
+            stiffness=tuple(self.stiffness * self._unit(INPUTS["k"])),
+            **damping,  # type: ignore[arg-type]
+            ground=Accelerogram(
+                self.sampling * self._unit((0, 1, 0)), self.record * self._unit((1, -2, 0))
+            ),
+            outputs=self.outputs,
+        )
+
+    def _number(self, name: str) -> FuzzyNumber:
+        """A triangular number about the modal value."""
+        modal = self._structure().parameters[name]
+        reach = self.fuzzy[name] * modal
+        return Triangular(modal - reach, modal, modal + reach) if reach else Interval(modal, modal)
+
+    def _as_matrices(self) -> MatrixStructure:
+        """The frame as sums of arrays times parameters; displacements, drifts, velocities alone."""
+        made, n = self._structure(), len(self.masses)
+        floors = np.eye(n)
+        mass = [(f"m{z + 1}", np.outer(e, e)) for z, e in enumerate(floors)]
+        springs = [(f"k{z + 1}", chain(e)) for z, e in enumerate(floors)]
+        damping = [(name, made.rayleigh[0] * array) for name, array in mass]
+        damping += [(name, made.rayleigh[1] * array) for name, array in springs]
+        ratio = len(self.damping) == 1
+        own = {"ratios": ("zeta",)} if ratio else {"damping": damping}
+        rows = {Output(x): self._row(x) for x in self.outputs}
+        return MatrixStructure(made.parameters, mass, springs, rows, ground=made.ground, **own)
+
+    def _row(self, output: str) -> Array:
+        """Row of displacements, drifts and velocities."""
+        kind, place = output[:-1], int(output[-1]) - 1
+        row = np.zeros(2 * len(self.masses))
+        row[place + len(self.masses) * (kind == "v")] = 1.0
+        if kind == "drift" and place:
+            row[place - 1] = -1.0
+        return row
+
+
+def _record(chance: Chance, samples: int) -> Array:
+    """Noise that rises from zero and fades to it, at most 3 m/s²."""
+    wave = chance.normal(size=samples) * np.sin(np.linspace(0, np.pi, samples))
+    wave[[0, -1]] = 0.0
+    return np.asarray(3 * wave / np.abs(wave).max())
+
+
+def _matrices(frame: Frame, chance: Chance) -> Frame | None:
+    """The matrices, where damping is linear in the inputs and outputs are plain rows."""
+    plain = all(name[0] in "qdv" for name in frame.outputs)
+    ratio = len(frame.damping) == 1
+    fixed = not any(name.startswith("rayleigh") for name in frame.fuzzy)
+    known = ratio or (fixed and frame.method != "dual")  # which takes modes that damping may couple
+    return replace(frame, matrices=True) if plain and known else None
+
+
+def _shuffled(frame: Frame, chance: Chance) -> Frame:
+    order = chance.permutation([*frame.fuzzy])
+    return replace(frame, fuzzy={str(name): frame.fuzzy[str(name)] for name in order})
+
+
+def _crisp(frame: Frame, chance: Chance) -> Frame | None:
+    others = [f"k{z + 1}" for z in range(len(frame.masses))]
+    others = [name for name in others if name not in frame.fuzzy]
+    return replace(frame, fuzzy={others[0]: 0.0, **frame.fuzzy}) if others else None
+
+
+def _refined(frame: Frame, chance: Chance) -> Frame:
+    count = len(frame.record)
+    fine = np.interp(np.arange(2 * count - 1) / 2, np.arange(count), frame.record)
+    return replace(frame, record=fine, sampling=frame.sampling / 2)
+
+
+RELATIONS = (
+    Relation("inputs in another order", _shuffled),
+    Relation("one level", lambda x, chance: replace(x, alpha=(float(chance.choice(x.alpha)),))),
+    Relation("one output", lambda x, chance: replace(x, outputs=(x.outputs[0],))),
+    Relation("half the duration", lambda x, chance: replace(x, nodes=x.nodes // 2)),
+    Relation("half the step", lambda x, chance: replace(x, step=x.step / 2, nodes=2 * x.nodes)),
+    Relation("one more crisp input", _crisp),
+    Relation("record refined", _refined),
+    Relation(
+        "record padded", lambda x, chance: replace(x, record=np.append(x.record, np.zeros(7)))
+    ),
+    Relation(
+        "other units",
+        lambda x, chance: replace(x, powers=tuple(map(int, chance.integers(-12, 13, 3)))),
+        same=True,
+    ),
+    Relation("as matrices", _matrices),
+    Relation("one thread", lambda x, chance: replace(x, workers=1), same=True),
+    Relation("three threads", lambda x, chance: replace(x, workers=3), same=True),
+)

@@ -1,0 +1,68 @@
+"""Relations: ways to say a problem otherwise, and checks of all results against the plain one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from alphacut.fuzzy.refused import FailedError, RefusedError
+from benchmarks.relations.stated import Stated, contradictions
+
+Chance = np.random.Generator
+
+
+class Subject(Protocol):
+    """A problem that gives its results in one frame of reference, however it is said."""
+
+    @classmethod
+    def drawn(cls, chance: Chance) -> Self:
+        """A random problem."""
+
+    def stated(self) -> Stated:
+        """What its result states."""
+
+
+@dataclass(frozen=True)
+class Relation:
+    """A way to say a problem otherwise.
+
+    Args:
+        name: In words.
+        said: The problem said otherwise; None where it does not apply.
+        same: Whether every number of the result stays, but for rounding.
+    """
+
+    name: str
+    said: Callable[[Any, Chance], Any]
+    same: bool = False
+
+
+def checked(
+    subject: Subject, relations: Sequence[Relation], chance: Chance, *, pairs: int = 0
+) -> Iterator[tuple[str, list[str]]]:
+    """Names of the relations that apply with the contradictions found, a failure among them.
+
+    Args:
+        subject: The problem.
+        relations: Ways to say it otherwise, checked one at a time.
+        chance: Source of chance.
+        pairs: Number of pairs of relations that are checked as well, drawn at random.
+    """
+    plain = subject.stated()
+    both = list(combinations(relations, 2))
+    drawn = chance.permutation(len(both))[:pairs]
+    for row in [*((x,) for x in relations), *(both[k] for k in drawn)]:
+        said: Any = subject
+        for relation in row:
+            said = said and relation.said(said, chance)
+        if said is None:
+            continue
+        name, same = " and ".join(x.name for x in row), all(x.same for x in row)
+        try:
+            yield name, contradictions(plain, said.stated(), same=same)
+        except (RefusedError, FailedError, ArithmeticError) as error:
+            yield name, [f"{type(error).__name__}: {error}"]
