@@ -64,11 +64,12 @@ def test_a_random_problem_said_otherwise_gives_no_contradiction(kind):
     seed = int(np.random.SeedSequence().entropy % 2**32)
     chance = np.random.default_rng(seed)
     relations = [x for x in KINDS[kind][1] if "processes" not in x.name]
-    drawn = [relations[k] for k in chance.permutation(len(relations))[:5]]
+    drawn = [relations[k] for k in chance.permutation(len(relations))[:3]]
     found = dict(checked(KINDS[kind][0].drawn(chance), drawn, chance))
     assert not {name: lines for name, lines in found.items() if lines}, f"{kind}, seed {seed}"
 
 
+@pytest.mark.slow
 def test_a_case_has_one_set_of_numbers_however_it_is_run(tmp_path):
     case = tmp_path / "small.toml"
     case.write_text(CASE, encoding="utf-8")
