@@ -13,7 +13,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import chain
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.fuzzy.arrays import Array
-from benchmarks.relations.relation import Chance, Relation
+from benchmarks.relations.relation import ROUNDED, Chance, Relation
 from benchmarks.relations.stated import Stated
 
 Units = tuple[int, int, int]  # powers of length, time and mass
@@ -86,7 +86,7 @@ class Frame:
             tuple(map(str, outputs)),
             _record(chance, int(0.6 / sampling)),
             sampling,
-            nodes=20,
+            nodes=int(chance.choice([20, 100])),
             step=step,
             method=str(chance.choice(["proof", "dual", "search"])),
         )
@@ -206,9 +206,9 @@ RELATIONS = (
     Relation(
         "other units",
         lambda x, chance: replace(x, powers=tuple(map(int, chance.integers(-12, 13, 3)))),
-        same=True,
+        within=ROUNDED,
     ),
     Relation("as matrices", _matrices),
-    Relation("one thread", lambda x, chance: replace(x, workers=1), same=True),
-    Relation("three threads", lambda x, chance: replace(x, workers=3), same=True),
+    Relation("one thread", lambda x, chance: replace(x, workers=1), within=0.0),
+    Relation("three threads", lambda x, chance: replace(x, workers=3), within=0.0),
 )

@@ -13,7 +13,7 @@ import numpy as np
 from alphacut.fuzzy import Automatic, General, Known, Signed, Triangular, propagate
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Method
-from benchmarks.relations.relation import Chance, Relation
+from benchmarks.relations.relation import ROUNDED, Chance, Relation
 from benchmarks.relations.stated import Stated
 
 PLANS: dict[str, Method | None] = {"none": None, "automatic": Automatic(), "general": General()}
@@ -130,8 +130,8 @@ RELATIONS = (
     Relation("one level", lambda x, chance: replace(x, alpha=(float(chance.choice(x.alpha)),))),
     Relation("one output", lambda x, chance: replace(x, outputs=x.outputs[:1])),
     Relation("one more crisp input", lambda x, chance: replace(x, crisp=2.0)),
-    Relation("other units", _in_units, same=True),
-    Relation("threads", _run_by(_threads), same=True),
-    Relation("forked processes", _run_by(_forked), same=True),
-    Relation("spawned processes", _run_by(_spawned), same=True),
+    Relation("other units", _in_units, within=ROUNDED),
+    Relation("threads", _run_by(_threads), within=0.0),
+    Relation("forked processes", _run_by(_forked), within=0.0),
+    Relation("spawned processes", _run_by(_spawned), within=0.0),
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from typing import Any, Self
 
 import numpy as np
@@ -18,7 +20,7 @@ from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
 from alphacut.stochastic.sections import Simulated, reduced_radii, section_of
-from benchmarks.relations.relation import Chance, Relation
+from benchmarks.relations.relation import ROUNDED, Chance, Relation
 from benchmarks.relations.stated import Stated
 
 EXACT = 1e-8
@@ -145,12 +147,14 @@ class Sections:
     """Periodic packings, and the radius map of their cells.
 
     Args:
-        packings: Five or more.
-        unit: Unit of length.
+        source: What five packings are made by.
+        seed: Of them.
+        packings: Their particles.
     """
 
+    source: Simulated
+    seed: int
     packings: tuple[Particles, ...]
-    unit: float = 1.0
 
     @classmethod
     def drawn(cls, chance: Chance) -> Self:
@@ -159,14 +163,22 @@ class Sections:
         radii = LogNormalRadii(1e-3, 1e-3 * float(chance.uniform(1.5, 3)))
         fraction = float(chance.uniform(0.1, 0.2 if spheres else 0.4))
         packing = Packing(40, fraction, radii, SPHERES if spheres else DISCS)
-        sections = Simulated(packing, 5).sections(int(chance.integers(1 << 30)))
-        return cls(tuple(section.particles for section in sections))
+        return cls._packed(Simulated(packing, 5), int(chance.integers(1 << 30)), None)
+
+    @classmethod
+    def _packed(cls, source: Simulated, seed: int, executor: Executor | None) -> Self:
+        sections = source.sections(seed, executor=executor)
+        return cls(source, seed, tuple(section.particles for section in sections))
+
+    def by_processes(self, start: str) -> Self:
+        """The packings made by processes that are forked or spawned."""
+        with ProcessPoolExecutor(2, get_context(start)) as pool:
+            return self._packed(self.source, self.seed, pool)
 
     def stated(self) -> Stated:
         """Limits, slopes and shares of the map."""
         sample = reduced_radii([section_of(particles) for particles in self.packings])
-        study = Study(Simulated(Packing(40, 0.2, LogNormalRadii(1, 1), self.packings[0].shape)))
-        _, pbox, _, band = fitted_map(study, sample)
+        _, pbox, _, band = fitted_map(Study(self.source), sample)
         numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": band}
         numbers |= {f"a2[{i}]": x for i, x in enumerate(pbox.a2)}
         numbers |= {f"a4[{i}]": x for i, x in enumerate(pbox.a4)}
@@ -190,14 +202,14 @@ def _shifted(sections: Sections, chance: Chance) -> Sections:
 
 
 CELLS = (
-    Relation("other units", lambda x, chance: replace(x, unit=_unit(chance)), same=True),
+    Relation("other units", lambda x, chance: replace(x, unit=_unit(chance)), within=ROUNDED),
     Relation("turned by 90°", lambda x, chance: replace(x, turn=x.turn + 90)),
     Relation("mirrored", lambda x, chance: replace(x, turn=-x.turn)),
     Relation("half the mesh size", lambda x, chance: x.size and replace(x, size=x.size / 2)),
     Relation("by the slices", lambda x, chance: replace(x, size=0.4) if x.size is None else None),
 )
 IMAGES = (
-    Relation("other units", lambda x, chance: replace(x, unit=_unit(chance)), same=True),
+    Relation("other units", lambda x, chance: replace(x, unit=_unit(chance)), within=ROUNDED),
     Relation("turned", _turned),
     Relation("tiled", _tiled),
     Relation("shifted", _rolled),
@@ -205,13 +217,19 @@ IMAGES = (
     Relation("phases exchanged", _exchanged),
 )
 PACKINGS = (
-    Relation("scaled", _scaled, same=True),
-    Relation("shifted", _shifted, same=True),
-    Relation("mirrored", lambda x, c: x.moved(lambda p, r, s: (s - p, r, s)), same=True),
+    Relation("forked processes", lambda x, chance: x.by_processes("fork"), within=0.0),
+    Relation("spawned processes", lambda x, chance: x.by_processes("spawn"), within=0.0),
+    Relation("scaled", _scaled, within=ROUNDED),
+    Relation("shifted", _shifted, within=ROUNDED),
+    Relation("mirrored", lambda x, c: x.moved(lambda p, r, s: (s - p, r, s)), within=ROUNDED),
     Relation(
-        "axes exchanged", lambda x, c: x.moved(lambda p, r, s: (p[:, ::-1], r, s[::-1])), same=True
+        "axes exchanged",
+        lambda x, c: x.moved(lambda p, r, s: (p[:, ::-1], r, s[::-1])),
+        within=ROUNDED,
     ),
     Relation(
-        "in another order", lambda x, c: x.moved(lambda p, r, s: (p[::-1], r[::-1], s)), same=True
+        "in another order",
+        lambda x, c: x.moved(lambda p, r, s: (p[::-1], r[::-1], s)),
+        within=ROUNDED,
     ),
 )

@@ -9,9 +9,10 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from alphacut.fuzzy.refused import FailedError, RefusedError
 from benchmarks.relations.stated import Stated, contradictions
 
+ROUNDED = 1e-6
+"""Share of an output's size by which numbers may differ that are the same but for rounding."""
 Chance = np.random.Generator
 
 
@@ -33,12 +34,12 @@ class Relation:
     Args:
         name: In words.
         said: The problem said otherwise; None where it does not apply.
-        same: Whether every number of the result stays, but for rounding.
+        within: Share of an output's size within which every number stays; None where it need not.
     """
 
     name: str
     said: Callable[[Any, Chance], Any]
-    same: bool = False
+    within: float | None = None
 
 
 def checked(
@@ -61,8 +62,10 @@ def checked(
             said = said and relation.said(said, chance)
         if said is None:
             continue
-        name, same = " and ".join(x.name for x in row), all(x.same for x in row)
+        name = " and ".join(relation.name for relation in row)
+        shares = [relation.within for relation in row]
+        within = None if None in shares else max(share or 0.0 for share in shares)
         try:
-            yield name, contradictions(plain, said.stated(), same=same)
-        except (RefusedError, FailedError, ArithmeticError) as error:
+            yield name, contradictions(plain, said.stated(), within=within)
+        except Exception as error:
             yield name, [f"{type(error).__name__}: {error}"]

@@ -12,8 +12,6 @@ from alphacut.fuzzy.result import Bounds
 
 ROUNDING = 1e-9
 """Share of an output's size that rounding explains where both results are proved or exact."""
-SAME = 1e-6
-"""Share of it by which results may differ where every number is to be the same but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +96,7 @@ def _with_middles(made: xr.Dataset, data: xr.Dataset) -> xr.Dataset:
     return xr.concat([made, there], "time").sortby("time")
 
 
-def contradictions(one: Stated, two: Stated, *, same: bool = False) -> list[str]:
+def contradictions(one: Stated, two: Stated, *, within: float | None = None) -> list[str]:
     """Contradictions of two results on what both speak of, a line each; empty if there are none.
 
     What is attained in one may not lie outside what is proved in the other, and bounds differ by
@@ -107,7 +105,7 @@ def contradictions(one: Stated, two: Stated, *, same: bool = False) -> list[str]
     Args:
         one: Statements.
         two: Others.
-        same: Whether every number is to be the same but for rounding.
+        within: Share of an output's size within which every number is to be the same; None: no.
     """
     tables = [_rounded_times(x.data) for x in (one, two)]
     first, second = xr.align(*tables, join="inner")
@@ -122,9 +120,8 @@ def contradictions(one: Stated, two: Stated, *, same: bool = False) -> list[str]
         "bounds differ by more than both errors": np.abs(first.bound - second.bound)
         - (first.error + second.error),
     }
-    allowed = ROUNDING
-    if same:
-        allowed = SAME
+    allowed = ROUNDING if within is None else within
+    if within is not None:
         excess = {f"{name} differs": np.abs(first[name] - second[name]) for name in first}
         excess = {name: gap.where(np.isfinite(gap)) for name, gap in excess.items()}
     lines = []

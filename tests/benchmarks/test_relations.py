@@ -107,7 +107,7 @@ def test_what_leaves_a_guarantee_or_both_errors_is_seen():
     one, near, far = (Stated.of_values({"E": (x, 0.1)}) for x in (1.0, 1.19, 1.21))
     assert not contradictions(one, near)
     assert contradictions(one, far)
-    assert contradictions(one, near, same=True)
+    assert contradictions(one, near, within=1e-6)
 
 
 @dataclass(frozen=True)
@@ -140,4 +140,4 @@ def test_a_tolerance_in_metres_is_seen():
         tolerance=1e-4,
     )
     smaller = replace(frame, powers=(8, 0, 0))
-    assert contradictions(frame.stated(), smaller.stated(), same=True)
+    assert contradictions(frame.stated(), smaller.stated(), within=1e-6)
