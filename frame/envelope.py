@@ -23,16 +23,20 @@ class Envelope(Bounds):
         between: What an output may exceed the bounds at both ends of the step to a node by, within
             the step, shape (T, m), in the units of the outputs: proved where the bounds are
             guaranteed, else estimated from some trajectories. None where none was made.
+        attained_error: What the exact motion at `lower_at` and `upper_at` may exceed the attained
+            bounds `inner` by, shape (T, m); None for rounding alone.
         facts: Further numbers by name. A length is that of the first displacement, of the first
             output where none is one, and a share of each peak where the tolerance was relative.
             `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;
             `model_error`, `degree`: of the polynomials of the modes; `gap`, `boxes`, `parts`: of a
             proof; `search_error`: what a search may have missed; `estimated_error`: the largest
-            error; `between_nodes`: the largest value of `between`.
+            error; `between_nodes`: the largest value of `between`;
+            `motions_tested`: exact motions that were compared with proved bounds.
     """
 
     time: Array
     between: Array | None = None
+    attained_error: Array | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
 
     def to_dataset(self) -> xarray.Dataset:
@@ -44,6 +48,8 @@ class Envelope(Bounds):
                 dataset[f"{kind}_{end}"] = (band, values)
         if self.between is not None:
             dataset["between"] = (("time", "output"), self.between)
+        if self.attained_error is not None:
+            dataset["attained_error"] = (("time", "output"), self.attained_error)
         dataset["time"].attrs["units"] = "s"
         units = sorted(set(self.units)) or ["SI"]
         for name in set(dataset.data_vars) - {"lower_at", "upper_at", "nature", "label"}:

@@ -32,6 +32,7 @@ from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import StoreyFrame
+from alphacut.frame.verification.self_test import tested
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
@@ -118,6 +119,8 @@ def envelope(
         bounds = way.run(over, tick)
     bounds = _judged(with_step_error(bounds, over, steps), over, way)
     bounds = with_stray(bounds, over)
+    if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
+        bounds = tested(bounds, model)
     return _on_levels(bounds, every.alpha, which)
 
 

@@ -30,6 +30,7 @@ class Certificate:
         outer: Proved upper bounds, shape (A, T, m, 2).
         between: Bound of what each output exceeds both ends of the step to a node by, shape (T, m),
             in its unit.
+        attained_error: What the trajectories at `at` may exceed `bounds` by, shape (T, m).
         boxes: Boxes of parameters looked at.
     """
 
@@ -37,6 +38,7 @@ class Certificate:
     at: Array
     outer: Array
     between: Array
+    attained_error: Array
     boxes: int
 
 
@@ -103,6 +105,7 @@ def certify(
         at,
         outer * unit,
         between * scale,
+        2 * (error + rounding) * scale,
         sum(used for *_, used in done),
     )
 

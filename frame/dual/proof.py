@@ -37,7 +37,7 @@ from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.proof import exact
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature
 
 PARTS = 32
@@ -92,7 +92,7 @@ class DualProof:
                 progress(1 - a / len(cuts.alpha))
         inner, at = (np.stack([getattr(x, name) for x in levels]) for name in ("inner", "at"))
         outer = np.minimum.accumulate(np.stack([x.outer for x in levels]), axis=0)
-        outer = np.maximum(outer, inner)  # which differ by rounding alone where they cross
+        _require_order(inner, outer, flow.outputs)
         error = (outer - inner).max(-1)
         most = np.abs(outer).max((1, 3))  # (A, m)
         of_peaks = np.abs(outer.max(1) - inner.max(1)).max(-1) / np.maximum(most, 1e-300)
@@ -172,6 +172,20 @@ class DualProof:
         with ThreadPoolExecutor(workers) as pool:
             for job in [pool.submit(improve, int(o), int(s)) for o, s in wide]:
                 job.result()
+
+
+def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None:
+    """Refuse attained bounds (A, T, m, 2), less their rounding, outside proved ones.
+
+    Raises:
+        FailedError: One is outside, or no number.
+    """
+    wrong = ~(inner <= outer)
+    if wrong.any():
+        output = outputs[int(np.argwhere(wrong)[0, 2])]
+        beyond = np.nanmax(np.where(wrong, inner - outer, np.nan))
+        what = f"attained bounds of {output} lie outside the proved ones by {beyond:.3g}"
+        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
 
 @dataclass(frozen=True, eq=False)

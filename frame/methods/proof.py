@@ -134,6 +134,7 @@ class Proof:
             basis=("the equations of motion hold",),
             inner=Ends(-inner[..., 0], inner[..., 1]),
             between=np.max([proof.between for _, proof in parts], axis=0),
+            attained_error=np.max([proof.attained_error for _, proof in parts], axis=0),
         )
 
     def _modelled(

@@ -1,0 +1,303 @@
+"""Exact motions against proved bounds: a guaranteed envelope tests itself.
+
+Points of the lowest cut are taken in this order: inputs that the envelope names at peaks, modal
+values, corners, inputs named at peaks of higher levels, points of low discrepancy. Each counts for
+all levels that hold it. At the nodes its exact motion must lie inside the bounds, between them no
+farther from a straight line than `between`, and where the envelope names these inputs it must equal
+the attained bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import count, islice, product
+
+import numpy as np
+
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.structures.linear import LinearSystem, evaluate
+from alphacut.frame.structures.quantities import Output
+from alphacut.frame.verification.exact_motion import LinearMotion
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.result import ROUND_OFF
+
+LEAST, MOST = 24, 240
+"""Fewest and most motions of a test; more than the most find little that these do not."""
+SHARE = 0.1
+"""Share of the proof's work that the test may take beyond the fewest motions."""
+BOUND_WORK = 2e4
+"""Multiplications of a proof for one bound (a node, output, side and level), at least: some 20 μs.
+A larger number would make more motions."""
+TERMS = 15
+"""Terms of a motion's series within a substep, about."""
+CORNERS = 16
+"""Most corners of the lowest cut."""
+QUARTERS = 4
+"""Parts of a step at whose ends motions are compared."""
+
+
+class ContradictionError(FailedError):
+    """An exact motion contradicts a guaranteed envelope.
+
+    Args:
+        what: The contradiction with its numbers.
+        table: Columns by name: time, motion and attained bounds of each output at the nodes.
+    """
+
+    def __init__(self, what: str, table: Mapping[str, Array]) -> None:
+        self.table = table
+        super().__init__(f"the proof is wrong: {what}", "keep the case and report it")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """How a copy is made, in another process, too."""
+        what = self.what.removeprefix("the proof is wrong: ")
+        return ContradictionError, (what, dict(self.table))
+
+
+def tested(envelope: Envelope, system: LinearSystem) -> Envelope:
+    """The envelope with the number of exact motions that agree with it as a fact.
+
+    Raises:
+        ContradictionError: An exact motion leaves proved bounds, strays farther between nodes than
+            is proved, or differs from the attained bound that names its inputs.
+    """
+    trial = Trial(envelope, system)
+    points = trial.points()
+    for k, motion in enumerate(trial.motions(points)):
+        trial.require_agreement(points[k], *motion.outputs(trial.times))
+    return replace(envelope, facts={**envelope.facts, "motions_tested": len(points)})
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Comparison of an envelope with exact motions.
+
+    Args:
+        envelope: Bounds, guaranteed or with guaranteed ones outside (`outer`).
+        system: Its structure.
+    """
+
+    envelope: Envelope
+    system: LinearSystem
+
+    @cached_property
+    def cuts(self) -> Array:
+        """Lower and upper ends of the inputs on all levels, shape (2, A, n)."""
+        numbers = self.envelope.inputs.values()
+        ends = [[number.cut(float(a)) for number in numbers] for a in self.envelope.alpha]
+        return np.moveaxis(np.array(ends, float), -1, 0)
+
+    @cached_property
+    def times(self) -> Array:
+        """Nodes and the quarter points between them, shape (4 (T − 1) + 1,), in s."""
+        time = self.envelope.time
+        inside = time[:-1, None] + np.diff(time)[:, None] * np.arange(QUARTERS) / QUARTERS
+        return np.append(inside.ravel(), time[-1])
+
+    def motions(self, points: Array) -> list[LinearMotion]:
+        """The structure at points (S, n), ready to move."""
+        matrices, rows = evaluate(
+            self.system, tuple(self.envelope.inputs), points, derivatives=False
+        )
+        ground = self.system.ground
+        record, step = (np.zeros(0), 0.0) if ground is None else (ground.acceleration, ground.step)
+        return [
+            LinearMotion(
+                mass=matrices.mass.value[s],
+                damping=matrices.damping.value[s],
+                stiffness=matrices.stiffness.value[s],
+                rows=rows.value[s],
+                start=matrices.start.value[s, :, 0],
+                pattern=matrices.rigid[:, 0],
+                record=record,
+                record_step=step,
+            )
+            for s in range(len(points))
+        ]
+
+    @property
+    def allowed(self) -> int:
+        """Motions that a share of the proof's work allows, counted in multiplications."""
+        bounds = 2 * self.envelope.lower.size
+        unknowns = self.motions(self.cuts[0, :1])[0].rows.shape[1]
+        nodes, outputs = self.envelope.lower.shape[1:]
+        motion = QUARTERS * nodes * outputs * unknowns * TERMS
+        return int(np.clip(SHARE * BOUND_WORK * bounds / motion, LEAST, MOST))
+
+    def points(self) -> Array:
+        """Inputs to be tested, shape (S, n)."""
+        most, distinct = self.allowed, dict[tuple[float, ...], None]()
+        for point in islice(self._in_order(), 4 * most):
+            if len(distinct) < most and np.isfinite(point).all():
+                distinct[tuple(map(float, point))] = None
+        return np.array(list(distinct))
+
+    def _in_order(self) -> Iterator[Array]:
+        """Points in the order of their worth, some of them more than once."""
+        (low, high), levels = self.cuts, len(self.envelope.alpha)
+        yield from self._named(0)
+        yield np.array([number.modal for number in self.envelope.inputs.values()])
+        yield from _corners(low[0], high[0])
+        for level in range(1, levels):
+            yield from self._named(level)
+        for k, share in enumerate(low_discrepancy(low.shape[1])):
+            level = (k // 2) % levels if k % 2 else 0
+            yield low[level] + (high[level] - low[level]) * share
+
+    def _named(self, level: int) -> Iterator[Array]:
+        """Inputs that the envelope names at the peaks of a level."""
+        of = self.envelope
+        for o in range(len(of.outputs)):
+            yield of.upper_at[level, of.upper[level, :, o].argmax(), o]
+            yield of.lower_at[level, of.lower[level, :, o].argmin(), o]
+
+    def require_agreement(self, point: Array, values: Array, rounding: Array) -> None:
+        """Refuse bounds that a motion at nodes and quarter points, (4 (T − 1) + 1, m), contradicts.
+
+        Args:
+            point: Its inputs, shape (n,).
+            values: Its outputs.
+            rounding: Their round-off.
+
+        Raises:
+            ContradictionError: It does.
+        """
+        check = _Check(self, point, values, rounding)
+        near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
+        inside = (self.cuts[0] <= point + near) & (point - near <= self.cuts[1])
+        for level in np.flatnonzero(inside.all(1)):
+            check.require_inside(int(level))
+            check.require_attained(int(level))
+        check.require_straight()
+
+
+@dataclass(frozen=True, eq=False)
+class _Check:
+    """One exact motion beside an envelope; the fields are those of `Trial.require_agreement`."""
+
+    trial: Trial
+    point: Array
+    values: Array
+    rounding: Array
+
+    @property
+    def envelope(self) -> Envelope:
+        """The envelope."""
+        return self.trial.envelope
+
+    @cached_property
+    def between(self) -> Array:
+        """What the envelope proves between nodes, (T, m); infinite where it proves nothing."""
+        of = self.envelope
+        return np.full(of.lower.shape[1:], np.inf) if of.between is None else of.between
+
+    @property
+    def least(self) -> Array:
+        """Distance of attained bounds from the motion that rounding explains, shape (m,)."""
+        of = self.envelope
+        return np.asarray(ROUND_OFF * np.maximum(-of.lower, of.upper).max((0, 1)))
+
+    @cached_property
+    def slack(self) -> Array:
+        """What the motion at named inputs may exceed attained bounds by, shape (T, m)."""
+        error = self.envelope.attained_error
+        return self.least + (np.zeros_like(self.between) if error is None else error)
+
+    def require_inside(self, level: int) -> None:
+        """Refuse proved bounds that the motion leaves, at nodes or between them."""
+        for sign, bound, words in (
+            (1.0, self.envelope.proved.upper[level], "above the proved upper bound"),
+            (-1.0, self.envelope.proved.lower[level], "below the proved lower bound"),
+        ):
+            most = sign * _within_steps(sign * bound, self.between)
+            beyond = sign * (self.values - most) - self.rounding
+            self._require(beyond, most, f"{words} of α = {self._alpha(level)},")
+
+    def require_attained(self, level: int) -> None:
+        """Refuse attained bounds that the motion at the inputs they name does not equal."""
+        of = self.envelope
+        if of.inner is None:
+            return
+        rounding = self.rounding[::QUARTERS]
+        for sign, at, inner, side in (
+            (1.0, of.upper_at[level], of.inner.upper[level], "upper"),
+            (-1.0, of.lower_at[level], of.inner.lower[level], "lower"),
+        ):
+            more = sign * (self.values[::QUARTERS] - inner)
+            beyond = np.maximum(-more - self.least, more - self.slack) - rounding
+            beyond = np.where((at == self.point).all(-1), beyond, -np.inf)
+            words = f"other than the attained {side} bound of α = {self._alpha(level)},"
+            self._require(beyond, inner, words, QUARTERS)
+
+    def require_straight(self) -> None:
+        """Refuse a motion that strays farther from straight lines between nodes than is proved."""
+        ends, share = self.values[::QUARTERS], np.arange(QUARTERS)[:, None] / QUARTERS
+        inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * share
+        line = np.concatenate([inside.reshape(-1, ends.shape[1]), ends[-1:]])
+        allowed = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
+        allowed = np.append(np.repeat(allowed, QUARTERS, axis=0), allowed[-1:], axis=0)
+        beyond = np.abs(self.values - line) - allowed - 2 * self.rounding
+        self._require(beyond, line, "farther than `between` from the straight line at")
+
+    def _alpha(self, level: int) -> str:
+        return f"{self.envelope.alpha[level]:g}"
+
+    def _require(self, beyond: Array, bound: Array, words: str, stride: int = 1) -> None:
+        """Refuse numbers (…, m) above zero, or that are none, at every `stride`-th time.
+
+        Raises:
+            ContradictionError: There is one; the largest is named.
+        """
+        if bool((beyond <= 0).all()):
+            return
+        worst = np.where(np.isnan(beyond), np.inf, beyond)
+        j, o = np.unravel_index(int(worst.argmax()), worst.shape)
+        of, value = self.envelope, self.values[j * stride, o]
+        unit = Output(of.outputs[o]).unit
+        inputs = zip(of.inputs, self.point, strict=True)
+        at = ", ".join(f"{name} = {float(x)!r}" for name, x in inputs)
+        what = (
+            f"{of.outputs[o]} at t = {self.trial.times[j * stride]:g} s is {value:.9g} {unit} at"
+            f" {at}: {words} {bound[j, o]:.9g}, by {beyond[j, o]:.3g} more than rounding and what"
+            " is declared explain"
+        )
+        raise ContradictionError(what, self._table())
+
+    def _table(self) -> dict[str, Array]:
+        """Time, motion and attained bounds of the lowest level at the nodes, by column."""
+        of, table = self.envelope, {"time [s]": self.envelope.time}
+        for o, name in enumerate(of.named):
+            table[f"motion of {name}"] = self.values[::QUARTERS, o]
+            table[f"attained lower bound of {name}"] = of.attained.lower[0, :, o]
+            table[f"attained upper bound of {name}"] = of.attained.upper[0, :, o]
+        return table
+
+
+def _within_steps(upper: Array, between: Array) -> Array:
+    """Upper bounds at nodes and at the quarter points between them, shape (4 (T − 1) + 1, m)."""
+    inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
+    parts = [upper[:-1], *[inside] * (QUARTERS - 1)]
+    return np.append(np.stack(parts, 1).reshape(-1, upper.shape[1]), upper[-1:], axis=0)
+
+
+def low_discrepancy(dimension: int) -> Iterator[Array]:
+    """Points of [0, 1]^d, one after the other: the additive recurrence of Roberts (2018)."""
+    root = 2.0
+    for _ in range(64):
+        root = (1 + root) ** (1 / (dimension + 1))
+    step = root ** -np.arange(1.0, dimension + 1)
+    for k in count(1):
+        yield (0.5 + k * step) % 1.0
+
+
+def _corners(low: Array, high: Array) -> Iterator[Array]:
+    """Corners of a box; of more than `CORNERS` two opposite ones and some at random."""
+    if 2.0 ** len(low) <= CORNERS:
+        yield from map(np.array, product(*zip(low, high, strict=True)))
+        return
+    yield from (low, high)
+    for upper in np.random.default_rng(60).integers(0, 2, (CORNERS - 2, len(low))):
+        yield np.where(upper, high, low)

@@ -1,0 +1,132 @@
+"""A guaranteed envelope that is wrong is refused by the result, whatever made it wrong."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from alphacut.frame import StoreyFrame, envelope, propagation
+from alphacut.frame.dual import level
+from alphacut.frame.dual.proof import DualProof
+from alphacut.frame.envelope import Ends
+from alphacut.frame.methods.proof import Proof
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.verification.self_test import ContradictionError, Trial
+from alphacut.fuzzy import Crisp, Triangular
+from alphacut.fuzzy.refused import FailedError
+
+INPUTS = {"k1": Triangular(3.9e6, 4e6, 4.1e6), "m2": Triangular(990.0, 1e3, 1020.0)}
+METHODS = [Proof(gap=1e-5), DualProof(gap=1e-3)]
+
+
+def frame():
+    record = 3 * np.random.default_rng(5).normal(size=40) * np.linspace(1, 0.2, 40)
+    return StoreyFrame(
+        masses=(1e3, 1e3),
+        stiffness=(4e6, 3e6),
+        damping_ratio=0.03,
+        ground=Accelerogram(0.03, record),
+        outputs=("q2", "drift2"),
+    )
+
+
+motion = partial(envelope, duration=1.0, step=0.02, alpha=(0.0, 0.5, 1.0), progress=False)
+
+
+def planted(monkeypatch, method, change):
+    """Lets a fault into the envelope that a method returns."""
+    run = type(method).run
+    monkeypatch.setattr(type(method), "run", lambda *given: change(run(*given)))
+
+
+def narrower(found):
+    return replace(found, lower=0.98 * found.lower, upper=0.98 * found.upper)
+
+
+def straight(found):
+    return replace(found, between=np.zeros_like(found.between))
+
+
+def attained_off(found, share):
+    """One attained value, that of the first output's peak, differs by a share."""
+    upper, node = found.inner.upper.copy(), found.upper[0, :, 0].argmax()
+    upper[0, node, 0] *= 1 + share
+    return replace(found, inner=Ends(found.inner.lower, upper))
+
+
+def no_number(found):
+    values = found.between.copy()
+    values[7] = np.nan
+    return replace(found, between=values)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_agrees_with_motions_and_says_how_many(method):
+    found = motion(frame(), INPUTS, method=method)
+    assert found.facts["motions_tested"] >= 24
+    assert found.to_dataset().attrs["motions_tested"] == found.facts["motions_tested"]
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (narrower, "the proved|lie outside the proved"),
+        (straight, "`between`|the proved"),
+        (partial(attained_off, share=-0.01), "the attained upper bound of α = 0"),
+        (partial(attained_off, share=0.01), "outside the proved|the attained upper"),
+        (no_number, "nan|inf"),
+    ],
+)
+def test_a_fault_in_the_result_raises(monkeypatch, method, change, words):
+    planted(monkeypatch, method, change)
+    with pytest.raises(FailedError, match=words):
+        motion(frame(), INPUTS, method=method)
+
+
+def test_tables_of_the_dual_off_by_a_hundredth_raise(monkeypatch):
+    made = level.tables
+
+    def smaller(*given):
+        table = made(*given)
+        return replace(table, value={order: 0.99 * x for order, x in table.value.items()})
+
+    monkeypatch.setattr(level, "tables", smaller)
+    with pytest.raises(FailedError, match="the proof is wrong"):
+        motion(frame(), INPUTS, method=DualProof(gap=1e-3))
+
+
+def test_names_output_time_inputs_and_difference(monkeypatch):
+    planted(monkeypatch, METHODS[0], straight)
+    with pytest.raises(ContradictionError) as caught:
+        motion(frame(), INPUTS, method=METHODS[0])
+    text, table = str(caught.value), caught.value.table
+    assert text.startswith("the proof is wrong: ")
+    assert all(word in text for word in ("at t = ", "k1 = ", "m2 = ", ", by "))
+    assert list(table)[:2] == ["time [s]", "motion of q2 [m]"]
+    assert all(len(column) == 51 for column in table.values())
+
+
+def test_points_come_in_the_order_of_their_worth():
+    found = motion(frame(), INPUTS, method=METHODS[0])
+    trial = Trial(found, frame())
+    points = trial.points()
+    named = [found.upper_at[0, found.upper[0, :, o].argmax(), o] for o in (0, 1)]
+    named += [found.lower_at[0, found.lower[0, :, o].argmin(), o] for o in (0, 1)]
+    first = {tuple(point) for point in points[: len({tuple(x) for x in named})].tolist()}
+    assert first == {tuple(point) for point in np.array(named).tolist()}
+    assert [4e6, 1e3] in points.tolist()[:5]
+    lower, upper = trial.cuts[:, 0]
+    assert ((lower <= points) & (points <= upper)).all()
+    assert len(points) >= 24
+
+
+def test_inputs_without_width_are_tested_at_their_one_point():
+    found = motion(frame(), {"k1": Crisp(4e6)}, method=DualProof())
+    assert found.facts["motions_tested"] == 1
+
+
+def test_what_is_not_proved_is_not_tested(monkeypatch):
+    monkeypatch.setattr(propagation, "tested", lambda *given: pytest.fail("tested"))
+    assert "motions_tested" not in motion(frame(), INPUTS, method="quasi-monte-carlo").facts
