@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from alphacut.case.material import Cell, ImageCell, Mesh, ModulusSection, RadiusMap, RoundCell
+from alphacut.case.matrices import MatricesSection
 from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
 from alphacut.case.structure import Frame, Pendulum, Structure
@@ -37,6 +38,7 @@ class Content(Section):
     modulus: ModulusSection = ModulusSection()
     frame: Frame | None = None
     pendulum: Pendulum | None = None
+    matrices: MatricesSection | None = None
     study: tuple[Study, ...] = ()
     envelope: Envelope | None = None
     identify: Identify | None = None
@@ -74,8 +76,13 @@ class Content(Section):
     @property
     def structure(self) -> Structure | None:
         """The structure, with a stand-in for a modulus that is yet to be computed."""
-        section = self.frame or self.pendulum
+        section = self.structure_section
         return None if section is None else section.structure()
+
+    @property
+    def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
+        """The section of the structure, if the case has one."""
+        return self.frame or self.pendulum or self.matrices
 
     @model_validator(mode="after")
     def _stages(self) -> Self:
@@ -107,9 +114,10 @@ class Content(Section):
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return self
-        if structure is None or None not in (self.frame, self.pendulum):
-            value = None if structure is None else "beside [pendulum]"
-            raise RefusedError("frame", value, "one of [frame] and [pendulum]")
+        sections = [x for x in (self.frame, self.pendulum, self.matrices) if x is not None]
+        if structure is None or len(sections) > 1:
+            value = None if structure is None else f"beside {len(sections) - 1} more"
+            raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
         whole = self.frame is None or self.frame.is_whole or "modulus" in self.stages
         own = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         studies = {"envelope": own} | {f"study[{k}]": x for k, x in enumerate(self.study)}

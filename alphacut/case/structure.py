@@ -9,12 +9,13 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, ValidationInfo, model_validator
 
 from alphacut.case.types import Each, Modulus, Quantity, Section, case_file, text
-from alphacut.frame import Accelerogram, StoreyFrame
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, chosen, require
 from alphacut.io.problem import suggestion
 from alphacut.records.read import read_recording
@@ -45,14 +46,14 @@ STAND_IN = Crisp(2e10)
 
 @dataclass(frozen=True)
 class Structure:
-    """A storey frame or a pendulum.
+    """A storey frame, a structure from matrices or a pendulum.
 
     Args:
         model: The model at modal values.
         numbers: Every parameter, crisp or fuzzy, in SI.
     """
 
-    model: StoreyFrame | LagrangianSystem
+    model: StoreyFrame | MatrixStructure | LagrangianSystem
     numbers: Mapping[str, FuzzyNumber]
 
     @property
@@ -96,14 +97,27 @@ class Structure:
         for name in names:
             chosen(key, name, self.outputs)
 
-    def observing(self, key: str, outputs: tuple[str, ...]) -> StoreyFrame | LagrangianSystem:
-        """The model; of a storey frame with these outputs alone.
+    @property
+    def linear(self) -> StoreyFrame | MatrixStructure | None:
+        """The model if it is linear, else None."""
+        return None if isinstance(self.model, LagrangianSystem) else self.model
+
+    def observing(
+        self, key: str, outputs: tuple[str, ...]
+    ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
+        """The model; of a linear structure with these outputs alone.
 
         Raises:
             RefusedError: It has no such output.
         """
         if self.frame is None:
             self.require_outputs(key, outputs)
+            if isinstance(self.model, MatrixStructure):
+                rows: dict[str, Array] = {
+                    x: self.model.observed[x] for x in self.model.outputs if x in outputs
+                }
+                factors = {x: f for x, f in self.model.row_factors.items() if x in outputs}
+                return replace(self.model, observed=rows, row_factors=factors)
             return self.model
         try:
             return replace(self.frame, outputs=outputs)
@@ -117,7 +131,8 @@ class Structure:
         return flow_of(self.model, names, duration, step, integrator or "midpoint")
 
 
-def _record(value: object, info: ValidationInfo) -> Accelerogram:
+def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
+    """Record of a file that the case names."""
     return read_recording(case_file(value, info)).accelerogram()
 
 
@@ -160,7 +175,7 @@ class Frame(Section):
     )
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
     rayleigh_stiffness: Delay = Field(default=ZERO, description="factor b of a damping a M + b K")
-    accelerogram: Annotated[Accelerogram, text(_record)] | None = Field(
+    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = Field(
         default=None,
         description="file of the ground's acceleration; motion is relative to it",
     )

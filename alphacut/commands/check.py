@@ -11,7 +11,7 @@ from alphacut.case.content import Content
 from alphacut.case.keys import quantity_of
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, answer, read
-from alphacut.frame import StoreyFrame
+from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.quantity import engineering
@@ -43,13 +43,15 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     return 0
 
 
-def structure(content: Content) -> StoreyFrame | None:
+def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     """The linear structure at the modal values; None where none vibrates.
 
     A modulus that is yet to be computed is that of the series at the modal values.
     """
-    if "envelope" not in content.stages or content.frame is None:
+    if "envelope" not in content.stages or content.structure_section is None:
         return None
+    if content.frame is None:
+        return content.structure_section.structure().linear
     number = None
     if not content.frame.is_whole:
         if content.round is None or content.radius is None or not content.round.square:

@@ -170,6 +170,21 @@ def fuzzy(value: object, si: str) -> FuzzyNumber:
     return SHAPES[len(values) - 1](*values)
 
 
+def fuzzy_of_any_unit(value: object) -> FuzzyNumber:
+    """A crisp or fuzzy quantity of any kind in `QUANTITIES`, in SI.
+
+    Raises:
+        ValueError: It is none.
+    """
+    reasons = []
+    for si in QUANTITIES:
+        try:
+            return fuzzy(value, si)
+        except ValueError as error:
+            reasons.append(str(error))
+    raise ValueError(reasons[0])
+
+
 def engineering(value: float, si: str, *, digits: int = 4) -> str:
     """A value in `si` for people, with a prefix: ``−3.590 MN``."""
     short = f"{value:.{digits}g}"

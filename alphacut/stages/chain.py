@@ -86,7 +86,7 @@ class Chain:
     def structure(self, number: FuzzyNumber | None) -> Structure:
         """The structure with a modulus in Pa, None for its own."""
         content = self.content
-        section = content.frame or content.pendulum
+        section = content.structure_section
         if section is None or content.envelope is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
         young = number is not None or content.frame is None or content.frame.is_whole

@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.frame.dual.expansion import Expansion, product, stacked
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.matrix import MatrixStructure, Terms
+from alphacut.frame.structures.matrix import Factor, MatrixStructure, Terms, value_of
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
@@ -112,7 +112,7 @@ def _(system: MatrixStructure, p: Inputs) -> Classical:
         _total(system.mass, p, n),
         _total(system.stiffness, p, n),
         np.array([row[:n] + row[n:] for row in rows]),
-        spread(nothing + 1.0, np.ones(len(rows))),
+        stacked([nothing + _value(system.row_factors.get(x, 1.0), p) for x in system.observed]),
         of_speed.astype(int),
         spread(nothing + 1.0, np.array(start)),
         np.ones(n) if system.pattern is None else np.asarray(system.pattern, float),
@@ -164,18 +164,25 @@ def _of_modes(ratios: list[Expansion], n: int, like: Expansion) -> Expansion:
     return stacked(each * n if len(each) == 1 else each)
 
 
+def _value(factor: Factor | str | float, p: Inputs) -> Expansion | float:
+    """Value of a factor over the box.
+
+    Raises:
+        UnprovedError: It is no arithmetic of the inputs.
+    """
+    try:
+        return value_of(factor, p)
+    except (TypeError, AttributeError) as failure:
+        raise UnprovedError(
+            f"a factor is not arithmetic ({failure})", "write it with + − * and powers"
+        ) from None
+
+
 def _total(terms: Terms, p: Inputs, n: int) -> Expansion:
     """Sum of arrays times factors, V = (n, n)."""
     out = spread(next(iter(p.values())) * 0.0, np.zeros((n, n)))
     for factor, array in terms:
-        try:
-            value = (
-                factor(p) if callable(factor) else p[factor] if isinstance(factor, str) else factor
-            )
-        except (TypeError, AttributeError) as failure:
-            raise UnprovedError(
-                f"a factor is not arithmetic ({failure})", "write it with + − * and powers"
-            ) from None
+        value = _value(factor, p)
         out = out + (spread(value, array) if isinstance(value, Expansion) else value * array)
     return out
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.calculus.jet import Jet, concatenate, variables
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import ratio_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real, require, require_numbers
+from alphacut.fuzzy.refused import chosen, real, require, require_numbers
 
 KINDS = ("mass", "damping", "stiffness")
 Factor = Callable[[Mapping[str, Any]], Any]
@@ -41,6 +41,8 @@ class MatrixStructure:
         pattern: ι, how the unknowns move rigidly with the ground, shape (n,); ones when None.
         ratios: The damping ratio ζ of all modes, a number or the name of a parameter; added to
             `damping`, it follows the parameters through the modes. Empty for none.
+        row_factors: Factor of an output's row by the output's name, as that of a member force; 1
+            where none is given.
 
     Raises:
         RefusedError: A shape does not fit, a number is not finite, a factor names no parameter, an
@@ -58,6 +60,7 @@ class MatrixStructure:
     ground: Accelerogram | None = None
     pattern: Array | None = None
     ratios: Sequence[str | float] = ()
+    row_factors: Mapping[str, Factor | str | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
@@ -68,6 +71,9 @@ class MatrixStructure:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
         self._require_vectors()
+        for name, factor in self.row_factors.items():
+            chosen("row_factors", name, self.observed)
+            self._require_factor(f"observed: {name}", factor)
         modal = sum(float(value_of(f, self.parameters)) * A for f, A in self.mass)
         positive = np.linalg.eigvalsh(modal).min() > 0
         require(positive, "mass", "not positive definite", "a mass for every unknown")
@@ -95,6 +101,15 @@ class MatrixStructure:
         pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
         require(pair, f"term of {kind}", type(term).__name__, "pairs (factor, array)")
         factor, array = term
+        self._require_factor(kind, factor)
+        return factor, self._symmetric(kind, array)
+
+    def _require_factor(self, kind: str, factor: Factor | str | float) -> None:
+        """Refuses a factor that is no arithmetic of the parameters.
+
+        Raises:
+            RefusedError: It is not.
+        """
         names, values = list(self.parameters), np.array([list(self.parameters.values())], float)
         try:
             value = value_of(factor, variables(values, names, names[:1]))
@@ -103,7 +118,6 @@ class MatrixStructure:
         allowed = "arithmetic to one number, of "
         number = isinstance(value, Jet | float | int | np.number)
         require(number, f"factor of {kind}", repr(value), allowed + ", ".join(names))
-        return factor, self._symmetric(kind, array)
 
     def _symmetric(self, kind: str, value: Any) -> Array:
         """The array, also a sparse one, without the round-off that parts its triangles."""
@@ -135,14 +149,10 @@ class MatrixStructure:
         like = next(iter(p.values()))
         n, samples = self.size, like.value.size
 
-        def lifted(factor: Factor | str | float) -> Jet:
-            value = value_of(factor, p)
-            return value if isinstance(value, Jet) else like.like(np.full(samples, float(value)))
-
         def total(terms: Terms) -> Jet:
             out = like.like(np.zeros((samples, n, n)))
             for factor, array in terms:
-                out = out + lifted(factor)[:, None, None] * array
+                out = out + lifted(factor, p)[:, None, None] * array
             return out
 
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
@@ -150,7 +160,7 @@ class MatrixStructure:
         rigid = np.ones(n) if self.pattern is None else np.asarray(self.pattern, float)
         mass, damping, stiffness = (total(getattr(self, kind)) for kind in KINDS)
         if self.ratios:
-            damping = damping + ratio_damping(mass, stiffness, lifted(self.ratios[0]))
+            damping = damping + ratio_damping(mass, stiffness, lifted(self.ratios[0], p))
         return Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
@@ -159,7 +169,19 @@ class MatrixStructure:
         rows = np.zeros((len(self.observed), 2 * self.size))
         for k, row in enumerate(self.observed.values()):
             rows[k, : len(row)] = row
-        return like.like(np.tile(rows, (like.value.size, 1, 1)))
+        if not self.row_factors:
+            return like.like(np.tile(rows, (like.value.size, 1, 1)))
+        factors = concatenate([lifted(self._row_factor(x), p)[:, None] for x in self.observed], -1)
+        return factors[:, :, None] * rows
+
+    def _row_factor(self, output: str) -> Factor | str | float:
+        return self.row_factors.get(output, 1.0)
+
+
+def lifted(factor: Factor | str | float, p: Mapping[str, Jet]) -> Jet:
+    """A factor's value at S parameter sets as a jet, shape (S,)."""
+    value, like = value_of(factor, p), next(iter(p.values()))
+    return value if isinstance(value, Jet) else like.like(np.full(like.value.size, float(value)))
 
 
 def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:

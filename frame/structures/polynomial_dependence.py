@@ -60,6 +60,8 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
             raise UnprovedError(f"{what}, and is known to be {own.range or 'finite'}")
     if isinstance(system, StoreyFrame):
         return _of_storey_frame(system, box)
+    if any(map(callable, system.row_factors.values())):
+        raise UnprovedError("an output has a factor that is a function of the parameters")
     for kind in ("mass", "damping", "stiffness"):
         for factor, array in getattr(system, kind):
             if callable(factor):

@@ -1,0 +1,167 @@
+"""Section on a structure from the matrices of a frame program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+
+from alphacut.case.structure import Critical, Structure, read_accelerogram
+from alphacut.case.types import Section, Some, after, case_file, text, unlike
+from alphacut.frame import Accelerogram, MatrixStructure
+from alphacut.frame.structures.monomial import Monomial
+from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.arrays import read_array
+from alphacut.io.quantity import fuzzy_of_any_unit
+
+RATIO = "zeta"
+"""Name of the parameter that a damping ratio is."""
+
+
+def _array_file(value: object, info: ValidationInfo) -> Array:
+    """Array of a file that the case names, as "K.npz" or "K.npz:columns"."""
+    name, _, member = str(value).partition(":") if isinstance(value, str) else ("", "", "")
+    return read_array(case_file(name or value, info), member)
+
+
+def _term(value: object, info: ValidationInfo) -> tuple[Monomial, Array]:
+    """Factor and array of a pair of texts."""
+    match value:
+        case [str(factor), str(file)]:
+            return Monomial.parse(factor), _array_file(file, info)
+    raise RefusedError("", value, 'a pair [factor, file], as ["Ec*I", "columns.mtx"]')
+
+
+def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
+    try:
+        return fuzzy_of_any_unit(value)
+    except ValueError as error:
+        raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
+
+
+Term = Annotated[tuple[Monomial, Array], text(_term)]
+Vector = Annotated[Array, text(_array_file)]
+Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
+
+
+class ObservedRow(Section):
+    """One output of a structure from matrices: a row that acts on the unknowns."""
+
+    unit: str = Field(default="m", description="SI unit of the output, as m, N or N*m")
+    row: dict[str, float] | None = Field(
+        default=None, description='entries of the row by unknown, as {"5.x" = 1}'
+    )
+    file: Vector | None = Field(default=None, description="the row as a file with one vector")
+    factor: Annotated[Monomial, text(lambda x, _: Monomial.parse(str(x)))] = Field(
+        default=Monomial(1.0, ()), description='factor of the row, as "E*I*l^-2"'
+    )
+
+
+class MatricesSection(Section):
+    """Linear structure from matrices in SI units, each times a product of powers of parameters.
+
+    A modulus that a stage computes takes the place of parameter E.
+    """
+
+    unknowns: Annotated[tuple[str, ...], Some, after(unlike)] = Field(
+        description="names of the unknowns in the order of the matrices, as NODE.DIRECTION"
+    )
+    parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
+    mass: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of M")
+    stiffness: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of K")
+    damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
+    damping_ratio: Critical | None = Field(
+        default=None, description="damping over the critical one, of all modes"
+    )
+    direction: str = Field(
+        default="", description="direction of the ground: it moves all unknowns NODE.DIRECTION"
+    )
+    pattern: dict[str, float] | None = Field(
+        default=None, description="how unknowns move with the ground, in place of direction"
+    )
+    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] = Field(
+        description="file of the ground's acceleration; motion is relative to it"
+    )
+    outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
+
+    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
+        """The structure, with a Young's modulus in Pa in place of its own parameter E.
+
+        Raises:
+            RefusedError: The matrices make no structure.
+        """
+        try:
+            numbers = self._numbers(modulus)
+            return Structure(self._model(numbers), numbers)
+        except RefusedError as error:
+            key = f"matrices: {error.key}"
+            raise RefusedError(key, error.value, error.allowed, error.cure) from None
+
+    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+        numbers = dict(self.parameters)
+        if self.damping_ratio is not None:
+            numbers[RATIO] = self.damping_ratio
+        if modulus is not None and "E" in numbers:
+            numbers["E"] = modulus
+        return numbers or {"scale": Crisp(1.0)}
+
+    def _model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
+        rows: dict[str, Array] = {
+            Output(name, row.unit): self._row(name, row) for name, row in self.outputs.items()
+        }
+        return MatrixStructure(
+            {name: number.modal for name, number in numbers.items()},
+            mass=self._terms(self.mass),
+            stiffness=self._terms(self.stiffness),
+            damping=self._terms(self.damping),
+            observed=rows,
+            ground=self.accelerogram,
+            pattern=self._pattern(),
+            ratios=() if self.damping_ratio is None else (RATIO,),
+            row_factors={name: self.outputs[name].factor.simplest for name in rows},
+        )
+
+    def _terms(
+        self, terms: tuple[tuple[Monomial, Array], ...]
+    ) -> list[tuple[Monomial | str | float, Array]]:
+        return [(factor.simplest, array) for factor, array in terms]
+
+    def _row(self, name: str, row: ObservedRow) -> Array:
+        if row.file is not None:
+            return np.ravel(row.file)
+        return self._vector(f"outputs.{name}.row", row.row or {})
+
+    def _vector(self, key: str, entries: Mapping[str, float]) -> Array:
+        """A vector over the unknowns from its entries by name."""
+        places = {name: place for place, name in enumerate(self.unknowns)}
+        vector = np.zeros(len(places))
+        for name, value in entries.items():
+            allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
+            require(name in places, f"matrices.{key}", name, allowed)
+            vector[places[name]] = value
+        return vector
+
+    def _pattern(self) -> Array:
+        if self.pattern is not None:
+            return self._vector("pattern", self.pattern)
+        ends = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
+        return np.array(ends)
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        """Refuses rows that are given twice or not at all, and a record without a direction."""
+        for name, output in self.outputs.items():
+            given = (output.row is None) != (output.file is None)
+            require(given, f"matrices.outputs.{name}", None, "one of row and file")
+        require(bool(self.outputs), "matrices.outputs", None, "one output or more")
+        ends = sorted({name.rpartition(".")[2] for name in self.unknowns})
+        allowed = f"one of {', '.join(ends[:8])}, or pattern"
+        moved = bool(self._pattern().any())
+        require(moved, "matrices.direction", self.direction or None, allowed)
+        self.structure()
+        return self

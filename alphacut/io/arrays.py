@@ -1,0 +1,63 @@
+"""Arrays from the files that frame programs write: Matrix Market, NumPy and CSV."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, require
+
+ENDINGS = (".mtx", ".npz", ".npy", ".csv")
+ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers"
+
+
+def read_array(path: Path, name: str = "") -> Array:
+    """Array of a file; sparse ones become dense.
+
+    Args:
+        path: The file.
+        name: Name of the array in a .npz file; may be left out where there is one.
+
+    Raises:
+        RefusedError: The file cannot be read, or holds something else.
+    """
+    if path.suffix.lower() not in ENDINGS:
+        raise RefusedError(path.name, f"of type {path.suffix or 'none'}", ALLOWED)
+    try:
+        array = np.asarray(_read(path, name))
+    except RefusedError:
+        raise
+    except Exception as error:  # whatever the readers of SciPy and NumPy raise
+        reason = " ".join(str(error).split())[:80]
+        raise RefusedError(path.name, reason or type(error).__name__, ALLOWED) from None
+    real = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
+    require(real and array.ndim in (1, 2) and array.size > 0, path.name, "no such array", ALLOWED)
+    return array.astype(float)
+
+
+def _read(path: Path, name: str) -> Array:
+    import scipy.io
+    import scipy.sparse
+
+    kind = path.suffix.lower()
+    if kind == ".mtx":
+        array = scipy.io.mmread(path)
+        return np.asarray(array.toarray() if scipy.sparse.issparse(array) else array)
+    if kind == ".csv":
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in csv.reader(file) if row and not row[0].startswith("#")]
+        return np.array([[float(cell) for cell in row] for row in rows])
+    if kind == ".npy":
+        return np.asarray(np.load(path, allow_pickle=False))
+    with np.load(path, allow_pickle=False) as file:
+        names = file.files
+        if {"format", "data", "shape"} <= set(names):
+            return np.asarray(scipy.sparse.load_npz(path).toarray())
+        chosen = [x for x in names if not name or x == name]
+        if len(chosen) != 1:
+            what = f"array {name or 'not named'}"
+            raise RefusedError(path.name, what, f"{path.name}:NAME, one of {', '.join(names)}")
+        return np.asarray(file[chosen[0]])

@@ -1,0 +1,126 @@
+"""Structures from the matrices of a frame program: factors, unknowns by name, files, refusals."""
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+
+from alphacut.case.load import load
+from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.structures.monomial import Monomial
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.problem import BadInput
+
+CASE = """
+title = "Two storeys as matrices"
+stages = ["envelope"]
+[matrices]
+unknowns = ["1.x", "2.x"]
+mass = [["m", "masses.csv"]]
+stiffness = [["12*E*I*l^-3", "lower.mtx"], ["2*k2", "upper.npz:springs"]]
+damping_ratio = "2 %"
+direction = "x"
+accelerogram = "record.csv"
+[matrices.parameters]
+m = "20 t"
+E = "30 GPa ± 5 %"
+I = "2e-4 m^4"
+l = "3 m"
+k2 = "10 MN/m"
+[matrices.outputs]
+roof = { row = { "2.x" = 1.0 } }
+shear = { row = { "1.x" = 1.0 }, unit = "N", factor = "12*E*I*l^-3" }
+[envelope]
+fuzzy = ["E"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.02 s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    np.savetxt(tmp_path / "masses.csv", np.diag([1.0, 0.5]), delimiter=",")
+    scipy.io.mmwrite(tmp_path / "lower.mtx", scipy.sparse.coo_matrix([[1.0, 0.0], [0.0, 0.0]]))
+    springs = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    np.savez(tmp_path / "upper.npz", springs=springs, other=np.eye(2))
+    times = 0.02 * np.arange(40)
+    rows = [f"{t:.2f},{np.sin(9 * t):.8f}" for t in times]
+    (tmp_path / "record.csv").write_text("time [s],acceleration [m/s^2]\n" + "\n".join(rows))
+    return tmp_path
+
+
+def loaded(folder, old="", new=""):
+    path = folder / "case.toml"
+    path.write_text(CASE.replace(old, new), encoding="utf-8")
+    return load(path).content
+
+
+def test_matrices_and_the_storey_frame_move_alike(folder):
+    structure = loaded(folder).structure
+    options = {"duration": 1.0, "step": 0.02, "alpha": (0.0,), "progress": False}
+    by_matrices = envelope(structure.model, {"E": 30e9}, **options)
+    frame = StoreyFrame(
+        masses=[20e3, 10e3],
+        stiffness=[12 * 30e9 * 2e-4 / 27, 20e6],
+        damping_ratio=0.02,
+        ground=structure.model.ground,
+        outputs=("q2", "shear1"),
+    )
+    by_storeys = envelope(frame, {"k2": 20e6}, **options)
+    peak = abs(by_storeys.upper).max((0, 1))
+    for end in ("lower", "upper"):
+        difference = abs(getattr(by_matrices, end) - getattr(by_storeys, end)).max((0, 1))
+        assert (difference < 1e-3 * peak).all()
+
+
+def test_a_force_has_the_factor_of_its_member(folder):
+    structure = loaded(folder).structure
+    options = {"duration": 1.0, "step": 0.02, "alpha": (0.0,), "progress": False}
+    bounds = envelope(structure.model, structure.inputs(["E"]), **options)
+    for modulus in np.linspace(28.5e9, 31.5e9, 5):
+        fixed = envelope(structure.model, {"E": modulus}, **options)
+        assert (bounds.lower[0] <= fixed.upper[0] + 1e-9 * abs(fixed.upper[0]).max()).all()
+        assert (fixed.lower[0] <= bounds.upper[0] + 1e-9 * abs(fixed.upper[0]).max()).all()
+    # drift and force of the first storey: N = 12 E I / l³ q1 at every E
+    assert abs(bounds.upper[0, :, 1]).max() > 1e3
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"lower.mtx"', '"nothing.mtx"', "a file, from the folder"),
+        ("upper.npz:springs", "upper.npz", "one of springs, other"),
+        ("12*E*I*l^-3", "sin(E)", "a product of powers"),
+        ("12*E*I*l^-3", "E*J", "factor"),
+        ('row = { "2.x"', 'row = { "9.x"', "matrices.outputs.roof.row"),
+        ('direction = "x"', 'direction = "y"', "matrices.direction"),
+        ('"1.x", "2.x"]\nmass', '"1.x", "2.x", "3.x"]\nmass', "of shape"),
+        ('m = "20 t"', 'm = "20 parsec fuzz"', "a quantity"),
+        ('{ row = { "2.x" = 1.0 } }', "{ }", "one of row and file"),
+    ],
+)
+def test_what_makes_no_structure_is_one_line(folder, old, new, message):
+    with pytest.raises(BadInput) as caught:
+        loaded(folder, old, new)
+    lines = str(caught.value).splitlines()
+    assert any(message in line for line in lines), lines
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1", 1.0), ("2*a", 6.0), ("a^2*b**-1", 4.5), ("b/a^2", 2 / 9), ("1e-3 * a / b", 1.5e-3)],
+)
+def test_monomials_are_read(text, value):
+    assert Monomial.parse(text)({"a": 3.0, "b": 2.0}) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("text", ["", "a+b", "a^b", "(a)", "a**", "__import__('os')", "a*", "a b"])
+def test_other_expressions_are_refused(text):
+    with pytest.raises(RefusedError):
+        Monomial.parse(text)
+
+
+def test_simple_factors_stay_polynomials():
+    assert Monomial.parse("3").simplest == 3.0
+    assert Monomial.parse("E").simplest == "E"
