@@ -64,18 +64,30 @@ class Study:
     def used(self, sample: AreaWeighted) -> AreaWeighted:
         """The sample with cells of discs no tighter than `Shape.reach`, unless limits are set.
 
+        Cells of spheres that are tighter are cut off by the limits.
+
         Raises:
-            RefusedError: More than `MOST_CAPPED` of the area lies in cells tighter than that.
+            RefusedError: More than `MOST_CAPPED` of the area or volume lies in cells tighter than
+                that.
         """
-        reach = self.shape.reach
-        if self.limits or self.shape == SPHERES:
+        if self.limits:
             return sample
-        share = 1 - float(sample.cdf(reach))
-        value = f"{share:.1%} of the area in cells tighter than r_n = {reach:g}"
-        allowed = f"shares up to {MOST_CAPPED:.0%}, since a disc fills its square cell at 1"
-        cure = "take an image of them as the cell (cell.image), or set limits"
-        require(share <= MOST_CAPPED, "particles", value, allowed, cure)
-        return sample.capped(reach)
+        shape, share = self.shape, 1 - float(sample.cdf(self.shape.reach))
+        value = f"{share:.1%} of the {shape.cells} in cells tighter than r_n = {shape.reach:g}"
+        allowed = f"shares up to {MOST_CAPPED:.0%}, since particles touch at r_n = 1"
+        require(share <= MOST_CAPPED, "particles", value, allowed, self._cure)
+        return sample if shape == SPHERES else sample.capped(shape.reach)
+
+    @property
+    def _cure(self) -> str:
+        """What to do with particles too dense for cells of one particle."""
+        fraction = (
+            f"{self.source.packing.fraction:g}" if isinstance(self.source, Simulated) else "…"
+        )
+        fixed = f"set cell.fraction = {fraction} in place of [microstructure]"
+        if self.shape == SPHERES:
+            return fixed
+        return f"take an image of them as the cell (cell.image), set limits, or {fixed}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +127,12 @@ class Microstructure:
     def share_beyond(self) -> float:
         """Share of area or volume in cells tighter than `Shape.reach`: counted as that, or lost."""
         return 0.0 if self.study.limits else 1 - float(self.sample.cdf(self.study.shape.reach))
+
+    @property
+    def stated_fraction(self) -> float | None:
+        """Share of area or volume that the packings are specified with; None of measured ones."""
+        source = self.study.source
+        return source.packing.fraction if isinstance(source, Simulated) else None
 
     @property
     def fraction_of_map(self) -> float:

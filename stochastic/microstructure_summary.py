@@ -29,6 +29,7 @@ def summary(result: Microstructure) -> dict[str, object]:
         f"{shape.cells}_fraction": float(np.mean([one.fraction for one in particles])),
         f"{shape.cells}_fraction_of_cells": cells,
         f"mean_{shape.cells}_fraction_of_map": map_,
+        "fraction_of_case": result.stated_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
         "share_capped": result.share_beyond,
@@ -103,11 +104,13 @@ def fragment(numbers: Mapping[str, Any]) -> str:
         numbers: Those of `summary`.
     """
     cells = "volume" if "mean_volume_fraction_of_map" in numbers else "area"
+    stated = numbers["fraction_of_case"]
+    beside = "" if stated is None else f"; of the case: {stated:g}"
     lines = [
         f"[radius]  # from {numbers['cells']} cells; the limits keep"
         f" {numbers['share_kept']:.4%} of their {cells}",
         f"# {cells} fraction of this map at its modal values:"
-        f" {numbers[f'mean_{cells}_fraction_of_map']:.4f}",
+        f" {numbers[f'mean_{cells}_fraction_of_map']:.4f}{beside}",
     ]
     for name, value in numbers["radius"].items():
         ends = [f"{x:.10g}" for x in (value if isinstance(value, list) else [value])]

@@ -6,7 +6,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from alphacut.case.material import Cell, ImageCell, Mesh, ModulusSection, RadiusMap, RoundCell
+from alphacut.case.material import (
+    AnyRadius,
+    Cell,
+    ImageCell,
+    Mesh,
+    ModulusSection,
+    RadiusMap,
+    RoundCell,
+)
 from alphacut.case.matrices import MatricesSection
 from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
@@ -63,15 +71,27 @@ class Content(Section):
         return self.cell if isinstance(self.cell, RoundCell) else None
 
     @property
-    def round_cell(self) -> tuple[RadiusMap, RoundCell]:
+    def stated_fraction(self) -> float | None:
+        """Share of the cell that the particles take as the case says, at its modal value."""
+        if self.microstructure is not None and self.microstructure.packing is not None:
+            return self.microstructure.packing.fraction
+        if self.round is None or self.round.fraction is None:
+            return None
+        return float(self.round.fraction.modal)
+
+    @property
+    def round_cell(self) -> tuple[AnyRadius, RoundCell]:
         """The radius map and the phases of a round particle.
 
         Raises:
             RefusedError: There is none.
         """
-        if self.radius is None or self.round is None:
-            raise RefusedError("radius", None, "sections [radius] and [cell]")
-        return self.radius, self.round
+        if self.round is None:
+            raise RefusedError("cell", None, "a section [cell] with a particle")
+        radius = self.radius or self.round.fraction_map
+        if radius is None:
+            raise RefusedError("radius", None, "a section [radius], or cell.fraction")
+        return radius, self.round
 
     @property
     def structure(self) -> Structure | None:
@@ -87,7 +107,8 @@ class Content(Section):
     @model_validator(mode="after")
     def _stages(self) -> Self:
         """Refuses stages without their sections."""
-        known = self.picture is not None or "microstructure" in self.stages
+        fraction = self.round is not None and self.round.fraction is not None
+        known = self.picture is not None or "microstructure" in self.stages or fraction
         needs = {
             "microstructure": ("microstructure",),
             "modulus": ("cell",) if known else ("radius", "cell"),
@@ -103,6 +124,13 @@ class Content(Section):
                 for x in needs[stage]
             ),
             (one, "radius", "beside stage microstructure", "one of them"),
+            (not fraction or self.radius is None, "radius", "beside cell.fraction", "one of them"),
+            (
+                not fraction or "microstructure" not in self.stages,
+                "cell.fraction",
+                "beside stage microstructure",
+                "one of them",
+            ),
             (method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell"),
         ):
             require(holds, key, value, allowed)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, PlainValidator, Tag, model_validator
 
+from alphacut.case.fraction_map import FractionMap
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
@@ -26,8 +27,9 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.quantity import number
 from alphacut.rve.cell import VoigtPhase
-from alphacut.rve.mesh.outline import Ellipse
+from alphacut.rve.mesh.outline import Ellipse, circle, reach
 from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
@@ -121,6 +123,11 @@ class RoundCell(Section):
     inclusion_poisson: Ratio | None = Field(
         default=None, description="Poisson's ratio of the particle, beside its modulus"
     )
+    fraction: Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)] | None = Field(
+        default=None,
+        description="share of area, below π/4, or of volume of spheres, below π/6, that particles"
+        " of one size take; in place of [radius]",
+    )
 
     @property
     def phases(self) -> dict[str, FuzzyNumber]:
@@ -153,6 +160,16 @@ class RoundCell(Section):
         return (*(["series"] if self.square else []), "auto", "slices", "prism")
 
     @property
+    def shape(self) -> Shape:
+        """Kind of the particles, discs across fibres."""
+        return SPHERES if self.particles == "spheres" else DISCS
+
+    @property
+    def fraction_map(self) -> FractionMap | None:
+        """The radius map of particles of one size; None where `fraction` is missing."""
+        return None if self.fraction is None else FractionMap(self.fraction, self.shape)
+
+    @property
     def fibres(self) -> bool:
         """True for round fibres of an isotropic material."""
         return self.square and self.particles == "cylinders"
@@ -167,6 +184,11 @@ class RoundCell(Section):
         require(isotropic == ratio, "cell.inclusion_poisson", value, allowed)
         solid = isotropic or self.particles != "spheres"
         require(solid, "cell.inclusion_modulus", "a plane stiffness", "Young's modulus of spheres")
+        if self.fraction is not None:
+            touching = float(self.shape.shares(1 / reach(self.outline or circle)))
+            most = self.fraction.support.upper
+            allowed = f"values below {touching:.6g}, where particles touch"
+            require(most < touching, "cell.fraction", f"{most:g}", allowed)
         return self
 
 
@@ -211,6 +233,8 @@ class ImageCell(Section):
         return self
 
 
+AnyRadius = RadiusMap | FractionMap
+"""The random radius of a case, of [radius] or of cell.fraction."""
 Cell = Annotated[
     Annotated[RoundCell, Tag("<round>")] | Annotated[ImageCell, Tag("<image>")],
     Discriminator(lambda table: "<image>" if "image" in table else "<round>"),

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.case.material import Mesh, RadiusMap, RoundCell
+from alphacut.case.material import AnyRadius, Mesh, RoundCell
 from alphacut.commands.options import Command, add_common, answer, read
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
@@ -48,7 +48,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)
     result = cell.solve(radius, phases, model)
     cell.require_tolerance(result.error, content.modulus.tolerance)
-    document = {**cell.document(result), "references": cell.references(radius, phases)}
+    references = cell.references(radius, phases, content.stated_fraction)
+    cell.require_bounds((result.modulus, result.modulus), references, phases.particles)
+    document = {**cell.document(result), "references": references}
     if options.cross_check:
         method, methods = options.cross_check, {*phases.methods} - {"auto", result.method}
         require(method in methods, "--cross-check", method, ", ".join(sorted(methods)))
@@ -77,7 +79,7 @@ def difference(first: Homogenised, second: Homogenised, tolerance: float) -> flo
     return gap
 
 
-def export(radius: RadiusMap, phases: RoundCell, mesh: Mesh, path: Path) -> Document:
+def export(radius: AnyRadius, phases: RoundCell, mesh: Mesh, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns counts."""
     from alphacut.export.mesh import cell_fields, write_mesh
 

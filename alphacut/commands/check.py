@@ -54,11 +54,13 @@ def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
         return content.structure_section.structure().linear
     number = None
     if not content.frame.is_whole:
-        if content.round is None or content.radius is None or not content.round.square:
+        if content.round is None or not content.round.square:
+            return None
+        if content.radius is None and content.round.fraction is None:
             return None
         quick = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
         model = model_of(content.round, content.mesh, quick)
-        number = Crisp(solve(content.radius, content.round, model).modulus)
+        number = Crisp(solve(*content.round_cell, model).modulus)
     return content.frame.structure(number).frame
 
 

@@ -170,6 +170,10 @@ class Page:
         if name == "microstructure":
             count, kind = part.get("discs", part.get("spheres")), part["particles"]
             yield f"{count:,} {kind} in {part['packings']} sections or cubes."
+            cells = "volume" if kind == "spheres" else "area"
+            stated, mapped = part["fraction_of_case"], part[f"mean_{cells}_fraction_of_map"]
+            beside = "" if stated is None else f"; the case says {stated:.4g}"
+            yield f"Of the {cells} of the cells the map's particles take {mapped:.4f}{beside}."
         elif name == "image":
             yield "The bounds are those of the image as it was segmented, in plane strain."
             shares = (f"{x} {share:.1%}" for x, share in part["fractions"].items())

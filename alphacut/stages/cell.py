@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
+from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
@@ -31,6 +31,8 @@ SHARE = 0.4
 """Of the tolerance, for the series at each θ and again for its rule in θ."""
 SPHERES = 1e-5
 """Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
+SLACK = 5e-3
+"""Relative distance of E from the bounds that is allowed: packings meet a fraction to 0.5 %."""
 Solve = Callable[..., Sequence[Homogenised]]
 """A model of the cell: from radius map, matrix and inclusions to one result for each of these."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
@@ -86,34 +88,40 @@ def _model(
     return PrismModel(mesh.size, mesh.layers, outline=outline, **elements).solve
 
 
-def inputs_of(radius: RadiusMap, cell: RoundCell) -> dict[str, FuzzyNumber]:
+def inputs_of(radius: AnyRadius, cell: RoundCell) -> dict[str, FuzzyNumber]:
     """Inputs of the cell by name, crisp or fuzzy, in SI."""
     return radius.numbers | cell.phases
 
 
-def cell_at(values: Mapping[str, float], radius: RadiusMap, cell: RoundCell) -> Cell:
+def cell_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell) -> Cell:
     """The cell at crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
     inclusion = cell.stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
     return Cell(matrix, inclusion, radius.at(values), cell.outline or circle)
 
 
-def modal_cell(radius: RadiusMap, cell: RoundCell) -> Cell:
+def modal_cell(radius: AnyRadius, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
     return cell_at(values, radius, cell)
 
 
-def solve(radius: RadiusMap, cell: RoundCell, model: Solve) -> Homogenised:
+def solve(radius: AnyRadius, cell: RoundCell, model: Solve) -> Homogenised:
     """The cell's result at the modal values of its inputs."""
     modal = modal_cell(radius, cell)
     return model(modal.radius, modal.matrix, [modal.inclusion])[0]
 
 
-def references(radius: RadiusMap, cell: RoundCell) -> Document:
+def references(radius: AnyRadius, cell: RoundCell, stated: float | None = None) -> Document:
     """Fraction of the particles, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E in GPa.
 
     They are of the modal inputs; the fraction alone of particles that are not round and isotropic.
+
+    Args:
+        radius: Random radius.
+        cell: Phases.
+        stated: Fraction that the case states, of which bounds and estimate are; None: that of the
+            map.
     """
     modal = modal_cell(radius, cell)
     map_of, matrix, inclusion = modal.radius, modal.matrix, modal.inclusion
@@ -122,6 +130,8 @@ def references(radius: RadiusMap, cell: RoundCell) -> Document:
     share = np.asarray(rule.mean(volume_fraction(radii) if spheres else np.pi / 4 * radii**2))
     if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or not modal.square:
         return {"fraction": float(share)}
+    beside = {} if stated is None else {"fraction_of_case": stated}
+    fraction, share = float(share), share if stated is None else np.asarray(stated)
     if spheres:
         ends = space.hashin_shtrikman(share, matrix, inclusion).T
         moduli = [_young(*k) for k in (*ends, space.mori_tanaka(share, matrix, inclusion))]
@@ -130,7 +140,8 @@ def references(radius: RadiusMap, cell: RoundCell) -> Document:
         whole, _, shear = plane.mori_tanaka(share, matrix, inclusion)
         moduli = [_across(*k) for k in (*ends, (whole / 2, shear))]
     return {
-        "fraction": float(share),
+        "fraction": fraction,
+        **beside,
         "hashin_shtrikman_E_GPa": [moduli[0] / GPA, moduli[1] / GPA],
         "mori_tanaka_E_GPa": moduli[2] / GPA,
     }
@@ -195,6 +206,31 @@ def declared_errors(result: Homogenised) -> Document | None:
         modulus, nu = result.estimated_error * result.modulus, result.poisson_error
         s11, s12 = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA}}
+
+
+def require_bounds(ends: tuple[float, float], bounds: Document, particles: str) -> None:
+    """Requires E of spheres within the Hashin–Shtrikman bounds of the fraction that a case states.
+
+    A map may hold another fraction, where cells as tight as no cube are cut off, and an average
+    over cells of unlike spheres is no bound either.
+
+    Args:
+        ends: Least and greatest E at the modal inputs, in Pa.
+        bounds: Of `references`.
+        particles: Of the cell.
+
+    Raises:
+        RefusedError: E lies outside by more than `SLACK`.
+    """
+    if particles != "spheres" or "fraction_of_case" not in bounds:
+        return
+    low, high = (GPA * end for end in bounds["hashin_shtrikman_E_GPa"])
+    fraction = bounds["fraction_of_case"]
+    if ends[1] < low * (1 - SLACK) or ends[0] > high * (1 + SLACK):
+        value = f"{ends[0] / GPA:.5g} GPa, of a map that holds {bounds['fraction']:.4g}"
+        limits = f"Hashin–Shtrikman's {low / GPA:.5g} … {high / GPA:.5g} GPa at {fraction:g}"
+        cure = f"set cell.fraction = {fraction:g} in place of [microstructure] or [radius]"
+        raise RefusedError("E of spheres", value, limits, cure)
 
 
 def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> None:

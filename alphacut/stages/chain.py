@@ -71,7 +71,13 @@ class Chain:
     def campaign(self) -> Campaign:
         """Samples of a round cell."""
         content = self.content
-        return Campaign(*content.round_cell, content.mesh, content.modulus, self.petsc)
+        return Campaign(
+            *content.round_cell,
+            content.mesh,
+            content.modulus,
+            self.petsc,
+            content.stated_fraction,
+        )
 
     def material(self) -> None:
         """The modulus of the cell, round or an image."""
@@ -82,6 +88,9 @@ class Chain:
             return
         results.modulus = data = self.store.take(modulus.stage(self.campaign))
         cell.require_tolerance(data.document["error"], section.tolerance)
+        ends = data.arrays["E"].transpose("alpha", "bound").values[-1]
+        particles = self.campaign.cell.particles
+        cell.require_bounds((ends[0], ends[1]), data.document["references"], particles)
 
     def structure(self, number: FuzzyNumber | None) -> Structure:
         """The structure with a modulus in Pa, None for its own."""

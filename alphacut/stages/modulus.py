@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.material import Mesh, ModulusSection, RadiusMap, RoundCell
+from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell
 from alphacut.fuzzy import Crisp, Extended, FuzzyNumber, General, Known, Reduced, Signed, propagate
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Method as Plan
@@ -74,7 +74,7 @@ class CellTask:
     """
 
     model: Solve
-    radius: RadiusMap
+    radius: AnyRadius
     cell: RoundCell
     crisp: Mapping[str, float]
 
@@ -100,7 +100,7 @@ class CellTask:
         }
 
 
-def theta_of(radius: RadiusMap) -> Array:
+def theta_of(radius: AnyRadius) -> Array:
     """The θ at which stress curves are stored, shape (SHOWN,)."""
     return np.asarray(np.linspace(*radius.theta, SHOWN))
 
@@ -115,13 +115,15 @@ class Campaign:
         mesh: Resolution of elements.
         modulus: Method, plan, levels.
         petsc: PETSc options.
+        stated_fraction: Share that particles take as the case states; None where it does not.
     """
 
-    radius: RadiusMap
+    radius: AnyRadius
     cell: RoundCell
     mesh: Mesh
     modulus: ModulusSection
     petsc: Mapping[str, str] = field(default_factory=dict)
+    stated_fraction: float | None = None
 
     @cached_property
     def inputs(self) -> dict[str, FuzzyNumber]:
@@ -192,7 +194,7 @@ class Campaign:
         if not same or not (stiffer or softer):
             return Known()
         way = 1 if stiffer else -1
-        signs = {"a1": way, "a2": way, "a3": way, "a4": -way}
+        signs = {"a1": way, "a2": way, "a3": way, "a4": -way, "fraction": way}
         signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
         return Known(signs=of_inputs, source="as mechanics proves of exact cells")
@@ -208,7 +210,7 @@ class Campaign:
 def stage(campaign: Campaign) -> Stage:
     """The stage of a round cell's samples."""
     plan, alpha = campaign.modulus.plan, campaign.modulus.alpha
-    inputs = [campaign.identity, campaign.inputs, plan, alpha]
+    inputs = [campaign.identity, campaign.inputs, campaign.stated_fraction, plan, alpha]
     return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run, has_samples=True)
 
 
@@ -255,7 +257,7 @@ def stage_result(result: Cuts, campaign: Campaign) -> StageResult:
         "average": meaning(campaign.cell, campaign.modulus),
         "error": campaign.errors(result),
         "checks": _largest(result, "check"),
-        "references": references(campaign.radius, campaign.cell),
+        "references": references(campaign.radius, campaign.cell, campaign.stated_fraction),
     }
     return StageResult(document, xarray.Dataset(variables, coordinates))
 

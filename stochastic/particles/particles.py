@@ -43,6 +43,10 @@ class Shape:
         """Share of a cell that particles take, of reduced radii of any shape."""
         return np.asarray(self.factor * np.asarray(radii, float) ** self.dimensions)
 
+    def reduced_radius(self, fraction: float) -> float:
+        """Reduced radius of a particle that takes a share of its cell."""
+        return float((fraction / self.factor) ** (1 / self.dimensions))
+
     def measure(self, radii: ArrayLike) -> Array:
         """Area in m² or volume in m³ of particles, of radii in m of any shape."""
         return self.shares(radii) * 2.0**self.dimensions

@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stochastic import microstructure
 from alphacut.stochastic.figures.all import draw
+from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.microstructure import Study, fitted_map, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
@@ -282,6 +283,19 @@ def test_cells_as_tight_as_no_square_are_counted_or_refused():
     assert dense.share_kept > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
         study(Study(Simulated(Packing(200, 0.75, EQUAL), 5)))
+
+
+def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
+    case = Study(Simulated(Packing(200, 0.4, TENFOLD, shape=SPHERES), 5))
+    groups = np.arange(100) % 5
+    for tight, allowed in ((15, True), (16, False)):
+        radii = np.r_[np.linspace(0.4, 0.9, 100 - tight), np.full(tight, 1.05)]
+        sample = AreaWeighted.of(radii, np.ones(100), groups)
+        if allowed:
+            assert case.used(sample) is sample
+        else:
+            with pytest.raises(RefusedError, match=r"16.* of the volume.*set cell.fraction = 0.4"):
+                case.used(sample)
 
 
 def test_equal_cells_leave_nothing_to_fit():

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from alphacut.case.load import load
@@ -116,6 +117,61 @@ def test_spheres_need_a_method_of_spheres(tmp_path):
     assert read(tmp_path, text).round.particles == "spheres"
     (problem,) = problems(tmp_path, text.replace('"series"', '"slices"'))
     assert problem.key == "modulus.method"
+
+
+FRACTION = """
+title = "Particles of one size"
+stages = ["modulus"]
+[cell]
+particles = "PARTICLES"
+fraction = FRACTION
+matrix_modulus = "20 GPa"
+matrix_poisson = 0.2
+inclusion_modulus = "60 GPa"
+inclusion_poisson = 0.2
+[modulus]
+alpha = [0, 1]
+"""
+
+
+def fraction_case(particles, fraction):
+    return FRACTION.replace("PARTICLES", particles).replace("FRACTION", str(fraction))
+
+
+@pytest.mark.parametrize(
+    ("particles", "factor", "power"), [("spheres", np.pi / 6, 3), ("cylinders", np.pi / 4, 2)]
+)
+def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, factor, power):
+    radius, _ = read(tmp_path, fraction_case(particles, "[0.2, 0.3, 0.4]")).round_cell
+    assert [*radius.numbers] == ["fraction"]
+    for fraction in (0.2, 0.3, 0.4):
+        radii = radius.at({"fraction": fraction})(np.linspace(-3, 3, 5))
+        assert factor * radii**power == pytest.approx(np.full(5, fraction), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("particles", "fraction", "key"),
+    [
+        ("spheres", 0.5235, None),
+        ("spheres", 0.5236, "cell.fraction"),
+        ("cylinders", "[0.7, 0.785]", None),
+        ("cylinders", "[0.7, 0.786]", "cell.fraction"),
+        ("ellipses(4, 0)", 0.19, None),
+        ("ellipses(4, 0)", 0.2, "cell.fraction"),
+    ],
+)
+def test_a_fraction_ends_where_particles_touch(tmp_path, particles, fraction, key):
+    text = fraction_case(particles, fraction)
+    if key is None:
+        assert read(tmp_path, text).round_cell
+    else:
+        assert key in [problem.key for problem in problems(tmp_path, text)]
+
+
+def test_a_fraction_stands_alone(tmp_path):
+    radius = "[radius]\na1 = 0.3\na2 = 0\na3 = 0.4\na4 = 0\n"
+    found = problems(tmp_path, fraction_case("spheres", 0.3) + radius)
+    assert [problem.key for problem in found] == ["radius"]
 
 
 CHANGES = [

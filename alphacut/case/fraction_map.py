@@ -1,0 +1,40 @@
+"""The radius map of cells whose particles all take the same share: crisp over θ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+from alphacut.stochastic.particles.particles import Shape
+
+
+@dataclass(frozen=True)
+class FractionMap:
+    """Random radius without chance: particles of one share of the cell at all θ.
+
+    Args:
+        fraction: Share of area or volume, crisp or fuzzy.
+        shape: Discs or spheres.
+        theta: Support of θ.
+    """
+
+    fraction: FuzzyNumber
+    shape: Shape
+    theta: tuple[float, float] = (-3.0, 3.0)
+
+    @property
+    def numbers(self) -> dict[str, FuzzyNumber]:
+        """Parameters of the map by name."""
+        return {"fraction": self.fraction}
+
+    @property
+    def law(self) -> TruncatedNormal:
+        """Law of θ, a normal one cut off at both ends."""
+        return TruncatedNormal(*self.theta)
+
+    def at(self, values: Mapping[str, float]) -> HermiteMap:
+        """The map at a crisp fraction."""
+        radius = self.shape.reduced_radius(values["fraction"])
+        return HermiteMap(radius, 0.0, radius, 0.0, self.law)

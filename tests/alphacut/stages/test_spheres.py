@@ -1,0 +1,47 @@
+"""Spheres of a stated fraction: E inside the bounds of what the case says, or refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from alphacut.case.load import load
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.stages.cell import model_of, references, require_bounds, solve
+from tests.alphacut.case.test_load import fraction_case
+
+
+def case(folder: Path, fraction: float):
+    path = folder / "case.toml"
+    path.write_text(fraction_case("spheres", fraction))
+    return load(path).content
+
+
+@pytest.mark.parametrize("fraction", [0.1, 0.3, 0.4, 0.5])
+def test_spheres_of_one_size_hold_the_fraction_and_lie_within_its_bounds(tmp_path, fraction):
+    content = case(tmp_path, fraction)
+    radius, cell = content.round_cell
+    result = solve(radius, cell, model_of(cell, content.mesh, content.modulus))
+    bounds = references(radius, cell, content.stated_fraction)
+    assert bounds["fraction"] == pytest.approx(fraction, rel=1e-12)
+    require_bounds((result.modulus, result.modulus), bounds, cell.particles)
+
+
+@pytest.mark.parametrize(
+    ("fraction", "low", "modulus"), [(0.5, 33.333333, 30.466), (0.4, 30.0, 28.30)]
+)
+def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
+    tmp_path, fraction, low, modulus
+):
+    """Both moduli are those of maps that had lost a fifth of the spheres."""
+    radius, cell = case(tmp_path, 0.3).round_cell
+    bounds = references(radius, cell, fraction)
+    ends = np.array(bounds["hashin_shtrikman_E_GPa"])
+    assert ends[0] == pytest.approx(low, rel=1e-7)
+    with pytest.raises(RefusedError, match=f"E of spheres is .*set cell.fraction = {fraction:g}"):
+        require_bounds((modulus * 1e9, modulus * 1e9), bounds, "spheres")
+    for inside in ends * [0.9951, 1.0049] * 1e9:
+        require_bounds((inside, inside), bounds, "spheres")
+    for outside in ends * [0.9949, 1.0051] * 1e9:
+        with pytest.raises(RefusedError):
+            require_bounds((outside, outside), bounds, "spheres")
