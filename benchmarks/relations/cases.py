@@ -187,7 +187,8 @@ def _changed(key: str, value: Any) -> Any:
         section = load(of.case, of.changes).content.envelope
         if section is None or (found := value(section)) is None:
             return None
-        return replace(of, changes=(*of.changes, f"{key}={found}"))
+        others = [change for change in of.changes if not change.startswith(f"{key}=")]
+        return replace(of, changes=(*others, f"{key}={found}"))
 
     return said
 

@@ -64,11 +64,12 @@ class Frame:
 
     @classmethod
     def drawn(cls, chance: Chance) -> Self:
-        """A frame of 1 to 3 storeys with 1 or 2 fuzzy inputs."""
+        """A frame of 1 to 3 storeys with 1 to 3 fuzzy inputs, wide ones where the proof is dual."""
         n = int(chance.integers(1, 4))
         masses, stiffness = chance.uniform(1e4, 3e4, n), chance.uniform(1e7, 4e7, n)
         names = [f"{kind}{z + 1}" for kind in "km" for z in range(n)]
-        count = int(chance.integers(1, 3))
+        method = str(chance.choice(["proof", "dual", "search"]))
+        count, widest = (3, 0.3) if method == "dual" else (int(chance.integers(1, 3)), 0.1)
         damping: tuple[float, ...] = (float(chance.uniform(0.01, 0.1)),)
         names.append("zeta")
         if chance.random() < 0.5:
@@ -82,13 +83,13 @@ class Frame:
             stiffness,
             masses,
             damping,
-            {str(name): float(chance.uniform(0.01, 0.1)) for name in inputs},
+            {str(name): float(chance.uniform(0.01, widest)) for name in inputs},
             tuple(map(str, outputs)),
             _record(chance, int(0.6 / sampling)),
             sampling,
             nodes=int(chance.choice([20, 100])),
             step=step,
-            method=str(chance.choice(["proof", "dual", "search"])),
+            method=method,
         )
 
     def stated(self) -> Stated:
