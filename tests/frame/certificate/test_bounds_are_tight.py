@@ -80,6 +80,28 @@ def test_what_outputs_do_between_nodes_is_bounded_where_the_record_jumps() -> No
     assert 1 <= proof.between[1, 0] / np.abs(fine - line).max() <= 1.8
 
 
+def test_what_a_free_wave_does_between_nodes_is_bounded_and_half_would_not_do() -> None:
+    """A cosine strays from its chord by h² ω²/8 about its crest, as the bound says."""
+    model = spring(1.0, None, 6.0, 0.2)
+    proof = certify(model, gap=1e-2, model_error=np.zeros((31, 1)), scale=np.ones(1))
+    fine = np.cos(np.sqrt(1.1) * np.linspace(0, 6, 6001))  # of the fastest of the box
+    line = np.interp(np.linspace(0, 6, 6001), model.time, fine[::200])
+    off = np.abs(fine - line).max()
+    assert proof.between[1:, 0].min() / off >= 1
+    assert proof.between.max() / off <= 1.3
+
+
+def test_the_model_error_counts_on_both_sides_of_the_gap_asked_for() -> None:
+    """Bounds are raised and attained values lowered by it; both together stay within the gap."""
+    model = spring(1.0, None, 6.0, 0.1)
+    error = np.full((61, 1), 0.004)
+    proof = certify(model, gap=0.01, model_error=error, scale=np.ones(1))
+    gap = (proof.outer - proof.bounds).max()
+    assert 2 * 0.004 < gap <= 0.01
+    with pytest.raises(ValueError, match="twice the model error"):
+        certify(model, gap=0.0079, model_error=error, scale=np.ones(1))
+
+
 def cube(square: float = 0.0) -> ModalModel:
     """A model of the motion x³ − square x² for all times; its third derivative is 6."""
     model = spring(1.0, None, 1.0, 1.0)

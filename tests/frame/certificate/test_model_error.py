@@ -313,6 +313,24 @@ def test_each_of_the_two_defects_counts(kind, monkeypatch) -> None:
     assert deviation.max() > bound.max() / 50
 
 
+def test_half_of_a_defect_would_not_do(monkeypatch) -> None:
+    """Early in a slow swing, 2 Re d exp(λ t) moves a mass by 2 d t, and no less than that."""
+    frame = StoreyFrame((1.0,), stiffness=(1.0,), q0=(1.0,))
+    flow = LinearFlow(frame, ("k1",), 1.0, 0.05, Exact())
+    found = fit_modes(flow, boxes({"k1": Interval(0.999, 1.001)}, (0,)), tolerance=1e-6)
+    true = model_error._defects
+
+    def only(*args):
+        defects = {name: np.zeros_like(values) for name, values in true(*args).items()}
+        return defects | {"kinematic": defects["kinematic"] + 1e-3}
+
+    monkeypatch.setattr(model_error, "_defects", only)
+    bound, time = proved_error(found)[1:, 0], found.time[1:]
+    moved = 1e-3 * (time * np.cos(time) + np.sin(time))  # q̈ + q = −2e-3 sin t, q̇(0) = 2e-3
+    assert (moved <= bound).all()
+    assert (bound[:6] <= 1.1 * moved[:6]).all()
+
+
 @pytest.mark.parametrize(("kind", "most"), [("start_q", 1.8), ("start_v", 2.5)])
 def test_a_wrong_start_counts_by_its_energy(kind, most, monkeypatch) -> None:
     """A start that is off by what moves the last storey most moves on freely, within the bound."""

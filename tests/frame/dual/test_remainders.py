@@ -273,6 +273,16 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
             assert (off[1:] / table.error[1:]).max() > TIGHT
 
 
+def test_what_second_derivatives_do_within_a_cell_is_in_the_error():
+    """G″ = (σ − σ₁)(σ − σ₂) is zero at both ends of a cell, and G strays by 5 h⁴/384 within."""
+    grid, h = Grid(np.array([10.0, 11.0]), np.zeros(1)), 1.0
+    oscillators = Oscillators(grid, None, np.zeros(1))
+    zero, fourth = np.zeros((3, 1)), np.array([[0.0], [0.0], [0.0], [0.0], [2.0]])
+    error, _ = oscillators._error(zero, fourth, 0, start=True)
+    exact = 5 * h**4 / 384
+    assert exact <= error[0] <= 3 * exact
+
+
 def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
     grid, parts = Grid(np.linspace(9.99, 10.01, 3), np.array([0, 1e-3])), 8
     resonant = Accelerogram(0.02, np.sin(0.2 * np.arange(400)))
