@@ -1,0 +1,149 @@
+"""Fragility of a linear structure under a suite of records, with intervals from proved peaks.
+
+A linear structure that starts at rest and is moved by its record alone scales with it. So the
+measure of a record at which a limit L is reached is c(p) = m L / peak(p), m the record's measure as
+it is and p the inputs. Over an α-cut it ranges between m L over the greatest and m L over the least
+peak, both of which are bounded from outside (proved) and from inside (reached).
+
+α is a level of possibility. It is no probability and is never multiplied with one: for each α the
+share of the suite's records under which a structure exceeds the limit lies in a band, whatever the
+structure within the α-cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from alphacut.frame.questions.peaks import Peaks
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Ends
+
+CONFIDENCE = 0.95
+"""Of the limits of a share if the records were independent draws."""
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalMeasures:
+    """Measures of R records at which a limit is reached, as intervals on A levels.
+
+    Args:
+        low: No structure of the cut exceeds the limit below it, shape (R, A).
+        low_reached: A structure of the cut is known to exceed it above, shape (R, A).
+        high_reached: A structure of the cut is known not to exceed it up to here, shape (R, A).
+        high: Every structure of the cut exceeds it above; infinite where no peak is known to be
+            larger than zero, shape (R, A).
+
+    Raises:
+        RefusedError: The ends do not rise, or a measure is not positive.
+    """
+
+    low: Array
+    low_reached: Array
+    high_reached: Array
+    high: Array
+
+    def __post_init__(self) -> None:
+        ends = (self.low, self.low_reached, self.high_reached, self.high)
+        rise = all((a <= b * (1 + 1e-9)).all() for a, b in pairwise(ends))
+        require(rise and (self.low > 0).all(), "critical measures", "not rising", "rising ends")
+
+    @classmethod
+    def of(
+        cls, peaks: Sequence[Peaks], measures: Sequence[float], output: str, limit: float
+    ) -> CriticalMeasures:
+        """Critical measures from the peaks under each record as it is.
+
+        Args:
+            peaks: Peaks of each record, R of them on the same levels.
+            measures: Measure of each record as it is, R of them.
+            output: Limited output.
+            limit: Limit of its magnitude, in the output's SI unit.
+        """
+        ends = [(*one.most(output)[::-1], *one.least(output)[::-1]) for one in peaks]
+        size = np.asarray(measures)[:, None] * limit
+        with np.errstate(divide="ignore"):
+            low, reached, inner, high = (
+                size / np.array([row[k] for row in ends]) for k in range(4)
+            )
+        # the structure that reaches the greatest peak known is one of the cut
+        return cls(low, reached, np.maximum(inner, reached), high)
+
+    def band(self, measure: Array) -> Ends:
+        """Least and greatest share of the records under which a structure exceeds the limit.
+
+        No structure within the α-cut exceeds the limit for a share of this suite's records outside
+        the band.
+
+        Args:
+            measure: Where the band is wanted, shape (X,).
+
+        Returns:
+            Both ends, each of shape (A, X).
+        """
+        return Ends(*(_counts(end, measure) / len(self.low) for end in (self.high, self.low)))
+
+    def confidence_band(self, measure: Array) -> Ends:
+        """Limits of the probability of exceedance if the records were independent draws.
+
+        At each measure, with 95 %: the lower Clopper–Pearson limit of the least count and the upper
+        one of the greatest (Clopper, Pearson 1934).
+
+        Args:
+            measure: Where the band is wanted, shape (X,).
+
+        Returns:
+            Both ends, each of shape (A, X).
+        """
+        from scipy.special import betaincinv  # which takes time to import
+
+        total, tail = len(self.low), (1 - CONFIDENCE) / 2
+        least, most = _counts(self.high, measure), _counts(self.low, measure)
+        lower = betaincinv(np.maximum(least, 1), total - least + 1, tail)
+        upper = betaincinv(most + 1, np.maximum(total - most, 1), 1 - tail)
+        return Ends(np.where(least > 0, lower, 0.0), np.where(most < total, upper, 1.0))
+
+    @property
+    def median(self) -> Ends:
+        """Median of the lognormal fit, exp of the mean logarithm, each end of shape (A,)."""
+        return Ends(*(np.exp(np.log(end).mean(0)) for end in (self.low, self.high)))
+
+    @property
+    def dispersion(self) -> Ends:
+        """Standard deviation of the logarithms, each end of shape (A,).
+
+        For values within their intervals it is within ‖h‖ / √(R − 1) of that of the middles, h the
+        half widths: subtracting the mean does not lengthen a vector.
+
+        Raises:
+            RefusedError: There is one record.
+        """
+        require(len(self.low) > 1, "records", len(self.low), "two records or more")
+        low, high = np.log(self.low), np.log(self.high)
+        finite = np.isfinite(high).all(0)
+        middle = np.where(finite, (low + high) / 2, low)
+        reach = np.linalg.norm((high - low) / 2, axis=0) / np.sqrt(len(low) - 1)
+        spread = middle.std(0, ddof=1)
+        return Ends(np.where(finite, np.maximum(spread - reach, 0.0), 0.0), spread + reach)
+
+
+def any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
+    """Critical measures of the event that any of several limits is exceeded.
+
+    That of a structure is the least of its own; what the limits are reached by may be different
+    structures, so that the inner upper end is no more than the inner lower one.
+    """
+    low, reached, high = (
+        np.min([getattr(x, name) for x in limits], axis=0)
+        for name in ("low", "low_reached", "high")
+    )
+    return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
+
+
+def _counts(critical: Array, measure: Array) -> Array:
+    """Records whose critical measure is below a measure, shape (A, X)."""
+    return np.asarray((critical[:, :, None] < np.asarray(measure)).sum(0))

@@ -1,0 +1,90 @@
+"""Fragility from intervals of peaks, against closed forms and random structures."""
+
+import numpy as np
+import pytest
+from scipy.stats import beta
+
+from alphacut.frame.questions.fragility import CriticalMeasures, any_limit
+from alphacut.frame.questions.peaks import Peaks
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
+
+LIMIT = 0.02
+
+
+def peaks(lower, upper, reached):
+    """Peaks of one output q on one level, by what is proved and reached."""
+    rows = (np.array([[x]]) for x in (lower, upper))
+    nothing, natures = np.zeros((1, 1)), (Nature.GUARANTEED,)
+    return Peaks(np.zeros(1), ("q",), *rows, nothing, np.array([[reached]]), natures)
+
+
+def suite(count=12, seed=4):
+    rng = np.random.default_rng(seed)
+    middle = 0.01 * rng.lognormal(0, 0.4, count)
+    return middle, [peaks(0.8 * x, 1.25 * x, 1.2 * x) for x in middle]
+
+
+def test_every_structure_of_the_cut_lies_in_the_band():
+    middle, each = suite()
+    measures = np.full(len(middle), 2.0)
+    critical = CriticalMeasures.of(each, measures, "q", LIMIT)
+    assert critical.low[:, 0] == pytest.approx(2 * LIMIT / (1.25 * middle))
+    assert critical.high[:, 0] == pytest.approx(2 * LIMIT / (0.8 * middle))
+    measure = np.linspace(0.5, 12, 200)
+    band = critical.band(measure)
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        exact = 2 * LIMIT / (middle * rng.uniform(0.8, 1.25, len(middle)))
+        share = (exact[:, None] < measure).mean(0)
+        assert (band.lower[0] <= share).all()
+        assert (share <= band.upper[0]).all()
+        assert critical.median.lower[0] <= np.exp(np.log(exact).mean()) <= critical.median.upper[0]
+        spread = np.log(exact).std(ddof=1)
+        assert critical.dispersion.lower[0] <= spread <= critical.dispersion.upper[0]
+
+
+def test_crisp_inputs_give_the_empirical_curve():
+    middle, _ = suite()
+    each = [peaks(x, x, x) for x in middle]
+    critical = CriticalMeasures.of(each, np.ones(len(middle)), "q", LIMIT)
+    measure = np.sort(LIMIT / middle)
+    band = critical.band(measure * (1 + 1e-12))
+    assert band.lower[0] == pytest.approx(np.arange(1, 13) / 12)
+    assert band.upper[0] == pytest.approx(np.arange(1, 13) / 12)
+    assert critical.dispersion.lower[0] == pytest.approx(np.log(middle).std(ddof=1))
+
+
+def test_confidence_limits_are_those_of_clopper_and_pearson():
+    middle, each = suite()
+    critical = CriticalMeasures.of(each, np.ones(len(middle)), "q", LIMIT)
+    measure = np.linspace(0.5, 6, 23)
+    band, limits = critical.band(measure), critical.confidence_band(measure)
+    for k in range(len(measure)):
+        least, most = (round(12 * end[0, k]) for end in band)
+        lower = beta.ppf(0.025, least, 13 - least) if least else 0.0
+        upper = beta.ppf(0.975, most + 1, 12 - most) if most < 12 else 1.0
+        assert limits.lower[0, k] == pytest.approx(lower)
+        assert limits.upper[0, k] == pytest.approx(upper)
+
+
+def test_any_of_the_limits_is_the_least():
+    _, each = suite()
+    one = CriticalMeasures.of(each, np.ones(12), "q", LIMIT)
+    two = CriticalMeasures.of(each, np.linspace(0.5, 2, 12), "q", LIMIT)
+    either = any_limit([one, two])
+    assert either.low == pytest.approx(np.minimum(one.low, two.low))
+    assert (either.high >= either.low_reached).all()
+
+
+def test_a_structure_that_may_stay_at_rest_has_no_upper_end():
+    critical = CriticalMeasures.of([peaks(0.0, 0.01, 0.01)] * 2, [1.0, 1.0], "q", LIMIT)
+    assert np.isinf(critical.high).all()
+    assert critical.band(np.array([5.0])).lower[0, 0] == 0.0
+    assert np.isinf(critical.dispersion.upper[0])
+
+
+def test_one_record_has_no_dispersion():
+    critical = CriticalMeasures.of([peaks(0.01, 0.02, 0.015)], [1.0], "q", LIMIT)
+    with pytest.raises(RefusedError, match="two records"):
+        _ = critical.dispersion
