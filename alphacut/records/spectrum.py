@@ -1,0 +1,62 @@
+"""Response spectra of records: exact for accelerations that are linear between samples.
+
+An oscillator of period T and damping ratio ζ moves from sample to sample by the exponential of its
+state matrix (Nigam, Jennings 1969); its peak is read at points of at most a fortieth of the period.
+"""
+
+from __future__ import annotations
+
+from math import ceil, pi
+
+import numpy as np
+
+from alphacut.frame import Accelerogram
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import real, require
+
+POINTS_PER_PERIOD = 40
+"""A peak of a sine read at points this far apart is low by at most 1 − cos(π/40) = 0.3 %."""
+
+
+def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> float:
+    """Pseudo-acceleration ω² max |u| of an oscillator at rest at the start, in m/s².
+
+    The free motion after the record's end is included for one period.
+
+    Args:
+        ground: The record.
+        period: Undamped natural period T, in s, above 0.
+        ratio: Damping ratio ζ, from 0 and below 1.
+
+    Raises:
+        RefusedError: The period or the ratio is out of range.
+    """
+    real("period", period, positive=True)
+    require(0 <= real("ratio", ratio) < 1, "ratio", ratio, "from 0 and below 1")
+    from scipy.linalg import expm  # which takes time to import
+    from scipy.signal import lfilter
+
+    omega = 2 * pi / period
+    parts = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
+    substep = ground.step / parts
+    start, end = _ends_of_substeps(ground, parts, ceil(period / substep))
+    state = np.zeros((4, 4))
+    state[:2, :2] = [[0, 1], [-(omega**2), -2 * ratio * omega]]
+    state[1, 2], state[2, 3] = -1.0, 1.0
+    step = expm(state * substep)
+    A, b = step[:2, :2], step[:2, 2:]
+    load = b[:, :1] * start + b[:, 1:] * (end - start) / substep  # (2, steps)
+    # u[k+1] = tr(A) u[k] − det(A) u[k−1] + what the loads of both steps add, by Cayley and Hamilton
+    added = load[0].copy()
+    added[1:] += A[0, 1] * load[1, :-1] - A[1, 1] * load[0, :-1]
+    displacement = lfilter([1.0], [1.0, -np.trace(A), np.linalg.det(A)], added)
+    return float(omega**2 * np.abs(displacement).max())
+
+
+def _ends_of_substeps(ground: Accelerogram, parts: int, free: int) -> tuple[Array, Array]:
+    """Accelerations at the start and the end of each substep, then of `free` ones of zeros."""
+    samples = ground.acceleration
+    places = np.arange((len(samples) - 1) * parts + 1) / parts
+    values = np.interp(places, np.arange(len(samples)), samples)
+    after = np.zeros(free)
+    return np.append(values[:-1], after), np.append(values[1:], after)
