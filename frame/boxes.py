@@ -9,19 +9,25 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.low_discrepancy import corners
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
+from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.knowledge.joint import joined_inputs as fuzzy_inputs
 from alphacut.fuzzy.refused import RefusedError, require, require_numbers
 from alphacut.fuzzy.result import Nature
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
-TOLERANCE = 1e-4
-"""Error wanted unless one is given, in m."""
+FAR_APART = 1.5
+"""Ratio of an input's ends from which on their geometric mean is its middle."""
 SHARE = 1e-3
-"""The same where it is relative, as a share of each output's peak."""
+"""Error wanted unless one is given, as a share of each output's peak."""
+
+
+CORNERS = 16
+"""Corners of the widest box that are looked at, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,18 +67,35 @@ class Boxes:
         ends = zip(self.names, self.lower[0].tolist(), self.upper[0].tolist(), strict=True)
         return self.numbers or {name: Interval(low, high) for name, low, high in ends}
 
-    def halves(self) -> list[Boxes]:
-        """Two parts, cut across the relatively widest input, each with the levels that reach it."""
-        axis = int((self.radius / np.maximum(np.abs(self.centre), 1e-300)).argmax())
-        parts = []
-        for ends, clipped in (("upper", np.minimum), ("lower", np.maximum)):
-            own = {"lower": self.lower.copy(), "upper": self.upper.copy()}
-            own[ends][:, axis] = clipped(own[ends][:, axis], self.centre[axis])
-            kept = own["lower"][:, axis] <= own["upper"][:, axis]
-            lower, upper = (own[name][kept] for name in ("lower", "upper"))
-            modal, held = np.clip(self.modal, lower[0], upper[0]), self.alpha[kept]
-            parts.append(Boxes(self.names, held, lower, upper, modal))
-        return parts
+    def bisected(self, axis: int) -> list[tuple[Boxes, Rows]]:
+        """Two halves along an input, each with the levels that reach it.
+
+        They meet at the geometric middle where the ends are positive and far apart: frequencies are
+        powers of stiffnesses and masses.
+        """
+        low, high = self.lower[0, axis], self.upper[0, axis]
+        middle = np.sqrt(low * high) if low > 0 and high > FAR_APART * low else (low + high) / 2
+        halves = []
+        for ends in ((-np.inf, middle), (middle, np.inf)):
+            reached = (self.lower[:, axis] <= ends[1]) & (self.upper[:, axis] >= ends[0])
+            levels = np.flatnonzero(reached)
+            low, high = np.full((2, len(self.names)), [[-np.inf], [np.inf]])
+            low[axis], high[axis] = ends
+            halves.append((self.on_levels(levels).within(low, high), levels))
+        return halves
+
+    def on_levels(self, levels: Rows | Sequence[int]) -> Boxes:
+        """Some of the levels."""
+        levels = np.asarray(levels)
+        ends = self.lower[levels], self.upper[levels]
+        return Boxes(self.names, self.alpha[levels], *ends, self.modal, self.numbers)
+
+    def within(self, low: Array, high: Array) -> Boxes:
+        """What lies between ends (n,), which all levels reach."""
+        lower, upper, modal = (
+            np.asarray(np.clip(x, low, high)) for x in (self.lower, self.upper, self.modal)
+        )
+        return Boxes(self.names, self.alpha, lower, upper, modal)
 
     def distinct(self) -> tuple[Boxes, Array]:
         """The boxes without those that repeat the one below, and which of them each level has.
@@ -83,6 +106,17 @@ class Boxes:
         new = np.append(True, (np.diff(both, axis=0) != 0).any(1))
         kept = replace(self, alpha=self.alpha[new], lower=self.lower[new], upper=self.upper[new])
         return kept, np.cumsum(new) - 1
+
+    @property
+    def probes(self) -> Array:
+        """The modal parameters and corners of the widest box, shape (S, d), in SI units."""
+        d = len(self.names)
+        if 2**d <= CORNERS:
+            ends = corners(-np.ones(d), np.ones(d))
+        else:  # some, two opposite ones among them
+            drawn = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
+            ends = np.vstack([-np.ones(d), np.ones(d), drawn])
+        return np.asarray(np.unique(np.vstack([self.modal, self.to_physical(ends)]), axis=0))
 
     @property
     def centre(self) -> Array:
@@ -141,12 +175,12 @@ class UnitFlow:
     Args:
         flow: The flow in physical parameters.
         boxes: The boxes; its names must be those of `flow`.
-        relative: Whether tolerances are shares of each output's modal peak instead of lengths.
+        relative: Whether tolerances are shares of each output's peak instead of lengths.
     """
 
     flow: Flow
     boxes: Boxes
-    relative: bool = False
+    relative: bool = True
 
     @property
     def time(self) -> Array:
@@ -164,8 +198,8 @@ class UnitFlow:
         return units_of(self.outputs)
 
     def tolerance(self, value: float | None) -> float:
-        """A tolerance, or the usual one: `TOLERANCE`, a share of the peaks where it is relative."""
-        return value or (SHARE if self.relative else TOLERANCE)
+        """A tolerance, or the usual one: `SHARE` of each peak, of that of `reference` otherwise."""
+        return value or SHARE * (1.0 if self.relative else float(self.peak[self.reference]))
 
     @property
     def reference(self) -> int:
@@ -180,19 +214,23 @@ class UnitFlow:
         return f"{value:.3g} {unit}"
 
     @cached_property
+    def peak(self) -> Array:
+        """Peak of each output at the modal parameters and the probes, shape (m,)."""
+        peak = np.abs(self.flow.values(self.boxes.probes)).max((0, 1))
+        return np.where(peak > 0, peak, float(peak.max()) or 1.0)
+
+    @cached_property
     def scale(self) -> Array:
         """Factor on a tolerance for each output, shape (m,).
 
-        Relative: the modal peaks. Else 1 when all outputs share a unit, or their modal peaks by
-            that of `reference`.
+        Relative: the peaks. Else 1 when all outputs share a unit, or their peaks by that of
+            `reference`.
         """
-        if not self.relative and len({Output(name).unit for name in self.outputs}) == 1:
+        if self.relative:
+            return self.peak
+        if len({Output(name).unit for name in self.outputs}) == 1:
             return np.ones(len(self.outputs))
-        peak = np.abs(self.flow.values(self.boxes.modal[None])[0]).max(0)
-        shares: Array = np.where(peak > 0, peak, peak.max() or 1.0) / (
-            1.0 if self.relative else peak[self.reference] or 1.0
-        )
-        return shares
+        return np.asarray(self.peak / self.peak[self.reference])
 
     def values(self, unit: Array) -> Array:
         """Trajectories at unit coordinates (S, d), shape (S, T, outputs)."""

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Bounds, Ends
 
@@ -38,6 +40,23 @@ class Envelope(Bounds):
     between: Array | None = None
     attained_error: Array | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def peak_words(self) -> str:
+        """Proved and reached peak of each output in the widest cut, in words."""
+        words = []
+        for name, unit, *ends in zip(
+            self.outputs,
+            self.units or ("",) * len(self.outputs),
+            *(
+                np.maximum(pair.upper, -pair.lower)[0].max(0)
+                for pair in (self.proved, self.attained)
+            ),
+            strict=True,
+        ):
+            proved, reached = (f"{float(end):.4g} {unit}".rstrip() for end in ends)
+            words.append(f"{name}: proved {proved}, reached {reached}")
+        return "; ".join(words)
 
     def to_dataset(self) -> xarray.Dataset:
         """The envelope as an xarray dataset with units; ready for NetCDF."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.checks.step_error import (
-    probes,
     step_error,
     with_step_error,
     with_stray,
@@ -30,7 +29,6 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
-from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import tested
 from alphacut.fuzzy import FuzzyNumber
@@ -68,7 +66,7 @@ def envelope(
     alpha: Sequence[float] = ALPHA,
     method: Method | str | None = None,
     integrator: str | Integrator | None = None,
-    relative: bool = False,
+    relative: bool = True,
     progress: Progress | bool | None = None,
     **options: object,
 ) -> Envelope:
@@ -86,8 +84,7 @@ def envelope(
             proof and search unless given), midpoint (of all others), rk4. Of general Lagrangian
             systems it is midpoint.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
-            parameters, instead of a length in SI units. It is where no output is a displacement
-            and neither method nor tolerance is named.
+            parameters and some corners, instead of a number in SI units.
         progress: Called with the share done; a bar on a terminal or in a notebook if not given,
             False for none.
         options: Options of a method that is named, or of auto.
@@ -100,11 +97,6 @@ def envelope(
     known = isinstance(model, LagrangianSystem) or hasattr(model, "matrices")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     require(known, "model", type(model).__name__, allowed)
-    relative = relative or (
-        method is None
-        and options.get("tolerance") is None
-        and not any(Output(name).unit == "m" for name in model.outputs)
-    )
     way = _method(model, method, options)
     if integrator is None:
         proves = isinstance(way, Auto | Proof | DualProof | Search)
@@ -187,7 +179,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
         ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
     moved = system.ground is not None and np.any(system.ground.acceleration)
-    for point in probes(cuts):
+    for point in cuts.probes:
         at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
         try:
             matrices = evaluate(system, cuts.names, point[None], derivatives=False)[0]

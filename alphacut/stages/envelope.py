@@ -15,8 +15,8 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, say
 from alphacut.stages.store import Stage, StageResult, Work
 
-USUAL = {True: Tolerance(1e-4), False: Tolerance(1e-3, "")}
-"""Tolerance where none is named: of displacements, or where there are none of each peak."""
+USUAL = Tolerance(1e-3, "")
+"""Tolerance where none is named: a share of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 
 
@@ -45,7 +45,7 @@ class EnvelopeTask:
             RefusedError: No output has that unit.
         """
         units = {Output(x).unit for x in structure.outputs}
-        own = self.section.tolerance or USUAL["m" in units]
+        own = self.section.tolerance or USUAL
         value, allowed = f"{own.value:g} {own.unit}", f"a share, or {', '.join(sorted(units))}"
         require(own.unit in {"", *units}, "envelope.tolerance", value, allowed)
         return own

@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from alphacut.frame.boxes import Boxes, UnitFlow
-from alphacut.frame.calculus.low_discrepancy import corners
+from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array
 
-CORNERS = 16
-"""Corners of the widest box that are looked at, at most."""
 OPTIMA = 64
 """Points at which bounds are reached that are looked at besides, at most."""
 MARGIN = 1.5
@@ -24,17 +21,6 @@ AT_ONCE = 16
 """Trajectories that are held at once."""
 FLOOR = 0.1
 """Least stray of a step, as a share of the largest of all steps."""
-
-
-def probes(cuts: Boxes) -> Array:
-    """The modal parameters and corners of the widest box, shape (S, d), in SI units."""
-    d = len(cuts.names)
-    if 2**d <= CORNERS:
-        ends = corners(-np.ones(d), np.ones(d))
-    else:  # some, two opposite ones among them
-        drawn = np.random.default_rng(7).choice([-1.0, 1.0], (CORNERS - 2, d))
-        ends = np.vstack([-np.ones(d), np.ones(d), drawn])
-    return np.asarray(np.unique(np.vstack([cuts.modal, cuts.to_physical(ends)]), axis=0))
 
 
 def step_error(flow: UnitFlow) -> Array:
@@ -48,7 +34,7 @@ def step_error(flow: UnitFlow) -> Array:
     """
     if flow.flow.exact:
         return np.zeros((len(flow.time), len(flow.outputs)))
-    values, error = flow.flow.deviations(probes(flow.boxes))
+    values, error = flow.flow.deviations(flow.boxes.probes)
     so_far: Array = np.maximum.accumulate(error.max(0), axis=0)
     peak = np.abs(values).max((0, 1))
     for name, reached, least in zip(flow.outputs, so_far[-1], peak, strict=True):
@@ -94,7 +80,7 @@ def with_stray(of: Envelope, flow: UnitFlow) -> Envelope:
     """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
     if of.between is not None:
         return of
-    corners = probes(flow.boxes)
+    corners = flow.boxes.probes
     between = stray(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
     facts = {**of.facts, "between_nodes": float((between / flow.scale).max())}
     return replace(of, between=between, facts=facts)

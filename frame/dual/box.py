@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -65,20 +65,19 @@ class Box:
         points[..., self.active] += ((self.high - self.low) / 2)[self.active] * unit
         return np.clip(points, self.low, self.high)
 
-    def level(self) -> Level:
-        """Models of all outputs at all nodes."""
-        moved = sources(self.system, self.structure)
-        return Level.of(self.structure, self.system.ground, self.time, moved)
+    def level(self, nodes: Rows | slice = slice(None)) -> Level:
+        """Models of all outputs at some nodes.
 
-    def part(self, output: int, nodes: Rows, low: Array, high: Array) -> Level:
-        """Models of one output at some nodes over the part between unit coordinates (d,)."""
-        whole = over_box(self.system, self.names, self.inputs(low), self.inputs(high))
-        one = slice(output, output + 1)
-        structure = replace(
-            whole, rows=whole.rows[one], factor=whole.factor[one], order=whole.order[one]
-        )
-        moved = sources(self.system, self.structure)
-        return Level.of(structure, self.system.ground, self.time[nodes], moved)
+        Raises:
+            UnprovedError: None of its modes can be enclosed.
+        """
+        try:
+            moved = sources(self.system, self.structure)
+            return Level.of(self.structure, self.system.ground, self.time[nodes], moved)
+        except UnprovedError as refusal:
+            if refusal.along is not None:
+                refusal.along = int(self.active[refusal.along])
+            raise
 
     def attained(self, unit: Array, node: Rows, output: Rows) -> Array:
         """Exact values of outputs at nodes for unit coordinates (S, d), each shape (S,)."""

@@ -12,38 +12,40 @@ so that nothing rests on how μ is found. The cost is one of modes, tables and n
 one of inputs (`kernel`, `level`).
 3. Where the modes' own maxima lie too far from one u, their ranges are halved: slabs of few z,
    not boxes of many u. Near the peaks, that is; elsewhere a wider gap is left.
-4. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
-(`parts`).
-5. What the maxima name leads to inputs whose exact motion is the other end of the gap
-   (`box`).
+4. What the maxima name leads to inputs whose exact motion is the other end of the gap (`box`).
+5. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
+   (`alphacut.frame.parts`), after its ends are pruned (`pruning`).
 """
 
 from __future__ import annotations
 
-import os
-import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dual.box import Box
-from alphacut.frame.dual.parts import Peak
+from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.pruning import prune_ends, remainder
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Ends, Envelope
-from alphacut.frame.methods.proof import exact
-from alphacut.fuzzy.arrays import Array
+from alphacut.frame.envelope import Envelope
+from alphacut.frame.parts import WIDE, Goal, PartBounds, can_be_halved, prove
+from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import FailedError, RefusedError
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.refused import RefusedError
 
-PARTS = 32
-"""Most parts of the box over which the nodes above a peak are bounded."""
-HOPELESS = 0.1
-"""Gap of a peak, as a share of it, above which so many parts do not close it."""
+PEAK_SLABS, PEAK_STEPS = 240, 40
+"""Most slabs of a bound above a peak over a part, and evaluations for each."""
+DRIFT = 1e-6
+"""Lowest frequency over the highest at which rounding of the stiffness may hide a drift."""
+NEAR = 1e-3
+"""Share of the box about the modal inputs over which modes are enclosed if any part of the box can
+be proved."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,12 @@ class DualProof:
     """The method and its options.
 
     Args:
-        gap: Distance of proved and attained bounds that suffices, as a share of each output's peak
-            at the modal inputs; what the remainders leave may be more.
-        peaks: The same of the bounds above a peak, as a share of it, above which the box of inputs
-            is parted.
+        gap: Distance of proved and attained bounds that suffices, as a share of each output's peak;
+            what the remainders leave may be more.
+        peaks: The same of the bounds above a peak, above which the box of inputs is parted.
         slabs: Most parts of the modes' ranges for a bound.
         steps: Most evaluations of the dual function for each of them.
+        parts: Most parts of the box that a peak is worth, and that are refused.
         workers: Threads, which do not change the result; all cores unless given.
 
     Raises:
@@ -68,10 +70,11 @@ class DualProof:
     peaks: float = 0.019
     slabs: int = 24
     steps: int = 40
+    parts: int = 32
     workers: int | None = None
 
     def __post_init__(self) -> None:
-        for key in ("gap", "peaks", "slabs", "steps"):
+        for key in ("gap", "peaks", "slabs", "steps", "parts"):
             if not getattr(self, key) > 0:
                 raise RefusedError(key, getattr(self, key), "a positive number")
 
@@ -82,126 +85,156 @@ class DualProof:
             UnprovedError: The structure has no classical modes that can be enclosed, or the motion
                 is not the exact one.
         """
-        linear, begun, cuts = exact(flow), time.perf_counter(), flow.boxes
-        peak = np.abs(linear.values(cuts.modal[None])[0]).max(0)
-        peak = np.where(peak > 0, peak, max(float(peak.max()), 1e-300))
-        levels: list[_Bounded] = []
-        for a in reversed(range(len(cuts.alpha))):
-            levels.insert(0, self._level(linear, cuts, a, peak, levels[0] if levels else None))
-            if progress is not None:
-                progress(1 - a / len(cuts.alpha))
-        inner, at = (np.stack([getattr(x, name) for x in levels]) for name in ("inner", "at"))
-        outer = np.minimum.accumulate(np.stack([x.outer for x in levels]), axis=0)
-        _require_order(inner, outer, flow.outputs)
-        error = (outer - inner).max(-1)
-        most = np.abs(outer).max((1, 3))  # (A, m)
-        of_peaks = np.abs(outer.max(1) - inner.max(1)).max(-1) / np.maximum(most, 1e-300)
-        return Envelope(
-            alpha=cuts.alpha,
-            time=flow.time,
-            outputs=flow.outputs,
-            inputs=cuts.inputs,
-            lower=-outer[..., 0],
-            upper=outer[..., 1],
-            lower_at=at[..., 0, :],
-            upper_at=at[..., 1, :],
-            error=error,
-            nature=Nature.GUARANTEED,
-            method=self.name,
-            units=flow.units,
-            basis=("the equations of motion hold",),
-            inner=Ends(-inner[..., 0], inner[..., 1]),
-            between=np.max([x.stray for x in levels], axis=0),
-            evaluations=inner.size,
-            seconds=time.perf_counter() - begun,
-            facts={
-                "gap": float((error / flow.scale).max()),
-                "gap_of_peaks": float(of_peaks.max()),
-                "single_modes": min(x.single for x in levels),
-            },
+        return prove(self, flow, progress)
+
+    def peak_gap(self, scale: Array, peak: Array) -> Array:
+        """Gap at peaks that suffices, shape (m,)."""
+        del scale
+        return self.peaks * peak
+
+    def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
+        """Expected work on the box, in evaluations of a mode's motion at a node.
+
+        Raises:
+            UnprovedError: No mode of the structure can be enclosed, however narrow a part is.
+        """
+        rates = frequencies(flow.system)
+        if rates[0] <= DRIFT * rates[-1]:
+            what = "a mode does not oscillate: the stiffness lets the structure drift"
+            raise UnprovedError(what, "take improved-graph-follower")
+        ends = np.stack([boxes.lower[0], boxes.upper[0]])
+        near = boxes.modal + NEAR * (ends - boxes.modal)
+        if (near[1] > near[0]).any():
+            Box(flow.system, boxes.names, flow.time, *near).level(np.arange(2))
+        return float(self.slabs * self.steps)
+
+    def bounds(
+        self, flow: LinearFlow, boxes: Boxes, goal: Goal
+    ) -> list[PartBounds | UnprovedError]:
+        """Bounds on each level of a part, or why there are none."""
+        found: list[PartBounds | UnprovedError] = []
+        for k in range(len(boxes.alpha)):
+            try:
+                found.append(self._of_level(flow, boxes, goal, k))
+            except UnprovedError as refusal:
+                found.append(refusal)
+        return found
+
+    def _of_level(self, flow: LinearFlow, boxes: Boxes, goal: Goal, k: int) -> PartBounds:
+        low, high = boxes.lower[k], boxes.upper[k]
+        box = Box(flow.system, boxes.names, flow.time, low, high)
+        if (high > low).any():
+            return _Bounding(self, box, goal, k).bounds()
+        value, error, stray = box.centre_motion()
+        both, margin = np.stack([-value, value], -1), error[..., None]
+        at = np.broadcast_to(low, (*both.shape, len(low))).copy()
+        shares = np.zeros((*both.shape[1:], len(low)))
+        return PartBounds(both + margin, both - margin, at, stray, shares)
+
+
+class _Bounding:
+    """Bounds over one level of a part.
+
+    Attributes:
+        needed: Bounds that are asked for, shape (T, m, 2).
+        nodes: Nodes of these, shape (J,).
+        level: Models of the motion at these.
+        outer: Upper bounds of (−output, output) at all nodes, shape (T, m, 2).
+        unit: Coordinates of the best inputs, shape (T, m, 2, d).
+        shares: Share of each input in the gap at each peak, shape (m, 2, d).
+    """
+
+    def __init__(self, proof: DualProof, box: Box, goal: Goal, k: int) -> None:
+        self.proof, self.box, self.goal = proof, box, goal
+        self.needed, self.outer = goal.needed[k], goal.outer[k].copy()
+        self.top = goal.incumbent[k].copy()
+        self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
+        self.level = box.level(self.nodes)
+        d = len(box.active)
+        self.unit = np.zeros((*self.outer.shape, d))
+        self.shares = np.zeros((*self.outer.shape[1:], d))
+
+    def bounds(self) -> PartBounds:
+        """Bounds of what is asked for, and what may hold a higher peak."""
+        if self.needed.all():
+            self._require_narrow()
+            effort = self.proof.slabs, self.proof.steps, self.goal.workers
+            bounds, self.unit = self.level.bounds(self.proof.gap * self.goal.peak, *effort)
+            self.outer = np.minimum(self.outer, bounds)
+        else:
+            self._at_peaks(self._bound)
+        inner = np.full(self.outer.shape, -np.inf)
+        node, output, side = np.nonzero(self.needed)
+        side = np.where(side, 1, -1)
+        inner[self.needed] = self.box.reached(self.unit[self.needed], node, output, side)
+        self.top = np.maximum(self.top, inner.max(0))
+        n, active = len(self.box.low), self.box.active
+        self.remaining = np.empty((2, *self.top.shape, n))
+        self.remaining[:] = np.stack([self.box.low, self.box.high])[:, None, None]
+        self.pruned = np.full(self.outer.shape, -np.inf)
+        self._at_peaks(self._prune)
+        shares = np.zeros((*self.top.shape, n))
+        shares[..., active] = self.shares
+        between = np.zeros(self.outer.shape[:2])
+        between[self.nodes] = self.level.stray() if self.needed.all() else 0.0
+        return PartBounds(
+            self.outer,
+            inner,
+            self.box.inputs(self.unit),
+            between,
+            shares,
+            self.remaining,
+            self.pruned,
+            {"single_modes": len(self.level.single)},
         )
 
-    def _level(
-        self, flow: LinearFlow, cuts: Boxes, a: int, peak: Array, within: _Bounded | None
-    ) -> _Bounded:
-        """Bounds of one level; what the level inside it attains is attained here too."""
-        low, high = cuts.lower[a], cuts.upper[a]
-        box = Box(flow.system, cuts.names, flow.time, low, high)
-        if not (high > low).any():
-            value, error, stray = box.centre_motion()
-            both, margin = np.stack([-value, value], -1), error[..., None]
-            at = np.broadcast_to(low, (*both.shape, len(low))).copy()
-            return _Bounded(both + margin, both - margin, at, stray, len(value))
-        level, workers = box.level(), self.workers or os.cpu_count() or 1
-        outer, unit = level.bounds(self.gap * peak, self.slabs, self.steps, workers)
-        node, output, side = (x.ravel() for x in np.indices(outer.shape))
-        reached = box.reached(unit.reshape(len(node), -1), node, output, np.where(side, 1, -1))
-        inner = reached.reshape(outer.shape)
-        self._parted(box, (outer, inner, unit), workers)
-        points = box.inputs(unit)
-        if within is not None:
-            better = within.inner > inner
-            inner[better], points[better] = within.inner[better], within.at[better]
-        return _Bounded(outer, inner, points, level.stray(), len(level.single))
+    def _require_narrow(self) -> None:
+        """Refuse a part whose remainders are worth more than `WIDE` of a peak, if bisections help.
 
-    def _parted(self, box: Box, bounds: tuple[Array, Array, Array], workers: int) -> None:
-        """Improve bounds (outer, inner, unit) above peaks whose gap is too wide, over parts."""
-        outer, inner, unit = bounds
-        top = np.maximum(inner.max(0), 0.0)  # (m, 2)
-        enough = np.broadcast_to(self.peaks * top.max(1, keepdims=True), top.shape)
+        Raises:
+            UnprovedError: They are.
+        """
+        for o, s in np.ndindex(self.top.shape) if not self.goal.last else ():
+            problem = Problem.of(self.level, o, s, 0.0)
+            problem.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
+            node, shares = int(problem.out[1].argmax()), np.zeros(len(self.box.low))
+            least, shares[self.box.active] = remainder(problem, node)
+            if least > WIDE * self.goal.peak[o] and can_be_halved(shares, self.proof.parts):
+                what = f"the remainders of the modes are {least / self.goal.peak[o]:.2g} of a peak"
+                raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
 
-        def improve(o: int, s: int) -> None:
-            nodes = np.flatnonzero(outer[:, o, s] > top[o, s] + enough[o, s])
-            every, side = np.full(len(nodes), o), (-1, 1)[s]
-            peak = Peak(
-                partial(box.part, o, nodes),
-                lambda unit: box.reached(unit, nodes, every, side),
-                unit.shape[-1],
-                s,
-                outer[nodes, o, s],
-                float(top[o, s]),
-                float(enough[o, s]),
-            )
-            outer[nodes, o, s] = peak.bounds(PARTS)
-            better = peak.value > inner[nodes, o, s]
-            inner[nodes[better], o, s] = peak.value[better]
-            unit[nodes[better], o, s] = peak.at[better]
-
-        gap = outer.max(0) - top
-        wide = np.argwhere((gap > enough) & (gap <= HOPELESS * top.max(1, keepdims=True)))
-        with ThreadPoolExecutor(workers) as pool:
-            for job in [pool.submit(improve, int(o), int(s)) for o, s in wide]:
+    def _at_peaks(self, improve: Callable[[int, int], None]) -> None:
+        """Do something for all outputs and sides with bounds above what suffices."""
+        enough = self.proof.peaks * self.goal.peak[:, None]
+        above = self.needed & (self.outer > self.top + enough)
+        with ThreadPoolExecutor(self.goal.workers) as pool:
+            for job in [pool.submit(improve, *place) for place in np.argwhere(above.any(0))]:
                 job.result()
 
+    def _problem(self, o: int, s: int) -> tuple[Problem, Rows]:
+        """Bounds of one output and side, and the places of those that are above what suffices."""
+        enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.top[o, s])
+        problem = Problem.of(self.level, o, s, enough, top)
+        known = self.outer[self.nodes, o, s]
+        problem.out[0] = known
+        above = self.needed[self.nodes, o, s] & (known > top + enough)
+        return problem, np.flatnonzero(above)
 
-def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None:
-    """Refuse attained bounds (A, T, m, 2), less their rounding, outside proved ones.
+    def _bound(self, o: int, s: int) -> None:
+        """Bound an output at nodes where it may pass its peak."""
+        problem, above = self._problem(o, s)
+        problem.run(above, PEAK_SLABS, PEAK_STEPS, 1.0, 0.0)
+        nodes = self.nodes[above]
+        self.outer[nodes, o, s], self.unit[nodes, o, s] = problem.out[0, above], problem.at[above]
 
-    Raises:
-        FailedError: One is outside, or no number.
-    """
-    wrong = ~(inner <= outer)
-    if wrong.any():
-        output = outputs[int(np.argwhere(wrong)[0, 2])]
-        beyond = np.nanmax(np.where(wrong, inner - outer, np.nan))
-        what = f"attained bounds of {output} lie outside the proved ones by {beyond:.3g}"
-        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
-
-
-@dataclass(frozen=True, eq=False)
-class _Bounded:
-    """One level's upper bounds of (−output, output).
-
-    Args:
-        outer: Proved, shape (T, m, 2).
-        inner: Attained, less rounding.
-        at: By these inputs, shape (T, m, 2, n), in SI units.
-        stray: Of outputs from straight lines in the step to a node, shape (T, m).
-        single: Modes that were enclosed one by one.
-    """
-
-    outer: Array
-    inner: Array
-    at: Array
-    stray: Array
-    single: int
+    def _prune(self, o: int, s: int) -> None:
+        """Prune the ends of the part that hold no higher peak of an output."""
+        problem, above = self._problem(o, s)
+        nodes = self.nodes[above]
+        problem.at[above] = self.unit[nodes, o, s]
+        worst = int(above[problem.out[0, above].argmax()])
+        self.shares[o, s] = remainder(problem, worst)[1]
+        best = self.unit[nodes, o, s][self.outer[nodes, o, s].argmax()]
+        low, high, pruned = prune_ends(self.level, problem, (o, s), above, best)
+        self.remaining[:, o, s] = self.box.inputs(np.stack([low, high]))
+        self.pruned[nodes, o, s] = pruned

@@ -57,16 +57,12 @@ class Slabs(NamedTuple):
 @loops
 def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
     """The output's model at inputs u, side × its value, and its gradient."""
-    both, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
+    both, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
     products(u, both)
-    for a in range(len(z)):
-        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], both)
-    weight, total = np.zeros(len(z)), 0.0
-    for k in range(len(data.share)):
-        total += of_mode(z, k, node, side, data, weight)
+    total = sensitivities(u, node, side, data, weight)
     gradient[:] = 0.0
     bend = np.zeros(len(both))
-    for a in range(len(z)):
+    for a in range(len(weight)):
         add(gradient, weight[a], data.linear[a])
         add(bend, weight[a], data.quadratic[a])
     for s in range(len(data.group_linear)):
@@ -80,6 +76,20 @@ def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> floa
             gradient[i] += bend[at] * u[j]
             gradient[j] += bend[at] * u[i]
             at += 1
+    return total
+
+
+@loops
+def sensitivities(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
+    """The modes' part of the model at inputs u; `weight` takes its slopes by all variables (Z,)."""
+    both, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
+    products(u, both)
+    for a in range(len(z)):
+        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], both)
+    weight[:] = 0.0
+    total = 0.0
+    for k in range(len(data.share)):
+        total += of_mode(z, k, node, side, data, weight)
     return total
 
 

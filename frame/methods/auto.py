@@ -1,25 +1,31 @@
-"""Auto: a proof; where there is none, the search; where there is none either, the follower.
+"""Auto: what is best known of an envelope, by the proof that is forecast to be the cheaper one.
 
-Up to six fuzzy inputs the branch and bound is tried, up to three or four if no tolerance is named
-or only the peaks are to keep it. The dual bound follows, which takes any number of inputs and
-states its gap. A gap above a named tolerance leads to the search, but not of the peaks.
+1. Up to six fuzzy inputs the branch and bound is a proof, for any number the dual bound is. The one
+   with less forecast work comes first, the other where it refuses or leaves a wide gap. The branch
+   and bound is first tried on the box as it is, and on parts of it where nothing else is left.
+2. A guarantee with a gap of more than a tenth of a peak is not the only answer: the search's
+   attained bounds stand inside it. Where a named tolerance is not proved, the search estimates the
+   envelope, and proved bounds stand outside it.
+3. Without a proof the search remains; where there are no oscillating modes, the follower.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from alphacut.frame.boxes import UnitFlow
+from alphacut.frame.boxes import SHARE, UnitFlow
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
+from alphacut.frame.parts import WIDE, exact, refusing
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array
@@ -29,13 +35,11 @@ from alphacut.fuzzy.refused import real
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
 FEW = 4
-"""Inputs up to which the branch and bound is worth its time where peaks count most."""
-BRANCHED = 1e-4, 5e-3
-"""Gaps of peaks, from one to below the other, with which it is so; else up to one input less
-(`benchmarks.frame.many_inputs --few`)."""
-
-WIDE = 0.1
-"""Gap of a peak with many inputs up to which the box is not parted where envelopes are many."""
+"""Inputs up to which the dual bound closes the gaps of peaks to the usual tolerance."""
+FINEST = 1e-4
+"""Gap of peaks, as a share of each, below which the dual bound takes too long."""
+ROUNDING = 1e-9
+"""Share of a peak by which a searched motion may be off."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +47,10 @@ class Auto:
     """The method and its options.
 
     Args:
-        tolerance: Error wanted, in m, or in the unit of the first output where none is a
-            displacement; 1e-4 unless given.
+        tolerance: Error wanted, as a share of each output's peak or, where the envelope is not
+            relative, in m or the unit of the first output; 1e-3 of each peak unless given.
         seed: Of the search and the follower.
-        workers: Threads of the proof; all cores unless given.
+        workers: Threads of the proof, which do not change the result; all cores unless given.
         peaks: Whether the error is that of the peaks, and a proof with a wider gap is kept.
 
     Raises:
@@ -69,55 +73,96 @@ class Auto:
         if not isinstance(flow.flow, LinearFlow):
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
         reasons: list[str] = []
-        held: Envelope | None = None
-        named = None if self.peaks else self.tolerance
-        for proof in self._proofs(flow):
+        proved: Envelope | None = None
+        for proof in self._proofs(flow, reasons):
             try:
-                proved = proof.run(flow, progress)
+                found = proof.run(flow, progress)
             except (UnprovedError, ModalError) as error:
                 reasons.append(f"{proof.name}: {error}")
                 continue
-            held = proved if held is None or _gap(proved) < _gap(held) else held
-            if self._close(proved, flow):
-                return _noted(proved, "; ".join([f"{proof.name} succeeded", *reasons]))
+            proved = found if proved is None or _gap(found) < _gap(proved) else proved
+            if self._is_close(found, flow):
+                return _noted(found, "; ".join([f"{proof.name} succeeded", *reasons]))
             reasons.append(f"{proof.name}: its gap is wider than the tolerance")
-        if held is not None and named is None:
-            return _noted(held, "; ".join([f"{held.method} succeeded", *reasons]))
-        why = f"unproved: {'; '.join(reasons)}"
+        named = self.tolerance is not None and not self.peaks
+        if proved is not None and not named and _gap(proved) <= WIDE:
+            return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
+        search = Search(self.tolerance, seed=self.seed)
         try:
-            search = Search(self.tolerance, seed=self.seed)
-            return _noted(search.run(flow, progress), f"search; {why}")
+            searched = search.run(flow, progress)
         except ModalError as error:
-            why = f"{why}; no search: {error}"
-        return _noted(follower.run(flow, progress), f"improved-graph-follower; {why}")
+            reasons.append(f"no search: {error}")
+            if proved is None:
+                why = f"improved-graph-follower; unproved: {'; '.join(reasons)}"
+                return _noted(follower.run(flow, progress), why)
+            return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
+        if proved is not None and not named:
+            return _noted(with_attained(proved, searched), f"{proved.method} and search")
+        outer = None if proved is None else proved.proved
+        why = f"search; unproved: {'; '.join(reasons)}"
+        return _noted(replace(searched, outer=outer), why)
 
-    def _proofs(self, flow: UnitFlow) -> tuple[Proof | DualProof, ...]:
-        """Proofs to try, in order; the branch and bound where it is the cheaper one."""
-        inputs, dual = len(flow.boxes.names), DualProof(workers=self.workers)
-        proof = Proof(tolerance=self.tolerance, boxes=BOXES, workers=self.workers)
-        share, few = self.tolerance or 0.0, FEW
-        if share and not self.peaks:
-            few = MOST_PARAMETERS
-        elif share and inputs > MOST_PARAMETERS:
+    def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
+        """Proofs to try, in order of their forecast work; the reasons of those that refuse."""
+        share, inputs = self.tolerance or SHARE, len(flow.boxes.names)
+        proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
+        dual = DualProof(workers=self.workers)
+        if self.tolerance and not self.peaks:
+            pass  # it leaves wide gaps below the peaks, however narrow it has them there
+        elif flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW):
+            dual = replace(dual, gap=max(share, FINEST), peaks=max(share, FINEST))
+        elif self.tolerance:
             dual = replace(dual, peaks=WIDE)
-        elif share and flow.relative:
-            dual = replace(dual, gap=share, peaks=share)
-            few = FEW if BRANCHED[0] <= share < BRANCHED[1] else FEW - 1
-        both = (proof, dual) if inputs <= few else (dual, proof)
-        return both if inputs <= max(few, FEW) else (dual,)
+        works = list[tuple[float, Proof | DualProof]]()
+        for each in (proof, dual) if inputs <= MOST_PARAMETERS else (dual,):
+            try:
+                with refusing():
+                    works.append((each.forecast(exact(flow), flow.boxes), each))
+            except UnprovedError as error:
+                reasons.append(f"{each.name}: {error}")
+        if self.tolerance and not self.peaks and len(works) == 2:
+            works = [(0.0, proof), works[1]]  # which bounds all nodes alike, not the peaks first
+        works.sort(key=lambda pair: pair[0])
+        for _, each in works:
+            yield replace(proof, parts=1) if each is proof and len(works) == 2 else each
+        if len(works) == 2 and works[0][1] is proof:
+            yield proof
 
-    def _close(self, proved: Envelope, flow: UnitFlow) -> bool:
+    def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
         """True where a gap is as narrow as asked, and of peaks with many inputs."""
-        if self.tolerance is None:
-            return True
-        if not self.peaks:
+        if self.tolerance is not None and not self.peaks:
             return bool((proved.error <= self._allowed(flow)).all())
-        few = flow.relative and len(flow.boxes.names) <= FEW
-        return not few or _gap(proved) <= 2 * self.tolerance
+        few = flow.relative and len(flow.boxes.names) <= FEW and self.tolerance is not None
+        return _gap(proved) <= (2 * (self.tolerance or 0.0) if few else WIDE)
 
     def _allowed(self, flow: UnitFlow) -> Array:
         """Error allowed of each output, shape (m,), in its unit; a little more for rounding."""
         return (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
+
+
+def with_attained(proved: Envelope, searched: Envelope) -> Envelope:
+    """A guarantee with what a search attains inside it, and both peaks in words."""
+    assert proved.inner is not None
+    peak = np.maximum(np.abs(searched.lower), np.abs(searched.upper)).max((0, 1))
+    ends, places = [], []
+    for side, name in ((-1, "lower"), (1, "upper")):
+        inner, at = getattr(proved.inner, name).copy(), getattr(proved, f"{name}_at").copy()
+        found = getattr(searched, name) - side * ROUNDING * peak
+        better = side * found > side * inner
+        inner[better], at[better] = found[better], getattr(searched, f"{name}_at")[better]
+        ends.append(inner)
+        places.append(at)
+    both = replace(
+        proved,
+        inner=Ends(*ends),
+        lower_at=places[0],
+        upper_at=places[1],
+        error=np.maximum(proved.upper - ends[1], ends[0] - proved.lower),
+        evaluations=proved.evaluations + searched.evaluations,
+        seconds=proved.seconds + searched.seconds,
+    )
+    facts = {**both.facts, "gap_of_peaks": _gap(both)}
+    return replace(both, facts=facts, notes=(both.peak_words, *both.notes))
 
 
 def _gap(proved: Envelope) -> float:

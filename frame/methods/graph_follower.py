@@ -56,8 +56,9 @@ class GraphFollower:
 
     Args:
         order: Degree κ of the Taylor models, 1 or 2.
-        tolerance: Promised gain above which a new trajectory is computed, in the unit of the first
-            output.
+        tolerance: Promised gain above which a new trajectory is computed, as a share of each
+            output's peak, or in the unit of the first displacement (the first output without one)
+            where the envelope is not relative.
 
     Raises:
         RefusedError: A switch is out of its range.
@@ -65,7 +66,7 @@ class GraphFollower:
 
     name: ClassVar[str] = "graph-follower"
     order: int = 2
-    tolerance: float = 1e-4
+    tolerance: float = 1e-3
 
     def __post_init__(self) -> None:
         require(self.order in (1, 2), "order", self.order, "1 and 2, the degrees of a Taylor model")

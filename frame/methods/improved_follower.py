@@ -47,7 +47,9 @@ class ImprovedFollower:
     """The method and its switches.
 
     Args:
-        tolerance: Predicted gain above which a new graph is computed, in units of the outputs.
+        tolerance: Predicted gain above which a new graph is computed, as a share of each
+            output's peak, or in the unit of the first displacement (the first output without one)
+            where the envelope is not relative.
         budget: Most graphs over all levels.
         seed: Which points are spread.
 
@@ -56,7 +58,7 @@ class ImprovedFollower:
     """
 
     name: ClassVar[str] = "improved-graph-follower"
-    tolerance: float = 7e-5
+    tolerance: float = 7e-4
     budget: int = 5000
     seed: int = 0
 

@@ -5,44 +5,42 @@
    and likewise the motion under a record (`frame.modal`).
 2. What these polynomials miss in the equations of motion is bounded over the whole box, and with it
    the error of the motion (`frame.certificate.model_error`). The degree rises until that takes a
-   fifth of the gap wanted. Where it does not, the box is cut in two across its relatively widest
-   input, and each part has polynomials of its own, up to `parts` of them. Where these are too few
-   to cut every input once, none is cut: the error would seldom fall enough.
+   fifth of the gap wanted. Where it does not, the part is refused, and bisected (`frame.parts`).
 3. Branch and bound encloses the polynomials' extremes at all nodes, for all outputs, sides and
    levels, between a point that is attained and a bound that is proved (`frame.certificate`).
-4. The envelope is the union over the parts: proved bounds, the points that attain all but the gap
-   of them, and a bound of what the motion does between nodes.
 """
 
 from __future__ import annotations
 
-import os
-import time
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from alphacut.frame.boxes import Boxes, UnitFlow
-from alphacut.frame.certificate.certificate import Certificate, certify
+from alphacut.frame.boxes import SHARE, Boxes, UnitFlow
+from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures.modes import ModalError
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.parts import BisectionError, Goal, PartBounds, prove
+from alphacut.frame.structures.polynomial_dependence import (
+    UnprovedError,
+    degrees,
+    without_ratio,
+)
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import real
-from alphacut.fuzzy.result import Nature
 
 PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
 USUAL = 10.0
 """Proved over sampled error of the model, seldom less."""
+BOXES_OF_INPUT = 4.0
+"""Factor by which one more input multiplies the boxes of a branch and bound, about."""
 ATTEMPTS = 5
 """Models of rising degree that are tried on a box."""
 
@@ -56,12 +54,13 @@ class Proof:
     """The method and its options.
 
     Args:
-        gap: Wanted distance of attained and proved bounds, in m, or in the unit of the first output
-            where none is a displacement; a tenth of the tolerance unless given.
-        tolerance: Largest error allowed: what the gap may grow to where a smaller one is not
-        proved.
+        gap: Wanted distance of attained and proved bounds, as the tolerance; a tenth of that unless
+            given.
+        tolerance: Largest error allowed, what the gap may grow to where a smaller one is not
+            proved: a share of each output's peak, or in the unit of the first displacement (the
+            first output without one) where the envelope is not relative; 1e-3 unless given.
         boxes: Most boxes looked at for each bound, on average; where they end, the gap is wider.
-        parts: Most parts of the box with polynomials of their own; d inputs are cut from 2^d on.
+        parts: Most parts of the box that a peak is worth, and that are refused.
         budget: Most eigen-analyses on each part.
         workers: Threads, which do not change the result; all cores unless given.
 
@@ -73,7 +72,7 @@ class Proof:
     gap: float | None = None
     tolerance: float | None = None
     boxes: float = 4000
-    parts: int = 8
+    parts: int = 16
     budget: int = 280
     workers: int | None = None
 
@@ -87,139 +86,126 @@ class Proof:
 
         Raises:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance.
-            ModalError: The structure has no smooth oscillating modes over the box.
         """
-        begun, tolerance = time.perf_counter(), flow.tolerance(self.tolerance or self.gap)
-        linear, count = exact(flow), len(flow.boxes.names)
-        if count > MOST_PARAMETERS:
-            raise UnprovedError(
-                f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {count}"
-            )
-        gaps = (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
-        modelled = self._modelled(linear, flow, gaps)
-        parts: list[tuple[Boxes, Certificate]] = []
-        for done, (boxes, model, error, gap) in enumerate(modelled):
-            tick = share(progress, done / len(modelled), (done + 1) / len(modelled))
-            proof = certify(
-                model,
-                gap=gap,
-                model_error=error,
-                scale=flow.scale,
-                workers=self.workers or os.cpu_count() or 1,
-                budget=self.boxes,
-                progress=tick,
-            )
-            parts.append((boxes, proof))
-        inner, outer, at = _united(flow, parts)
-        error = (outer - inner).max(-1)
-        facts = {
-            "model_error": max(float((error / flow.scale).max()) for _, _, error, _ in modelled),
-            "degree": max(model.degree for _, model, _, _ in modelled),
-            "gap": float((error / flow.scale).max()),
-            "boxes": sum(proof.boxes for _, proof in parts),
-            "parts": len(parts),
-        }
-        envelope = flow.envelope(
-            outer,
-            at,
-            error,
-            method=self.name,
-            nature=Nature.GUARANTEED,
-            evaluations=sum(model.analyses for _, model, _, _ in modelled),
-            seconds=time.perf_counter() - begun,
-            facts=facts,
-        )
-        return replace(
-            envelope,
-            basis=("the equations of motion hold",),
-            inner=Ends(-inner[..., 0], inner[..., 1]),
-            between=np.max([proof.between for _, proof in parts], axis=0),
-            attained_error=np.max([proof.attained_error for _, proof in parts], axis=0),
-        )
+        tolerance = flow.tolerance(self.tolerance or self.gap)
+        return prove(replace(self, tolerance=tolerance), flow, progress)
 
-    def _modelled(
-        self, linear: LinearFlow, flow: UnitFlow, gaps: tuple[float, ...]
-    ) -> list[tuple[Boxes, ModalModel, Array, float]]:
-        """Parts of the box with their models, proved errors and gaps."""
-        reason: UnprovedError | ModalError = UnprovedError("nothing was tried")
-        most = self.parts if 2 ** len(flow.boxes.names) <= self.parts else 1
-        for gap in gaps:
-            done: list[tuple[Boxes, ModalModel, Array, float]] = []
-            left = [flow.boxes]
-            while left:
-                boxes = left.pop()
-                try:
-                    done.append((boxes, *self._proved(linear, boxes, flow, gap), gap))
-                    continue
-                except (GapError, ModalError) as error:
-                    reason = error
-                if len(done) + len(left) + 2 > most:
-                    break
-                left += boxes.halves()
-            else:
-                return done
-        raise reason
+    def peak_gap(self, scale: Array, peak: Array) -> Array:
+        """The tolerance of each output, shape (m,)."""
+        del peak
+        return scale * self._gaps[-1]
 
-    def _proved(
-        self, linear: LinearFlow, boxes: Boxes, flow: UnitFlow, gap: float
-    ) -> tuple[ModalModel, Array]:
-        """Modal model over boxes with its proved error (T, m).
+    @property
+    def _gaps(self) -> tuple[float, ...]:
+        """Gaps that are tried on a part, in units of the tolerance."""
+        tolerance = self.tolerance or SHARE
+        return (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
 
-        That exceeds the sampled error some thirty times, so the polynomials are refined until it
-        takes little of the gap.
+    def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
+        """Expected work on the box, in evaluations of a mode's motion at a node.
 
         Raises:
-            GapError: It takes too much.
+            UnprovedError: There are too many inputs, or matrices are no polynomials of them.
+        """
+        d = int((boxes.upper[0] > boxes.lower[0]).sum())
+        if d > MOST_PARAMETERS:
+            raise UnprovedError(
+                f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {d}"
+            )
+        ends = zip(boxes.lower[0].tolist(), boxes.upper[0].tolist(), strict=True)
+        degrees(without_ratio(flow.system), dict(zip(boxes.names, ends, strict=True)))
+        return float(BOXES_OF_INPUT**d)
+
+    def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[PartBounds]:
+        """Bounds on each level of a part.
+
+        Raises:
+            UnprovedError: The error of the modal model cannot be bounded within the tolerance.
+            ModalError: The structure has no smooth oscillating modes over the part.
+        """
+        model, error, gap = self._modelled(flow, boxes, goal.scale)
+        proof = certify(
+            model,
+            gap=gap,
+            model_error=error,
+            scale=goal.scale,
+            workers=goal.workers,
+            budget=self.boxes,
+        )
+        facts = {
+            "model_error": float((error / goal.scale).max()),
+            "degree": model.degree,
+            "boxes": proof.boxes / len(boxes.alpha),
+            "evaluations": model.analyses / len(boxes.alpha),
+        }
+        at, off = boxes.to_physical(proof.at), proof.attained_error
+        shares = np.broadcast_to(tail_shares(model), at.shape[2:])
+        return [
+            PartBounds(outer, inner, where, proof.between, shares, off, facts=facts)
+            for outer, inner, where in zip(proof.outer, proof.bounds, at, strict=True)
+        ]
+
+    def _modelled(
+        self, flow: LinearFlow, boxes: Boxes, scale: Array
+    ) -> tuple[ModalModel, Array, float]:
+        """Modal model of a part with its proved error (T, m) and the gap that it leaves room for.
+
+        That error exceeds the sampled one some thirty times, so the polynomials are refined until
+        it takes little of the gap.
+
+        Raises:
+            GapError: It takes too much of all gaps.
             UnprovedError: No degree can help, or a proof needs more than is affordable.
         """
+        refusal = UnprovedError("no gap is asked for")
+        for gap in self._gaps:
+            try:
+                return *self._proved(flow, boxes, scale, gap), gap
+            except (GapError, BisectionError) as error:
+                refusal = error
+        raise refusal
+
+    def _proved(
+        self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
+    ) -> tuple[ModalModel, Array]:
+        """Modal model of a part with its proved error (T, m), which leaves room for a gap."""
         aim, before, largest = gap / 30, 0, np.inf
         for _ in range(ATTEMPTS):
-            how = {"budget": self.budget, "scale": flow.scale, "energy": True}
-            model = fit_modes(linear, boxes, tolerance=aim, **how)  # type: ignore[arg-type]
+            how = {"budget": self.budget, "scale": scale, "energy": True}
+            model = fit_modes(flow, boxes, tolerance=aim, **how)  # type: ignore[arg-type]
             if model.degree <= before:
                 break
-            sampled = float((model.error / flow.scale).max())
+            sampled = float((model.error / scale).max())
             largest = USUAL * sampled  # a bound is seldom less, and takes time
             if largest <= PORTION * gap:
                 error = proved_error(model)
-                largest = float((error / flow.scale).max())
+                largest = float((error / scale).max())
                 if largest <= PORTION * gap:
                     return model, error
             # a degree more divides it by ten or so
             aim, before = sampled * min(0.99, 4 * PORTION * gap / largest), model.degree
-        raise GapError(
-            f"the proved error of the modes, some {flow.in_words(largest)}, takes too much of the"
-            f" gap {flow.in_words(gap)}",
-            "narrower or fewer fuzzy inputs, or a wider gap, can be proved",
-        )
+        raise self._refusal(model, largest / gap)
+
+    def _refusal(self, model: ModalModel, share: float) -> UnprovedError:
+        """Refusal of a part of which the model's error takes too large a share of the gap.
+
+        Halving the inputs that share in the error divides it by 2^(degree + 1) or so.
+        """
+        what = f"the proved error of the modes, {share:.3g} of it, takes too much of the gap"
+        cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
+        shares = tail_shares(model)
+        halvings = np.ceil(np.log2(share / PORTION) / (model.degree + 1))
+        if halvings / (shares**2).sum() > np.log2(self.parts):
+            return BisectionError(what, cure)
+        return GapError(what, cure, int(shares.argmax()))
 
 
-def exact(flow: UnitFlow) -> LinearFlow:
-    """The exact motion of a linear structure.
-
-    Raises:
-        UnprovedError: It is none.
-    """
-    linear = flow.flow
-    if not isinstance(linear, LinearFlow):
-        raise UnprovedError("the system is not linear")
-    if not isinstance(linear.integrator, Exact):
-        raise UnprovedError(
-            f"the motion is that of the scheme '{linear.integrator.name}', and a proof is of the"
-            " exact one"
-        )
-    return linear
-
-
-def _united(flow: UnitFlow, parts: list[tuple[Boxes, Certificate]]) -> tuple[Array, Array, Array]:
-    """Attained bounds and proved ones of the union, and where; some parts have fewer levels."""
-    levels, d = len(flow.boxes.alpha), len(flow.boxes.names)
-    shape = (levels, len(flow.time), len(flow.outputs), 2)
-    inner, outer, at = np.full(shape, -np.inf), np.full(shape, -np.inf), np.zeros((*shape, d))
-    for boxes, proof in parts:
-        own = slice(0, len(boxes.alpha))
-        better = proof.bounds > inner[own]
-        inner[own][better] = proof.bounds[better]
-        at[own][better] = flow.boxes.to_unit(boxes.to_physical(proof.at))[better]
-        outer[own] = np.maximum(outer[own], proof.outer)
-    return inner, outer, at
+def tail_shares(model: ModalModel) -> Array:
+    """Share of each input in the terms of highest degree of a modal model, shape (d,)."""
+    index, top = model.eigenvalue.index, model.eigenvalue.index.sum(1) == model.degree
+    weight = np.zeros(len(index))
+    for polynomial in (model.eigenvalue, model.coefficient):
+        size = np.abs(polynomial.coefficients)
+        weight += (size / np.maximum(size.max(0), 1e-300)).max(1)
+    shares = weight[top] @ index[top]
+    return np.asarray(shares / max(float(shares.sum()), 1e-300))

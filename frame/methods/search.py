@@ -70,8 +70,9 @@ class Search:
     """The method and its options.
 
     Args:
-        tolerance: Error wanted, in m, or in the unit of the first output where none is a
-            displacement; 1e-4 unless given.
+        tolerance: Error wanted, as a share of each output's peak, or in the unit of the first
+            displacement (the first output without one) where the envelope is not relative; 1e-3
+            unless given.
         passes: Most independent passes; 8 unless given, 5 of more than `MANY` inputs.
         seed: Of all that is drawn.
 

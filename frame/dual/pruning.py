@@ -1,0 +1,92 @@
+"""Pruning of a box: of each input, the end of its range that cannot hold a higher peak.
+
+The half or quarter of an input's range that lies away from the best inputs found is bounded by the
+models at hand. Where no bound lies above the peak, that end is pruned (domain reduction by probing:
+Tawarmalani, Sahinidis 2002). What remains is narrower in many inputs at once, and the remainders of
+models that are expanded anew there fall with the fourth power of the widths.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.dual.level import Level, Problem
+from alphacut.frame.dual.slabs import sensitivities
+from alphacut.fuzzy.arrays import Array, Rows
+
+ENDS = (0.5, 0.25)
+"""Shares of an input's range that are tried."""
+EFFORTS = (1, 24)
+"""Slabs of a bound over an end."""
+STEPS = 40
+"""Evaluations of the dual function for each slab."""
+
+
+def prune_ends(
+    level: Level, problem: Problem, place: tuple[int, int], above: Rows, best: Array
+) -> tuple[Array, Array, Array]:
+    """Prune the ends of a box that hold no higher peak of one output and side.
+
+    Args:
+        level: Models over the box.
+        problem: Bounds over the box.
+        place: Output and side.
+        above: Places of the nodes that may hold one, shape (J,).
+        best: Coordinates away from which ends lie, shape (d,).
+
+    Returns:
+        Lower and upper ends of what remains, (d,), and bounds at these nodes over all that is
+        pruned, (J,).
+    """
+    low, high = -np.ones_like(best), np.ones_like(best)
+    pruned = np.full(len(above), -np.inf)
+    for slabs in EFFORTS:
+        for i in range(len(best)):
+            away = int(best[i] <= 0)  # the upper end lies away from a best input that is low
+            for share in ENDS:
+                if high[i] - low[i] < 2.0:
+                    break
+                piece = low.copy(), high.copy()
+                piece[1 - away][i] = end = (1 - 2 * share) * (1 if away else -1)
+                bounds = _over_piece(level, problem, place, above, piece, slabs)
+                if bounds.max() <= problem.attained + problem.enough:
+                    pruned = np.maximum(pruned, bounds)
+                    (high if away else low)[i] = end
+    return low, high, pruned
+
+
+def _over_piece(
+    level: Level,
+    problem: Problem,
+    place: tuple[int, int],
+    above: Rows,
+    piece: tuple[Array, Array],
+    slabs: int,
+) -> Array:
+    """Bounds over a piece of the box at nodes (J,), until one lies above the peak."""
+    inside = Problem.of(level.within(*piece), *place, problem.enough, problem.attained)
+    inside.out[0] = problem.out[0]
+    for node in above[np.argsort(-problem.out[0, above])]:
+        inside.run(np.array([node]), slabs, STEPS, 1.0, 0.0)
+        if inside.out[0, node] > problem.attained + problem.enough:
+            break
+    return np.asarray(inside.out[0, above])
+
+
+def remainder(problem: Problem, node: int) -> tuple[float, Array]:
+    """What remainders add to a bound at a node at least, and the share of each input in it, (d,).
+
+    At the maximum the multipliers are the slopes of the motion by the intervening variables.
+    Remainders are of fourth degree: they are shared out by the squares of what the first and second
+    degree of each variable have of an input.
+    """
+    data, d = problem.data, problem.data.linear.shape[1]
+    slope = np.zeros(len(data.linear))
+    sensitivities(problem.at[node], node, problem.side, data, slope)
+    upper = np.zeros((len(slope), d, d))
+    upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)
+    size = (np.abs(data.linear) + upper.sum(1) + upper.sum(2)) ** 2
+    each = np.abs(slope) * data.rest
+    shares = (each / np.maximum(size.sum(1), 1e-300)) @ size
+    least = float(problem.constant[1, node] + each.sum())
+    return least, np.asarray(shares / max(float(shares.sum()), 1e-300))

@@ -1,0 +1,484 @@
+"""Spatial branch and bound over the inputs, above every proof: bounds over parts of a box.
+
+1. A part takes the bounds that a proof has of it. What may still hold a peak that is higher than
+   the incumbent by more than the gap asked for is open; all else is closed with its bounds.
+2. A part that the proof refuses, or that is open, is bisected: along the input that the refusal
+   names, else along the one with the largest share of the gap; at the geometric middle where the
+   ends are positive and far apart, since frequencies are powers of stiffnesses and masses.
+3. The part with the largest bound comes first. Where a gap falls too slowly it is left.
+
+A node's bound is the largest over all parts (Adjiman, Floudas 1998; pruning by bounds).
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from alphacut.frame.boxes import Boxes, UnitFlow
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.progress_bar import Progress
+from alphacut.fuzzy.refused import FailedError
+from alphacut.fuzzy.result import Nature
+
+BATCH = 2
+"""Parts that are bounded with the same incumbents, whatever the number of threads."""
+MIN_PROGRESS = 0.8
+"""A gap is left where it has fallen by less than this share of an even fall over all parts."""
+GRACE = 8
+"""Parts that are bounded before the progress of a gap counts."""
+WIDE = 0.1
+"""Gap of a peak, as a share of it, above which bounds are worth nothing elsewhere either. It is
+left where parts cannot halve all inputs that share in it."""
+ADDED = ("boxes", "evaluations")
+"""Facts of parts that are added; of the others the largest counts."""
+NARROWED = 0.5
+"""Shares pruned from all inputs, in sum, from which on a part is bounded anew, not bisected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What is asked of the bounds of a part, L levels.
+
+    Args:
+        scale: Units of the tolerances of each output, shape (m,).
+        peak: Peak of each output at the modal inputs and the probes, shape (m,).
+        needed: Bounds of (−output, output) that are asked for, shape (L, T, m, 2).
+        outer: Bounds that are known, the same shape; infinite where none is.
+        incumbent: Largest attained value on each side, shape (L, m, 2).
+        workers: Threads.
+        last: Whether the part is not bisected any more, so that wide bounds are better than none.
+    """
+
+    scale: Array
+    peak: Array
+    needed: Mask
+    outer: Array
+    incumbent: Array
+    workers: int
+    last: bool
+
+
+@dataclass(frozen=True, eq=False)
+class PartBounds:
+    """Upper bounds of (−output, output) over one level of a part, n inputs.
+
+    Args:
+        outer: Proved, shape (T, m, 2).
+        inner: Attained, less rounding; −inf where nothing is.
+        at: By these inputs, shape (T, m, 2, n), in SI units.
+        between: Of outputs from straight lines in the step to a node, shape (T, m).
+        shares: Share of each input in the gap at each peak, shape (m, 2, n).
+        attained_error: What the exact motion at `at` may exceed `inner` by, shape (T, m); None for
+            rounding alone.
+        remaining: Lower and upper ends of what may hold each peak, shape (2, m, 2, n), in SI units;
+            None for all of the part.
+        pruned: Bounds over what may not, as far as nodes are asked for; None for nothing.
+        facts: Further numbers by name.
+    """
+
+    outer: Array
+    inner: Array
+    at: Array
+    between: Array
+    shares: Array
+    attained_error: Array | None = None
+    remaining: Array | None = None
+    pruned: Array | None = None
+    facts: Mapping[str, float] = field(default_factory=dict)
+
+
+class BisectionError(UnprovedError):
+    """Bounds are not proved, and bisections would not help enough."""
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Turn what modes and matrices have against a proof into its refusal.
+
+    Raises:
+        UnprovedError: It refuses.
+    """
+    try:
+        yield
+    except ModalError as error:
+        raise UnprovedError(error.what, error.cure) from None
+    except np.linalg.LinAlgError as error:
+        what = f"a matrix is singular ({str(error).lower()})"
+        raise UnprovedError(what, "take improved-graph-follower") from None
+
+
+class BoxProof(Protocol):
+    """A proof of bounds over any box of the inputs."""
+
+    name: ClassVar[str]
+
+    @property
+    def parts(self) -> int:
+        """Most parts that a box, or a peak of an output, is worth."""
+
+    @property
+    def workers(self) -> int | None:
+        """Threads; all cores unless given."""
+
+    def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
+        """Expected work on the box, in evaluations of a mode's motion at a node.
+
+        Raises:
+            UnprovedError: No part of the box can be proved.
+        """
+
+    def peak_gap(self, scale: Array, peak: Array) -> Array:
+        """Gap at peaks that suffices, shape (m,), in the units of the outputs; see `Goal`."""
+
+    def bounds(
+        self, flow: LinearFlow, boxes: Boxes, goal: Goal
+    ) -> Sequence[PartBounds | UnprovedError]:
+        """Bounds on each level of a part, or why there are none.
+
+        Raises:
+            UnprovedError: There are none on any level.
+            ModalError: The structure has no smooth oscillating modes over the part.
+        """
+
+
+@dataclass(eq=False)
+class Part:
+    """A part of the box whose bounds are to be improved.
+
+    Args:
+        boxes: Its L levels.
+        levels: Which of all levels they are.
+        needed: Bounds that are asked for, shape (L, T, m, 2).
+        outer: Bounds that are known, the same.
+        urgency: The largest of them above the incumbent, in units of the gap asked for.
+    """
+
+    boxes: Boxes
+    levels: list[int]
+    needed: Mask
+    outer: Array
+    urgency: float = np.inf
+
+    def restricted(self, chosen: Sequence[int], needed: Mask) -> Part:
+        """Some of its levels, with other bounds that are asked for."""
+        levels = [self.levels[k] for k in chosen]
+        return Part(self.boxes.on_levels(chosen), levels, needed, self.outer[list(chosen)])
+
+    def bisected(self, axis: int) -> list[Part]:
+        """Both halves along an input, each with the levels that reach it."""
+        halves = []
+        for boxes, reached in self.boxes.bisected(axis):
+            levels = [self.levels[k] for k in reached]
+            halves.append(Part(boxes, levels, self.needed[reached], self.outer[reached]))
+        return halves
+
+
+Key = tuple[int, int, int]
+"""A peak: its level, output and side."""
+
+
+@dataclass(eq=False)
+class Queue:
+    """Parts that are open, and the hull of all that are closed.
+
+    Args:
+        proof: The proof.
+        flow: Exact motions of a linear structure.
+        boxes: All levels, A of them.
+        scale: As of `Goal`.
+        peak: As of `Goal`.
+    """
+
+    proof: BoxProof
+    flow: LinearFlow
+    boxes: Boxes
+    scale: Array
+    peak: Array
+
+    def __post_init__(self) -> None:
+        shape = (len(self.boxes.alpha), len(self.flow.time), len(self.flow.outputs), 2)
+        self.closed, self.inner = np.full(shape, -np.inf), np.full(shape, -np.inf)
+        self.at = np.zeros((*shape, len(self.boxes.names)))
+        self.between, self.attained_error = np.zeros((2, *shape[1:3]))
+        self.facts: dict[str, float] = {"parts": 0}
+        self.refusals, self.refusal = 0, UnprovedError("nothing was tried")
+        self.workers = self.proof.workers or os.cpu_count() or 1
+        self.gap = self.proof.peak_gap(self.scale, self.peak)
+        whole = Part(self.boxes, [*range(shape[0])], np.ones(shape, bool), np.full(shape, np.inf))
+        self.open = [whole]
+        self.spent, self.begun = dict[Key, int](), dict[Key, float]()
+        self.abandoned = set[Key]()
+
+    def run(self, progress: Progress | None = None) -> None:
+        """Bound parts until none is open.
+
+        Raises:
+            UnprovedError: A part is refused, and so are many within it.
+        """
+        with ThreadPoolExecutor(self.workers) as pool:
+            while batch := self._next():
+                goals = [self._goal(part, self.workers // len(batch)) for part in batch]
+                found = list(pool.map(self._bounds, batch, goals))
+                for part, levels in zip(batch, found, strict=True):
+                    self._settle(part, levels)
+                if progress is not None:
+                    progress(self.facts["parts"] / (self.facts["parts"] + len(self.open)))
+
+    def _next(self) -> list[Part]:
+        """The most urgent parts, without the peaks whose gap is left as it is."""
+        for part in self.open:
+            self._drop_abandoned(part)
+        self.open = [part for part in self.open if part.needed.any()]
+        self.open.sort(key=lambda part: -part.urgency)
+        batch, self.open = self.open[:BATCH], self.open[BATCH:]
+        return batch
+
+    def _drop_abandoned(self, part: Part) -> None:
+        for k, level in enumerate(part.levels):
+            for own, output, side in self.abandoned:
+                if own == level and part.needed[k, :, output, side].any():
+                    place = (k, slice(None), output, side)
+                    mask = np.zeros_like(part.needed[k])
+                    mask[:, output, side] = part.needed[place]
+                    self._close(level, mask, part.outer[k])
+                    part.needed[place] = False
+
+    def _close(self, level: int, mask: Mask, outer: Array) -> None:
+        """Take bounds over a part into the hull."""
+        hull = self.closed[level]
+        hull[mask] = np.maximum(hull[mask], outer[mask])
+
+    def _incumbent(self, level: int) -> Array:
+        """Largest attained value of each output and side in a level, (m, 2); 0 at least."""
+        return np.asarray(np.maximum(self.inner[level:].max((0, 1)), 0.0))
+
+    def _goal(self, part: Part, workers: int) -> Goal:
+        incumbent = np.stack([self._incumbent(level) for level in part.levels])
+        known = part.needed, part.outer, incumbent
+        last = self.refusals >= self.proof.parts - 1
+        return Goal(self.scale, self.peak, *known, max(workers, 1), last)
+
+    def _bounds(self, part: Part, goal: Goal) -> Sequence[PartBounds | UnprovedError]:
+        try:
+            with refusing():
+                return self.proof.bounds(self.flow, part.boxes, goal)
+        except UnprovedError as refusal:
+            return [refusal] * len(part.levels)
+
+    def _settle(self, part: Part, found: Sequence[PartBounds | UnprovedError]) -> None:
+        """Take the bounds of a part over, and put what is open into the queue."""
+        self.facts["parts"] += 1
+        for k, level in enumerate(part.levels):
+            if isinstance(own := found[k], PartBounds):
+                part.outer[k] = np.where(
+                    part.needed[k], np.minimum(part.outer[k], own.outer), part.outer[k]
+                )
+                self._take(level, own)
+        votes = np.zeros(len(self.boxes.names))
+        wide = np.zeros_like(part.needed)
+        for k, level in enumerate(part.levels):
+            if isinstance(own := found[k], PartBounds):
+                wide[k] = self._split(part, k, level, own, votes)
+            else:
+                wide[k] = part.needed[k]
+                self._refused(own, votes)
+        levels = [k for k in range(len(part.levels)) if wide[k].any()]
+        if levels:
+            rest = part.restricted(levels, wide[levels])
+            self._put(rest.bisected(self._axis(rest.boxes, votes)))
+
+    def _refused(self, refusal: UnprovedError, votes: Array) -> None:
+        self.refusals, self.refusal = self.refusals + 1, refusal
+        if self.refusals >= self.proof.parts or isinstance(refusal, BisectionError):
+            raise refusal
+        if refusal.along is not None:
+            votes[refusal.along] += 1.0
+
+    def _take(self, level: int, own: PartBounds) -> None:
+        better = own.inner > self.inner[level]
+        self.inner[level][better], self.at[level][better] = own.inner[better], own.at[better]
+        self.between = np.maximum(self.between, own.between)
+        if own.attained_error is not None:
+            self.attained_error = np.maximum(self.attained_error, own.attained_error)
+        for name, value in own.facts.items():
+            known = self.facts.get(name)
+            if known is not None:
+                value = known + value if name in ADDED else max(known, value)
+            self.facts[name] = value
+
+    def _split(self, part: Part, k: int, level: int, own: PartBounds, votes: Array) -> Mask:
+        """Close what holds no higher peak; which bounds are left for the halves, (T, m, 2)."""
+        needed, outer = part.needed[k], part.outer[k]
+        top, worthless = self._incumbent(level) + self.gap[:, None], False
+        above = needed & (outer > top)
+        if own.pruned is not None:
+            self._close(level, above, own.pruned)
+        for output, side in _peaks(above):
+            key = (level, output, side)
+            peak = float(outer[:, output, side].max())
+            if self._is_hopeless(key, peak, own.shares[output, side]):
+                self.abandoned.add(key)
+                above[:, output, side] = False
+            elif peak > top[output, side] + WIDE * self.peak[output]:
+                votes += own.shares[output, side]
+                worthless = True
+        if worthless:
+            return np.asarray(needed)
+        self._close(level, needed & ~above, outer)
+        for output, side in _peaks(above):
+            votes += own.shares[output, side]
+            ends = None if own.remaining is None else own.remaining[:, output, side]
+            if ends is None or not self._narrowed(part.boxes.on_levels([k]), ends):
+                continue
+            mask = np.zeros_like(above)
+            mask[:, output, side] = above[:, output, side]
+            above = above & ~mask
+            rest = part.restricted([k], mask[None])
+            rest.boxes, pruned = rest.boxes.within(*ends), rest.boxes.radius
+            share = 1 - rest.boxes.radius / np.where(pruned > 0, pruned, 1.0)
+            whole = [rest] if share[pruned > 0].sum() >= NARROWED else []
+            self._put(whole or rest.bisected(self._axis(rest.boxes, own.shares[output, side])))
+        return np.asarray(above)
+
+    @staticmethod
+    def _narrowed(boxes: Boxes, ends: Array) -> bool:
+        return bool((ends[0] > boxes.lower[0]).any() or (ends[1] < boxes.upper[0]).any())
+
+    def _is_hopeless(self, key: Key, peak: float, shares: Array) -> bool:
+        """True where a gap falls too slowly, or too many inputs share it."""
+        level, output, side = key
+        others = [
+            float(part.outer[k, :, output, side][part.needed[k, :, output, side]].max(initial=0))
+            for part in self.open
+            for k, own in enumerate(part.levels)
+            if own == level
+        ]
+        top, most = self._incumbent(level)[output, side], self.proof.parts
+        gap = max(peak, *others) - top if others else peak - top
+        count = self.spent[key] = self.spent.get(key, 0) + 1
+        begun = self.begun.setdefault(key, gap)
+        even = (begun - self.gap[output]) * count / most
+        if count >= GRACE and gap > begun - MIN_PROGRESS * even:
+            return True
+        return count > most or (gap > WIDE * self.peak[output] and not can_be_halved(shares, most))
+
+    def _axis(self, boxes: Boxes, votes: Array) -> int:
+        """Input with most votes, else the relatively widest."""
+        width = boxes.upper[0] - boxes.lower[0]
+        votes = np.where(width > 0, votes, 0.0)
+        if votes.any():
+            return int(votes.argmax())
+        return int((width / np.maximum(np.abs(boxes.centre), 1e-300)).argmax())
+
+    def _put(self, parts: Sequence[Part]) -> None:
+        for part in parts:
+            excess = [
+                (np.where(part.needed[k], part.outer[k], -np.inf).max(0) - self._incumbent(level))
+                / np.maximum(self.gap[:, None], 1e-300)
+                for k, level in enumerate(part.levels)
+            ]
+            part.urgency = float(np.max(excess))
+            self.open.append(part)
+
+
+def _peaks(above: Mask) -> list[tuple[int, int]]:
+    """Outputs and sides with bounds above their peaks, from a mask (T, m, 2)."""
+    return [(int(output), int(side)) for output, side in np.argwhere(above.any(0))]
+
+
+def can_be_halved(shares: Array, parts: int) -> bool:
+    """Tells whether so many parts can halve all inputs among which a gap is shared, (n,)."""
+    return not shares.any() or 1 / float((shares**2).sum()) <= np.log2(parts)
+
+
+def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
+    """Guaranteed envelope of all outputs on all levels.
+
+    Raises:
+        UnprovedError: The system is not linear, its motion not the exact one, or bounds are not
+            proved.
+    """
+    begun, linear, cuts = time.perf_counter(), exact(flow), flow.boxes
+    with refusing():
+        proof.forecast(linear, cuts)
+    queue = Queue(proof, linear, cuts, flow.scale, flow.peak)
+    queue.run(progress)
+    outer = np.minimum.accumulate(queue.closed, axis=0)
+    inner, at = queue.inner, queue.at
+    for level in reversed(range(len(inner) - 1)):  # what a narrower cut attains is attained here
+        better = inner[level + 1] > inner[level]
+        inner[level][better], at[level][better] = inner[level + 1][better], at[level + 1][better]
+    _require_order(inner, outer, flow.outputs)
+    error = (outer - inner).max(-1)
+    largest = np.maximum(np.abs(outer).max((1, 3)), 1e-300)
+    of_peaks = (outer.max(1) - inner.max(1)).max(-1) / largest
+    facts = {
+        **queue.facts,
+        "gap": float((error / flow.scale).max()),
+        "gap_of_peaks": float(of_peaks.max()),
+    }
+    return Envelope(
+        alpha=cuts.alpha,
+        time=flow.time,
+        outputs=flow.outputs,
+        inputs=cuts.inputs,
+        lower=-outer[..., 0],
+        upper=outer[..., 1],
+        lower_at=at[..., 0, :],
+        upper_at=at[..., 1, :],
+        error=error,
+        nature=Nature.GUARANTEED,
+        method=proof.name,
+        units=flow.units,
+        basis=("the equations of motion hold",),
+        inner=Ends(-inner[..., 0], inner[..., 1]),
+        between=queue.between,
+        attained_error=queue.attained_error if queue.attained_error.any() else None,
+        evaluations=int(facts.pop("evaluations", inner.size)),
+        seconds=time.perf_counter() - begun,
+        facts=facts,
+    )
+
+
+def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None:
+    """Refuse attained bounds (A, T, m, 2), less their rounding, outside proved ones.
+
+    Raises:
+        FailedError: One is outside, or no number.
+    """
+    wrong = ~(inner <= outer)
+    if wrong.any():
+        output = outputs[int(np.argwhere(wrong)[0, 2])]
+        beyond = np.nanmax(np.where(wrong, inner - outer, np.nan))
+        what = f"attained bounds of {output} lie outside the proved ones by {beyond:.3g}"
+        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
+
+
+def exact(flow: UnitFlow) -> LinearFlow:
+    """The exact motion of a linear structure.
+
+    Raises:
+        UnprovedError: It is none.
+    """
+    linear = flow.flow
+    if not isinstance(linear, LinearFlow):
+        raise UnprovedError("the system is not linear")
+    if not isinstance(linear.integrator, Exact):
+        raise UnprovedError(
+            f"the motion is that of the scheme '{linear.integrator.name}', and a proof is of the"
+            " exact one"
+        )
+    return linear
