@@ -20,6 +20,7 @@ from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 MOST_ENTRIES = 400_000

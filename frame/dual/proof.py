@@ -183,9 +183,9 @@ class _Bounding:
             self.box.inputs(self.unit),
             between,
             shares,
-            self.remaining,
-            self.pruned,
-            {"single_modes": len(self.level.single)},
+            remaining=self.remaining,
+            pruned=self.pruned,
+            facts={"single_modes": len(self.level.single)},
         )
 
     def _require_narrow(self) -> None:
