@@ -13,6 +13,7 @@ from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import FunctionType
 
 import numpy as np
 from pydantic import BaseModel
@@ -83,6 +84,8 @@ def _canonical(value: object) -> object:
         return [type(value).__name__, values]
     if isinstance(value, np.ndarray):
         return [value.shape, str(value.dtype), hashlib.sha256(value.tobytes()).hexdigest()]
+    if isinstance(value, FunctionType):  # whose text names an address; the source is digested
+        return f"{value.__module__}.{value.__qualname__}"
     return value.name if isinstance(value, Path) else str(value)
 
 

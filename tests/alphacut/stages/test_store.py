@@ -78,6 +78,14 @@ def test_a_stage_that_fails_leaves_no_file(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_fingerprints_do_not_depend_on_where_functions_lie_in_memory():
+    content = load(ROOT / "cases" / "pendulum.toml", ()).content
+    (task,) = envelope.tasks(content.envelope, ())
+    models = [content.pendulum.structure(None) for _ in range(2)]
+    assert models[0].model.lagrangian is not models[1].model.lagrangian
+    assert len({envelope.stage(model, task).key for model in models}) == 1
+
+
 def test_fingerprints_see_every_input(tmp_path):
     def key(*changes):
         content = load(written(tmp_path), changes).content
