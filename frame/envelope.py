@@ -27,6 +27,8 @@ class Envelope(Bounds):
             guaranteed, else estimated from some trajectories. None where none was made.
         attained_error: What the exact motion at `lower_at` and `upper_at` may exceed the attained
             bounds `inner` by, shape (T, m); None for rounding alone.
+        least_peaks: Proved lower bound of the smallest peak of |output| in each cut, and the
+            smallest that a motion is known to have, each (A, m); None for what the bounds say.
         facts: Further numbers by name. A length is that of the first displacement, of the first
             output where none is one, and a share of each peak where the tolerance was relative.
             `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;
@@ -39,6 +41,7 @@ class Envelope(Bounds):
     time: Array
     between: Array | None = None
     attained_error: Array | None = None
+    least_peaks: Ends | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -67,6 +70,9 @@ class Envelope(Bounds):
                 dataset[f"{kind}_{end}"] = (band, values)
         if self.between is not None:
             dataset["between"] = (("time", "output"), self.between)
+        if self.least_peaks is not None:
+            for end, values in zip(("proved", "reached"), self.least_peaks, strict=True):
+                dataset[f"least_peak_{end}"] = (("alpha", "output"), values)
         if self.attained_error is not None:
             dataset["attained_error"] = (("time", "output"), self.attained_error)
         dataset["time"].attrs["units"] = "s"

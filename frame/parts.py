@@ -86,6 +86,8 @@ class PartBounds:
         remaining: Lower and upper ends of what may hold each peak, shape (2, m, 2, n), in SI units;
             None for all of the part.
         pruned: Bounds over what may not, as far as nodes are asked for; None for nothing.
+        least_peaks: Lower bound of each output's smallest peak, and one that is reached, shapes
+            (m,); None where all nodes are not bounded.
         facts: Further numbers by name.
     """
 
@@ -97,6 +99,7 @@ class PartBounds:
     attained_error: Array | None = None
     remaining: Array | None = None
     pruned: Array | None = None
+    least_peaks: Ends | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -213,6 +216,8 @@ class Queue:
         self.closed, self.inner = np.full(shape, -np.inf), np.full(shape, -np.inf)
         self.at = np.zeros((*shape, len(self.boxes.names)))
         self.between, self.attained_error = np.zeros((2, *shape[1:3]))
+        self.least_peaks = np.full((shape[0], shape[2]), np.inf)
+        self.least_reached = np.full((shape[0], shape[2]), np.inf)
         self.facts: dict[str, float] = {"parts": 0}
         self.refusals, self.refusal = 0, UnprovedError("nothing was tried")
         self.workers = self.proof.workers or os.cpu_count() or 1
@@ -313,6 +318,9 @@ class Queue:
         self.between = np.maximum(self.between, own.between)
         if own.attained_error is not None:
             self.attained_error = np.maximum(self.attained_error, own.attained_error)
+        if own.least_peaks is not None:
+            reached = self.least_reached[level]
+            self.least_reached[level] = np.minimum(reached, own.least_peaks.upper)
         for name, value in own.facts.items():
             known = self.facts.get(name)
             if known is not None:
@@ -337,6 +345,9 @@ class Queue:
                 worthless = True
         if worthless:
             return np.asarray(needed)
+        if needed.all():  # parts of this one are asked for their largest peaks alone
+            least = 0.0 if own.least_peaks is None else own.least_peaks.lower
+            self.least_peaks[level] = np.minimum(self.least_peaks[level], least)
         self._close(level, needed & ~above, outer)
         for output, side in _peaks(above):
             votes += own.shares[output, side]
@@ -422,6 +433,10 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         better = inner[level + 1] > inner[level]
         inner[level][better], at[level][better] = inner[level + 1][better], at[level + 1][better]
     _require_order(inner, outer, flow.outputs)
+    least_peaks = Ends(  # a lower bound holds in narrower cuts, what is reached in wider ones
+        np.maximum.accumulate(queue.least_peaks, axis=0),
+        np.minimum.accumulate(queue.least_reached[::-1], axis=0)[::-1],
+    )
     error = (outer - inner).max(-1)
     largest = np.maximum(np.abs(outer).max((1, 3)), 1e-300)
     of_peaks = (outer.max(1) - inner.max(1)).max(-1) / largest
@@ -446,6 +461,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         basis=("the equations of motion hold",),
         inner=Ends(-inner[..., 0], inner[..., 1]),
         between=queue.between,
+        least_peaks=least_peaks,
         attained_error=queue.attained_error if queue.attained_error.any() else None,
         evaluations=int(facts.pop("evaluations", inner.size)),
         seconds=time.perf_counter() - begun,

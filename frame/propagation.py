@@ -196,4 +196,5 @@ def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:
     names = ("lower", "upper", "lower_at", "upper_at", "error")
     own = {name: getattr(bounds, name)[which] for name in names}
     pairs = [x and Ends(x.lower[which], x.upper[which]) for x in (bounds.inner, bounds.outer)]
-    return replace(bounds, alpha=alpha, inner=pairs[0], outer=pairs[1], **own)
+    least = bounds.least_peaks and Ends(*(x[which] for x in bounds.least_peaks))
+    return replace(bounds, alpha=alpha, inner=pairs[0], outer=pairs[1], least_peaks=least, **own)

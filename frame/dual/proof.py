@@ -15,23 +15,26 @@ one of inputs (`kernel`, `level`).
 4. What the maxima name leads to inputs whose exact motion is the other end of the gap (`box`).
 5. The few nodes whose bounds are still too far above a peak are bounded over parts of the box
    (`alphacut.frame.parts`), after its ends are pruned (`pruning`).
+6. The same bounds, over ranges of the leading mode, tell how low a peak can be (`least_peaks`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.dual.box import Box
+from alphacut.frame.dual.least_peaks import least_peak
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.pruning import prune_ends, remainder
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.envelope import Envelope
+from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.parts import WIDE, Goal, PartBounds, can_be_halved, prove
 from alphacut.frame.structures.linear import frequencies
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
@@ -124,12 +127,14 @@ class DualProof:
         low, high = boxes.lower[k], boxes.upper[k]
         box = Box(flow.system, boxes.names, flow.time, low, high)
         if (high > low).any():
-            return _Bounding(self, box, goal, k).bounds()
+            return _Bounding(self, flow, box, goal, k).bounds()
         value, error, stray = box.centre_motion()
         both, margin = np.stack([-value, value], -1), error[..., None]
         at = np.broadcast_to(low, (*both.shape, len(low))).copy()
         shares = np.zeros((*both.shape[1:], len(low)))
-        return PartBounds(both + margin, both - margin, at, stray, shares)
+        least = Ends((np.abs(value) - error).max(0), (np.abs(value) + error).max(0))
+        found = PartBounds(both + margin, both - margin, at, stray, shares)
+        return replace(found, least_peaks=least)
 
 
 class _Bounding:
@@ -144,8 +149,8 @@ class _Bounding:
         shares: Share of each input in the gap at each peak, shape (m, 2, d).
     """
 
-    def __init__(self, proof: DualProof, box: Box, goal: Goal, k: int) -> None:
-        self.proof, self.box, self.goal = proof, box, goal
+    def __init__(self, proof: DualProof, flow: LinearFlow, box: Box, goal: Goal, k: int) -> None:
+        self.proof, self.flow, self.box, self.goal = proof, flow, box, goal
         self.needed, self.outer = goal.needed[k], goal.outer[k].copy()
         self.top = goal.incumbent[k].copy()
         self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
@@ -173,6 +178,7 @@ class _Bounding:
         self.remaining[:] = np.stack([self.box.low, self.box.high])[:, None, None]
         self.pruned = np.full(self.outer.shape, -np.inf)
         self._at_peaks(self._prune)
+        least = self._least_peaks() if self.needed.all() else None
         shares = np.zeros((*self.top.shape, n))
         shares[..., active] = self.shares
         between = np.zeros(self.outer.shape[:2])
@@ -185,8 +191,18 @@ class _Bounding:
             shares,
             remaining=self.remaining,
             pruned=self.pruned,
+            least_peaks=least,
             facts={"single_modes": len(self.level.single)},
         )
+
+    def _least_peaks(self) -> Ends:
+        """Proved lower bound of each output's smallest peak, and a small one that is reached."""
+        outputs = range(len(self.top))
+        with ThreadPoolExecutor(self.goal.workers) as pool:
+            bounds, units = zip(*pool.map(partial(least_peak, self.level), outputs), strict=True)
+        points = np.unique(self.box.inputs(np.stack(units)), axis=0)
+        reached = np.abs(self.flow.values(points)).max(1).min(0)
+        return Ends(np.array(bounds), reached)
 
     def _require_narrow(self) -> None:
         """Refuse a part whose remainders are worth more than `WIDE` of a peak, if bisections help.

@@ -38,6 +38,8 @@ class Peaks:
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope
             and of the steps between nodes, shape (A, m).
         reached: Magnitude that a motion in the cut is known to reach, shape (A, m).
+        least_proved: Peak that each motion in the cut is proved to have at least, shape (A, m).
+        least_reached: Peak that a motion in the cut is known to keep to; infinite where none is.
         natures: Nature of each output's bounds, m of them.
     """
 
@@ -47,6 +49,8 @@ class Peaks:
     upper: Array
     error: Array
     reached: Array
+    least_proved: Array
+    least_reached: Array
     natures: tuple[Nature, ...]
 
     def most(self, output: str) -> Ends:
@@ -67,7 +71,8 @@ class Peaks:
         k = self.outputs.index(output)
         known = self.natures[k] is not Nature.ATTAINED
         below = known * np.maximum(self.lower[:, k] - self.error[:, k], 0.0)
-        return Ends(below, self.most(output).upper[-1:])
+        above = np.minimum(self.most(output).upper[-1:], self.least_reached[:, k])
+        return Ends(np.maximum(below, self.least_proved[:, k]), above)
 
     def nature(self, outputs: Iterable[str]) -> Nature:
         """Weakest nature of some outputs' bounds."""
@@ -93,8 +98,18 @@ def peaks(envelope: Envelope) -> Peaks:
         upper,
         np.maximum(above, below),
         np.maximum(reached, 0.0),
+        np.zeros_like(upper) if envelope.least_peaks is None else envelope.least_peaks.lower,
+        _least_reached(envelope, upper),
         natures,
     )
+
+
+def _least_reached(envelope: Envelope, like: Array) -> Array:
+    """Peak that a motion in each cut is known to keep to, with its steps, shape (A, m)."""
+    if envelope.least_peaks is None:
+        return np.full_like(like, np.inf)
+    between = 0.0 if envelope.between is None else envelope.between.max(0)
+    return envelope.least_peaks.upper + between
 
 
 def within_steps(size: Array, between: Array | None) -> Array:

@@ -139,7 +139,9 @@ def test_tolerances_at_their_ends(limit, kept, passed):
 def test_a_limit_between_what_is_reached_and_what_is_excluded_is_neither(limit, kept, passed):
     """A motion is known to reach 1, none passes 2; kept is what no motion passes."""
     one, name = np.ones((1, 1)), (Nature.GUARANTEED,)
-    found = Peaks(np.zeros(1), ("q1",), 0 * one, 1.9 * one, 0.1 * one, one, name)
+    found = Peaks(
+        np.zeros(1), ("q1",), 0 * one, 1.9 * one, 0.1 * one, one, 0 * one, np.inf * one, name
+    )
     assert _judged(found, {"q1": limit})[:2] == (kept, passed)
 
 

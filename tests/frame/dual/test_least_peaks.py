@@ -1,0 +1,57 @@
+"""No motion of a box peaks lower than its least peak, which is near the lowest one known."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import DualProof, envelope
+from alphacut.frame.dual import least_peaks
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.questions.peaks import passing, peaks
+from alphacut.fuzzy import Triangular
+from tests.frame.dual.test_dual_proof import each_storey, record, storeys
+
+MODEL = storeys(3, damping_ratio=0.03, ground=record(), outputs=("q3", "drift1"))
+FUZZY = each_storey(3) | {"zeta": Triangular(0.02, 0.03, 0.04)}
+
+
+@pytest.fixture(scope="module")
+def found():
+    given = {"duration": 4.0, "step": 0.05, "alpha": (0, 0.5, 1), "progress": False}
+    return envelope(MODEL, FUZZY, method=DualProof(), **given)
+
+
+def lowest(alpha, count=3000):
+    """Smallest peaks of random motions of a cut, (m,)."""
+    low, high = np.array([number.cut(alpha) for number in FUZZY.values()]).T
+    unit = np.random.default_rng().random((count, len(low)))
+    unit[::2] = unit[::2].round()
+    values = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.05, Exact()).values(low + unit * (high - low))
+    return np.abs(values).max(1).min(0)
+
+
+def test_no_motion_peaks_lower(found):
+    proved, reached = found.least_peaks
+    for level, alpha in enumerate(found.alpha):
+        assert (lowest(alpha) >= proved[level] - 1e-12).all()
+    assert (proved <= reached).all()
+    assert (np.diff(proved, axis=0) >= 0).all()
+    assert (proved[0] >= 0.75 * np.minimum(reached[0], lowest(0.0))).all()
+
+
+def test_a_limit_below_the_least_peak_must_be_exceeded(found):
+    proved = found.least_peaks.lower[0, 0]
+    read_off = np.maximum(found.lower[0, :, 0], -found.upper[0, :, 0]).max()
+    assert read_off < 0.9 * proved  # what the bounds at the nodes say
+    answer = passing(peaks(found), {"q3": 0.95 * proved})["q3"]
+    assert answer.necessity[0] == 1.0
+
+
+def test_cells_cover_all_places():
+    for ends in ([0, 40, 0, 12], [3, 5, 2, 2], [7, 7, 0, 1]):
+        cells = least_peaks._cells(np.array(ends))
+        for i in range(ends[0], max(ends[1], ends[0] + 1)):
+            for j in range(ends[2], max(ends[3], ends[2] + 1)):
+                i1, j1 = min(i + 1, ends[1]), min(j + 1, ends[3])
+                inside = [c for c in cells if c[0] <= i and i1 <= c[1] and c[2] <= j and j1 <= c[3]]
+                assert inside
