@@ -14,7 +14,7 @@ from alphacut.figures import style
 from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
 from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.questions.probability import Probability as Bounds
-from alphacut.frame.questions.probability import probabilities
+from alphacut.frame.questions.probability import CONFIDENCE, probabilities
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
@@ -29,18 +29,13 @@ if TYPE_CHECKING:
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
-    """Random values with a density proportional to the membership.
-
-    One value from each of `count` equally likely pieces, in random order (a Latin hypercube where
-    several inputs are random): means over them scatter less than those of independent draws.
-    """
+    """Independent random values with a density proportional to the membership."""
     grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
     density = number.membership(grid)
     share = np.concatenate([[0.0], np.cumsum(np.diff(grid) * (density[1:] + density[:-1]) / 2)])
 
     def draw(rng: np.random.Generator, count: int) -> Array:
-        pieces = (rng.permutation(count) + rng.random(count)) / count
-        return np.asarray(np.interp(pieces * share[-1], share, grid))
+        return np.asarray(np.interp(rng.random(count) * share[-1], share, grid))
 
     return draw
 
@@ -52,7 +47,7 @@ def _document(name: str, one: Bounds, limits: dict[str, float]) -> Document:
         "lower": one.lower,
         "upper": one.upper,
         "error": one.error,
-        "deviation": one.deviation,
+        "interval": {"lower": one.interval[0], "upper": one.interval[1]},
         "nature": str(Nature.ATTAINED),
         "evaluations": one.evaluations,
         "curve": {"limit": one.limits, "lower": one.curve[0], "upper": one.curve[1]},
@@ -62,6 +57,12 @@ def _document(name: str, one: Bounds, limits: dict[str, float]) -> Document:
 def cut(one: Document, level: int) -> str:
     """Bounds of a probability on a level."""
     return between(one["lower"][level], one["upper"][level], Nature.ATTAINED, 3)
+
+
+def interval(one: Document, level: int) -> str:
+    """Interval of a probability on a level that holds whatever the draws are, rounded outwards."""
+    ends = one["interval"]
+    return between(ends["lower"][level], ends["upper"][level], Nature.GUARANTEED, 3)
 
 
 def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
@@ -84,7 +85,7 @@ class Probability(Question):
         "at the lowest α",
         "nature",
         "at the highest α",
-        "scatter",
+        f"{CONFIDENCE:.0%} interval at the lowest α",
         "between nodes",
     )
 
@@ -141,7 +142,7 @@ class Probability(Question):
                 cut(one, 0),
                 one["nature"],
                 cut(one, -1),
-                f"{one['deviation']:.2g}",
+                interval(one, 0),
                 f"{max(one['error']):.2g}",
             )
             for name, one in document["events"].items()
@@ -152,8 +153,10 @@ class Probability(Question):
         """How the probability was computed."""
         random = ", ".join(document["random"]) or "no input"
         return (
-            f"Random: {random}, with {document['samples']} draws at each fuzzy point. The bounds"
-            " are those of the fuzzy points tried; other points may have more or less. Peaks are"
+            f"Random: {random}, with {document['samples']} independent draws at each fuzzy point."
+            " The bounds are those of the fuzzy points tried; other points may have more or less."
+            f" With a probability of {CONFIDENCE:.0%} the interval holds the probabilities of all"
+            " fuzzy points at once (Clopper and Pearson, Bonferroni over the points). Peaks are"
             f" those at nodes every {document['step']:g} s; the last column says what lies between"
             " them."
         )

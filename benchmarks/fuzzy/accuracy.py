@@ -39,7 +39,7 @@ METHODS: dict[str, list[Method]] = {
     "extended": [Extended()],
     "signed": [Signed()],
     "optimisation": [*SEARCHES],
-    "automatic": [Automatic(passes=k) for k in (1, 4)],
+    "automatic": [Automatic(uncovered=share) for share in (0.02, 0.002)],
 }
 
 

@@ -1,8 +1,12 @@
 """Fuzzy probability that limits are exceeded, with some inputs random and others fuzzy.
 
-The same random draws serve every fuzzy point (common random numbers), so that differences between
-points are no noise. The points are the corners of each α-cut and a spread inside, so the bounds of
-the probability are attained: another point may have a smaller or a greater one.
+The same independent draws serve every fuzzy point (common random numbers), so that differences
+between points are no noise. The points are the corners of each α-cut and a spread inside, so the
+bounds of the probability are attained: another point may have a smaller or a greater one.
+
+What the draws may miss is bounded by the interval of Clopper and Pearson (1934) at every fuzzy
+point, at the level of Bonferroni: with probability `CONFIDENCE` the intervals of all points hold
+their probabilities at once.
 """
 
 from __future__ import annotations
@@ -33,6 +37,9 @@ LOOKED_AT = 4
 MOST_CORNERS = 8
 """Inputs of which the corners are tried."""
 
+CONFIDENCE = 0.95
+"""Probability with which the intervals of all fuzzy points hold at once, for each limit."""
+
 Sampler = Callable[[np.random.Generator, int], Array]
 
 
@@ -44,7 +51,8 @@ class Probability:
         lower: Least probability over the fuzzy points tried, shape (A,).
         upper: Greatest one, shape (A,).
         error: What peaks between nodes may add to either, estimated, shape (A,).
-        deviation: Standard deviation of the estimates, the largest of all.
+        interval: Ends of the interval that holds the probabilities of all fuzzy points of a level
+            with probability `CONFIDENCE`, whatever the draws are, shape (2, A).
         limits: Other limits, shape (L,), in SI units; shares of their limits for `ANY`.
         curve: Least and greatest probability of exceeding each of them, shape (2, A, L).
         evaluations: Motions computed.
@@ -54,7 +62,7 @@ class Probability:
     lower: Array
     upper: Array
     error: Array
-    deviation: float
+    interval: Array
     limits: Array
     curve: Array
     evaluations: int
@@ -150,18 +158,36 @@ def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> 
     low, _ = _bounds(least, level, np.append(limits, 1.0))
     lowest, high = _bounds(peak, level, np.append(limits, 1.0))
     above = [ends[:, 0] for ends in _bounds(more, level, np.ones(1))]
-    draws = peak.shape[1]
-    mean = (np.append(low[:, -1], high[:, -1]) * draws + 1) / (draws + 2)  # Laplace's rule
-    deviation = float(np.sqrt(mean * (1 - mean) / (draws + 3)).max())
+    interval = np.stack([lowest[:, -1], high[:, -1]])
+    if spreads:
+        interval = _interval((least > 1).sum(axis=1), (more > 1).sum(axis=1), peak.shape[1], level)
     return Probability(
         low[:, -1],
         high[:, -1],
         np.maximum(above[0] - lowest[:, -1], above[1] - high[:, -1]),
-        deviation if spreads else 0.0,
+        interval,
         limits * scale,
         np.stack([low[:, :-1], high[:, :-1]]),
         peak.size,
     )
+
+
+def _interval(least: Array, most: Array, draws: int, level: Array) -> Array:
+    """Ends of the intervals of Clopper and Pearson of all points of each level, shape (2, A).
+
+    Args:
+        least: Draws that surely pass the limit, by point, shape (points,).
+        most: Draws that may, motions between nodes among them, shape (points,).
+        draws: Independent draws at each point.
+        level: Level of each point, shape (points,).
+    """
+    from scipy.stats import beta
+
+    miss = (1 - CONFIDENCE) / (2 * len(level))  # of either side at one point (Bonferroni)
+    low = np.where(least > 0, beta.ppf(miss, least, draws - least + 1), 0.0)
+    high = np.where(most < draws, beta.ppf(1 - miss, most + 1, draws - most), 1.0)
+    inside = [level >= k for k in range(level.max() + 1)]
+    return np.array([[low[x].min() for x in inside], [high[x].max() for x in inside]])
 
 
 def _bounds(peak: Array, level: Array, limits: Array) -> tuple[Array, Array]:

@@ -1,59 +1,53 @@
-"""The method that is taken where none is named: a search, and a pass that is independent of it.
-
-The search descends in every cut from the best of spread points (α-cut optimisation). The pass then
-looks at fresh points and descends from the best of these alone. Where most of its descents end on
-the bound that the search had, the bounds are estimated: their error is twice what the pass improved
-and what its ends lack. Where they end elsewhere, or where a bound lies at a kink or a jump, nothing
-is known of the error, and the bounds are attained only. A spike that is narrower than the distance
-of the samples is seen by neither.
-"""
+"""The method that is taken where none is named: corners where they suffice, else single linkage."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from itertools import product
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.alpha_cut_optimisation import LevelSearch, Optimisation, attained, cuts
+from alphacut.fuzzy.plans.cut import attained, cuts_with_width
+from alphacut.fuzzy.plans.sign_walk import POINTS, SignWalk
+from alphacut.fuzzy.plans.single_linkage import ROUNDING, VALUE_TOLERANCE, SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
-_STARTS = 2  # descents per bound of the search
-_LOOK = 6  # fresh points of a look per level and input
-_TOLERANCE = 1e-3  # of an output's range: how near descents agree; less found by a pass is nothing
-_MOST = 12  # outputs of which each bound is searched
-_SAFETY = 2  # the next pass may find more than the last one
-_ROUNDS = 12  # of a descent
-_AGREEING = 0.5  # least share of fresh descents that must end on the bound
-_SLOPE = 0.01  # of an output's range over the width of a cut: less is that of a smooth optimum
-_ROUNDING = 1e-9  # of an output's size
+_MAX_SEARCHED = 12  # outputs of which each bound is searched; of more each bound is costly
 
 
 @dataclass(frozen=True)
 class Automatic:
-    """Corners where what is known of the model makes them suffice; a search elsewhere.
+    """Corners where they suffice, else multi-level single linkage.
 
-    Of more than 12 outputs none is searched: their bounds are as the samples happen to be.
+    Corners are guaranteed to suffice where what is known of the model says so. They are estimated
+    to where the differences of every input keep their sign at 24 points of the widest cut. Other
+    outputs are searched (Rinnooy Kan, Timmer 1987) until the share of each cut that is not yet
+    covered is small (Boender, Rinnooy Kan 1987): the bounds are then estimated, to 1e-5 of the
+    range. They are attained where the budget ends the search, or where a bound lies at a kink or a
+    jump. Of more than 12 outputs none is searched.
 
     Args:
-        passes: Passes at most; the last that finds nothing new ends them.
+        uncovered: Share of each cut up to which a search goes on, in (0, 1).
+        seed: Seed of all samples.
 
     Raises:
-        RefusedError: There is no pass.
+        RefusedError: A value is out of range.
     """
 
-    passes: int = 4
+    uncovered: float = 0.002
+    seed: int = 0
 
     name = "automatic"
 
     def __post_init__(self) -> None:
-        real("passes", self.passes, positive=True, whole=True)
+        real("uncovered", self.uncovered, positive=True, most=1)
+        real("seed", self.seed, whole=True)
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output."""
@@ -61,119 +55,94 @@ class Automatic:
         monotone = campaign.known.monotone_in(domain.names, outputs)
         if not domain.interactions and corners_suffice(domain, monotone).all():
             return replace(Reduced().run(campaign, domain), method=self.name)
-        outputs = outputs if len(outputs) <= _MOST else ()
-        spent = Optimisation(_STARTS, _LOOK).search(campaign, domain, outputs)
-        check = _Passes(campaign, domain, outputs)
-        spent = spent or check.run(self.passes)
-        return check.judged(spent=spent)
+        return _Search(campaign, domain, outputs, self).run()
 
 
-@dataclass
-class _Passes:
-    """Passes that are independent of the search.
+class _Search:
+    """Search of a model of which too little is known for a proof.
 
     Args:
-        campaign: The model with the samples of the search.
+        campaign: The model.
         domain: Inputs and levels.
-        outputs: Outputs whose bounds were searched.
-
-    Attributes:
-        gain: What the last pass improved, shape (levels, columns).
-        ends: Where fresh descents ended: level and value by output and sign of the bound.
+        outputs: All outputs.
+        method: Options.
     """
 
-    campaign: Campaign
-    domain: Domain
-    outputs: tuple[str, ...]
-    gain: Array = field(default_factory=lambda: np.zeros(()))
-    ends: dict[tuple[str, float], list[tuple[int, float]]] = field(default_factory=dict)
+    def __init__(
+        self, campaign: Campaign, domain: Domain, outputs: tuple[str, ...], method: Automatic
+    ) -> None:
+        self.campaign, self.domain, self.outputs, self.method = campaign, domain, outputs, method
+        self.cuts = list(cuts_with_width(campaign, domain))
+        self.monotone: Mask = np.zeros(len(outputs), bool)
+        self.searched: tuple[str, ...] = ()
+        self.linkage: SingleLinkage | None = None
+        self.spent = False
 
-    def run(self, passes: int) -> bool:
-        """Pass until one finds nothing new; whether the budget ended that."""
-        before = self._bounds()
-        for turn in range(passes):
-            spent = self._pass(turn + 1)
-            after = self._bounds()
-            self.gain = np.maximum(before.lower - after.lower, after.upper - before.upper)
-            before = after
-            if spent or (self.gain <= _TOLERANCE * self._span()).all():
-                return spent
-        return False
-
-    def _pass(self, seed: int) -> bool:
-        """Look and descend in every cut; whether the budget ended that."""
+    def run(self) -> Bounds:
+        """Bounds of every output, with the nature that the search gives them."""
         try:
-            for cut in cuts(self.campaign, self.domain):
-                fresh = cut.look(_LOOK * len(cut.moving), seed)
-                for output, sign in product(self.outputs if len(fresh) else (), (1.0, -1.0)):
-                    end = self._end(cut, fresh, output, sign)
-                    self.ends.setdefault((output, sign), []).append((cut.level, end))
+            if self.cuts:
+                self._search()
         except SpentError:
-            return True
-        return False
+            self.spent = True
+        return self._judge(attained(self.campaign, self.domain, Automatic.name, spent=self.spent))
 
-    def _end(self, cut: LevelSearch, fresh: Array, output: str, sign: float) -> float:
-        """Value where a descent from the best of fresh points ends.
+    def _search(self) -> None:
+        """Run the corners of the outputs whose effects keep their signs, and search the others."""
+        widest = self.cuts[-1]
+        first: Array = np.empty((0, len(widest.moving)))
+        if not self.domain.interactions:
+            walk = SignWalk(self.campaign, widest, self.method.seed)
+            self.monotone, first = walk.corners_suffice(), walk.base
+        names = tuple(np.array(self.outputs)[~self.monotone])
+        if not names:
+            return
+        self.searched = names if len(names) <= _MAX_SEARCHED else ()
+        self.linkage = SingleLinkage(
+            self.campaign,
+            self.domain,
+            self.searched,
+            uncovered=self.method.uncovered,
+            seed=self.method.seed,
+        )
+        if self.searched:
+            self.linkage.run(first)
+        else:
+            self.linkage.sample()
 
-        Hills at corners lead to one another along the edges.
-        """
-        start = fresh[cut.worth(fresh, output, sign).argmin()]
-        end = cut.along(cut.descend(start, output, sign, _ROUNDS), output, sign, _ROUNDS)
-        return float(sign * cut.worth(end[None], output, sign)[0])
-
-    def judged(self, *, spent: bool) -> Bounds:
-        """Bounds with their error where most fresh descents agree with them, else attained."""
-        bounds, near = self._bounds(), _TOLERANCE * self._span()
-        missed = [self._missed(bounds, column, near[column]) for column in range(len(near))]
-        agrees = np.array([own is not None for own in missed]) & (self.gain <= near).all(axis=0)
-        agrees[agrees] = [self._smooth(bounds, column) for column in np.flatnonzero(agrees)]
-        sure = agrees & ~spent
+    def _judge(self, bounds: Bounds) -> Bounds:
+        """The bounds with errors, natures and what they rest on."""
+        estimated = self.monotone.copy()
+        for column, output in enumerate(self.outputs):
+            estimated[column] |= self.linkage is not None and self.linkage.is_estimate(output)
         size = np.maximum(np.abs(bounds.lower), np.abs(bounds.upper)).max(axis=0)
-        ends = np.stack([np.zeros(len(self.domain.alpha)) if x is None else x for x in missed], 1)
-        error = _SAFETY * np.maximum(self.gain, ends) + _ROUNDING * size
+        error = VALUE_TOLERANCE * (bounds.upper - bounds.lower)[0] + ROUNDING * size
         lower, upper = self.domain.boxes
         crisp = (lower == upper).all(axis=1)[:, None]
-        natures = tuple(Nature.ESTIMATED if own else Nature.ATTAINED for own in sure)
-        unsure = [name for name in self.outputs if not agrees[bounds.column(name)]]
-        note = f"a better bound of {', '.join(unsure[:4])} is likely: an independent search ended"
-        note += " elsewhere, or the bound lies at a kink or a jump"
-        last = attained(self.campaign, self.domain, Automatic.name, spent=spent)
+        natures = tuple(Nature.ESTIMATED if holds else Nature.ATTAINED for holds in estimated)
         return replace(
-            last,  # the judgement took samples, too
-            error=np.where(sure & ~crisp, error, 0.0),
+            bounds,
+            error=np.where(estimated & ~crisp, error, 0.0),
             natures=natures,
             nature=Nature.weakest(natures),
-            notes=(*last.notes, note) if unsure and not spent else last.notes,
+            notes=(*self._notes(), *bounds.notes),
         )
 
-    def _missed(self, bounds: Bounds, column: int, near: float) -> Array | None:
-        """Distance of agreeing fresh descents to the bounds, (levels,); None where few agree."""
-        missed, agreeing, count = np.zeros(len(self.domain.alpha)), 0, 0
-        for sign, bound in ((1.0, bounds.lower), (-1.0, bounds.upper)):
-            for level, end in self.ends.get((bounds.outputs[column], sign), []):
-                lack = sign * (end - bound[level, column])
-                count += 1
-                agreeing += bool(lack <= near)
-                missed[level] = max(missed[level], lack if lack <= near else 0.0)
-        return missed if count and agreeing >= _AGREEING * count else None
+    def _notes(self) -> list[str]:
+        """What the estimates rest on, and which outputs have none."""
+        notes = []
+        if self.monotone.any():
+            names = _listed(np.array(self.outputs)[self.monotone])
+            which = f"the differences of each input keep their sign at {POINTS} points"
+            notes.append(f"corners alone bound {names}: {which}")
+        if self.linkage is not None and self.searched:
+            notes.append(self.linkage.summary())
+            if not self.spent and (rough := [x for x in self.searched if self.linkage.is_rough(x)]):
+                notes.append(f"a bound of {_listed(rough)} lies at a kink or a jump")
+        return notes
 
-    def _smooth(self, bounds: Bounds, column: int) -> bool:
-        """True if an output has nearly no slope where its bounds are attained inside a cut."""
-        try:
-            return all(
-                cut.steepest(cut.unit(places[cut.level, column][None])[0], bounds.outputs[column])
-                <= _SLOPE
-                for cut in cuts(self.campaign, self.domain)
-                for places in (bounds.lower_at, bounds.upper_at)
-            )
-        except SpentError:
-            return False
 
-    def _bounds(self) -> Bounds:
-        """Bounds so far."""
-        return attained(self.campaign, self.domain, Automatic.name, spent=False)
-
-    def _span(self) -> Array:
-        """Range of each output over all samples, shape (columns,)."""
-        values = self.campaign.samples.values.array
-        return np.asarray(np.nanmax(values, axis=0) - np.nanmin(values, axis=0))
+def _listed(names: Iterable[str]) -> str:
+    """The first four names."""
+    first = list(names)
+    return ", ".join(first[:4]) + (" …" if len(first) > 4 else "")

@@ -3,6 +3,9 @@
 Each quasi-random probability u becomes, per α, the interval of quantiles that the fuzzy parameters
 allow; the model is bounded over these intervals and the cuts of the other fuzzy inputs. Averages
 over u bound the mean, the distribution and every quantile of the response.
+
+The points come in eight independent scramblings of Sobol's sequence (Owen, 1995). The averages over
+each of them scatter, which gives the t-interval of their mean.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +28,11 @@ from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.numbers import FuzzyNumber, PiecewiseLinear
+
+SCRAMBLINGS = 8
+"""Independent scramblings of the points."""
+CONFIDENCE = 0.95
+"""Probability with which a t-interval holds the true average over the random inputs."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +60,28 @@ class RandomInput:
         return PiecewiseLinear(tuple(grid), tuple(low), tuple(high))
 
 
+class Estimate(NamedTuple):
+    """Bounds of an average over the random inputs.
+
+    Args:
+        lower: Lower ends, shape (levels, …).
+        upper: Upper ends, same shape.
+        lower_error: Half the width of the 95 % t-interval of the lower ends.
+        upper_error: The same of the upper ends.
+    """
+
+    lower: Array
+    upper: Array
+    lower_error: Array
+    upper_error: Array
+
+
 @dataclass(frozen=True, eq=False)
 class IntervalResponse:
     """A response with bounds at every quasi-random point.
 
     Args:
-        bounds: Bounds at each point.
+        bounds: Bounds at each point, scrambling by scrambling.
     """
 
     bounds: Sequence[Bounds]
@@ -64,35 +89,54 @@ class IntervalResponse:
     @property
     def evaluations(self) -> int:
         """Evaluations of the model."""
-        return sum(one.evaluations for one in self.bounds)
+        return sum(bounds.evaluations for bounds in self.bounds)
 
     @property
     def nature(self) -> Nature:
         """The weakest of the points; averages have the error of quasi-Monte Carlo besides."""
-        return Nature.weakest(one.nature for one in self.bounds)
+        return Nature.weakest(bounds.nature for bounds in self.bounds)
 
-    def mean(self, output: str = "y") -> tuple[Array, Array]:
-        """Bounds of the mean on every level, two arrays (levels,)."""
-        lower, upper = self._ends(output)
-        return lower.mean(axis=0), upper.mean(axis=0)
+    def mean(self, output: str = "y") -> Estimate:
+        """Bounds of the mean on every level, arrays of shape (levels,)."""
+        return self._estimate(output, lambda ends: np.asarray(ends.mean(axis=0)))
 
-    def p_box(self, at: ArrayLike, output: str = "y") -> tuple[Array, Array]:
-        """Bounds of the distribution function at responses `at` (m,), two arrays (levels, m)."""
-        lower, upper = self._ends(output)
+    def p_box(self, at: ArrayLike, output: str = "y") -> Estimate:
+        """Bounds of the distribution function at responses `at` (m,), arrays (levels, m)."""
         responses = np.atleast_1d(np.asarray(at, float))
-        least = (upper[..., None] <= responses).mean(axis=0)
-        return least, (lower[..., None] <= responses).mean(axis=0)
 
-    def quantile(self, probability: ArrayLike, output: str = "y") -> tuple[Array, Array]:
-        """Bounds of quantiles at probabilities (m,), two arrays (levels, m)."""
-        lower, upper = self._ends(output)
+        def share(ends: Array) -> Array:
+            return np.asarray((ends[..., None] <= responses).mean(axis=0))
+
+        lower, upper, lower_error, upper_error = self._estimate(output, share)
+        return Estimate(upper, lower, upper_error, lower_error)  # large responses are exceeded less
+
+    def quantile(self, probability: ArrayLike, output: str = "y") -> Estimate:
+        """Bounds of quantiles at probabilities (m,), arrays (levels, m)."""
         at = np.atleast_1d(np.asarray(probability, float))
-        return np.quantile(lower, at, axis=0).T, np.quantile(upper, at, axis=0).T
 
-    def _ends(self, output: str) -> tuple[Array, Array]:
-        """Ends at every point, two arrays (points, levels)."""
-        ends = np.array([one.bounds(output) for one in self.bounds])
-        return ends[:, 0], ends[:, 1]
+        def quantiles(ends: Array) -> Array:
+            return np.asarray(np.quantile(ends, at, axis=0).T)
+
+        return self._estimate(output, quantiles)
+
+    def _estimate(self, output: str, average: Callable[[Array], Array]) -> Estimate:
+        """Bounds of an average of the ends at every point, with its t-interval.
+
+        Args:
+            output: Name of the output.
+            average: From ends at points, shape (n, levels), to an average, shape (levels, …).
+        """
+        from scipy.stats import t
+
+        ends = np.array([bounds.bounds(output) for bounds in self.bounds])  # (points, 2, levels)
+        parts = np.split(ends, SCRAMBLINGS)
+        factor = t.ppf((1 + CONFIDENCE) / 2, SCRAMBLINGS - 1) / np.sqrt(SCRAMBLINGS)
+        values = [average(ends[:, side]) for side in (0, 1)]
+        errors = [
+            factor * np.std([average(part[:, side]) for part in parts], axis=0, ddof=1)
+            for side in (0, 1)
+        ]
+        return Estimate(*values, *errors)
 
 
 @dataclass(frozen=True)
@@ -100,8 +144,8 @@ class IntervalQuasiMonteCarlo:
     """Sampling of a model with random and fuzzy inputs.
 
     Args:
-        points: Quasi-random points, best a power of 2.
-        seed: Where their scrambling starts from.
+        points: Quasi-random points of all eight scramblings, a multiple of 8, best a power of 2.
+        seed: Seed of the scramblings.
         method: How the model is bounded over the box of each point; corners, the default, are exact
             where the model is monotone, and too narrow where it is not.
     """
@@ -112,6 +156,8 @@ class IntervalQuasiMonteCarlo:
 
     def __post_init__(self) -> None:
         real("points", self.points, positive=True, whole=True)
+        allowed = f"multiples of {SCRAMBLINGS}, one part for each scrambling"
+        require(self.points % SCRAMBLINGS == 0, "points", self.points, allowed)
         real("seed", self.seed, whole=True)
 
     def run(
@@ -135,14 +181,14 @@ class IntervalQuasiMonteCarlo:
         Raises:
             RefusedError: There is no random input, or an input is named twice.
         """
-        from scipy.stats import qmc
-
-        apart = bool(random) and not set(random) & set(inputs)
-        require(apart, "random inputs", tuple(random), "one or more, none of them fuzzy")
-        sobol = qmc.Sobol(len(random), rng=np.random.default_rng(self.seed))
+        separate = bool(random) and not set(random) & set(inputs)
+        require(separate, "random inputs", tuple(random), "one or more, none of them fuzzy")
         results = []
-        for u in sobol.random(self.points):
-            drawn = {x: one.at(p, alpha) for (x, one), p in zip(random.items(), u, strict=True)}
+        for u in self._probabilities(len(random)):
+            drawn = {
+                name: number.at(p, alpha)
+                for (name, number), p in zip(random.items(), u, strict=True)
+            }
             results.append(
                 propagate(
                     function,
@@ -154,3 +200,14 @@ class IntervalQuasiMonteCarlo:
                 )
             )
         return IntervalResponse(results)
+
+    def _probabilities(self, inputs: int) -> Array:
+        """Points of independent scramblings one after another, shape (points, inputs)."""
+        from scipy.stats import qmc
+
+        return np.concatenate(
+            [
+                qmc.Sobol(inputs, rng=rng).random(self.points // SCRAMBLINGS)
+                for rng in np.random.default_rng(self.seed).spawn(SCRAMBLINGS)
+            ]
+        )

@@ -9,7 +9,7 @@ from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import ANY, Peaks, passing, peaks
-from alphacut.frame.questions.probability import probabilities
+from alphacut.frame.questions.probability import _interval, probabilities
 from alphacut.frame.questions.tolerances import _judged, scaled, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
@@ -167,7 +167,31 @@ def test_probabilities_are_nested_and_agree_with_independent_draws():
     points = np.column_stack([np.full(4000, 25e9), np.full(4000, 7e3), draws])
     size = np.abs(LinearFlow(FRAME, ("E", "m2", "v2_0"), 4, 0.05, Exact()).values(points)).max(1)
     share = (size[:, 1] > 0.16).mean()
-    assert one.upper[-1] == pytest.approx(share, abs=5 * one.deviation)
+    low, high = one.interval[:, -1]
+    assert low < share < high
+    assert low < one.lower[-1] <= one.upper[-1] < high
+
+
+def test_the_interval_is_that_of_clopper_and_pearson_at_the_level_of_bonferroni():
+    """Of one fuzzy input with 66 points on two levels and one on the last, at which 0 or all pass."""
+    inputs = {"E": Triangular(24e9, 25e9, 26e9)}
+    answers = probable(inputs=inputs, limits={"drift2": 1e3, "q1": 1e-9}, samples=50)
+    miss = 0.05 / (2 * (66 + 66 + 1))
+    np.testing.assert_allclose(answers["drift2"].interval[1], 1 - miss ** (1 / 50))
+    assert (answers["drift2"].interval[0] == 0).all()
+    np.testing.assert_allclose(answers["q1"].interval[0], miss ** (1 / 50))
+    assert (answers["q1"].interval[1] == 1).all()
+
+
+def test_the_interval_of_every_point_holds_at_once_as_often_as_it_says():
+    """Counts of common draws at 40 points, 400 times."""
+    rng, missed = np.random.default_rng(), 0
+    true = np.linspace(0.01, 0.6, 40)
+    for _ in range(400):
+        counts = (rng.random(100)[:, None] < true).sum(axis=0)
+        low, high = _interval(counts, counts, 100, np.arange(40))  # points from k on at level k
+        missed += bool((low > true).any() or (high < true[-1]).any())
+    assert missed <= 0.05 * 400 + 3 * np.sqrt(0.05 * 400)
 
 
 def test_the_curve_falls_from_one_to_none():

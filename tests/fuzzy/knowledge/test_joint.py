@@ -47,7 +47,7 @@ def test_joining_twice_changes_nothing_and_new_claims_are_joined_again():
 
 def test_propagation_joins_and_prints_the_claim_with_its_conditions():
     inputs = {"x": FIRST, "y": SECOND, "z": Triangular(1, 2, 3), "one": 1.0}
-    method = Automatic(passes=1)
+    method = Automatic()
     result = propagate(lambda x, y, z, one: x * y / z * one, inputs, method, alpha=[0, 0.1, 1])
     text = str(result)
     assert "result of the next value of x, y lies in its α-cut with P >= 1 - α" in text

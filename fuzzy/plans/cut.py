@@ -1,0 +1,200 @@
+"""One α-cut in unit coordinates: values of an output there, and descents by gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Mask
+from alphacut.fuzzy.campaign.call import SpentError
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.plans.design import of_samples
+from alphacut.fuzzy.result import Bounds
+from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.interaction import pulled
+
+_DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
+# the same of the slope at the end of a descent: models that solve to 1e-8 are as noisy
+_LARGE_DIFFERENCE = 1e-4
+_MAX_SLOPE = 0.01  # ranges of the output over the width of a cut: at a kink or jump it is larger
+_FACE = 1e-9  # of the width: a point this close to a face of the cut lies on it
+_STEEPNESS = 4.0  # of the objective's unit: so first steps of L-BFGS-B mostly reach a face at once
+_FAILED = 1e6  # ranges of the output that stand for a sample without a value
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The lower or upper bound of an output, searched as a minimum of sign · output.
+
+    Args:
+        output: Name of the output.
+        sign: 1 for the lower bound, −1 for the upper one.
+    """
+
+    output: str
+    sign: float
+
+
+class Cut:
+    """One α-cut under search, in unit coordinates of the inputs that have a width."""
+
+    def __init__(self, campaign: Campaign, domain: Domain, level: int) -> None:
+        self.campaign, self.domain, self.level = campaign, domain, level
+        self.alpha = domain.alpha[level]
+        self.lower, self.upper = (ends[level] for ends in domain.boxes)
+        self.near = _FACE * (self.upper - self.lower)
+        self.moving = np.flatnonzero(self.upper > self.lower)
+
+    def points(self, unit: Array) -> Array:
+        """Inputs of points (n, moving) of the unit cube, shape (n, inputs)."""
+        points = np.repeat(self.lower[None], len(unit), axis=0)
+        width = (self.upper - self.lower)[self.moving]
+        points[:, self.moving] = self.lower[self.moving] + unit * width
+        return np.clip(points, self.lower, self.upper)
+
+    def unit(self, points: Array) -> Array:
+        """Points (n, inputs) in unit coordinates, shape (n, moving)."""
+        width = (self.upper - self.lower)[self.moving]
+        unit: Array = np.clip((points - self.lower)[:, self.moving] / width, 0, 1)
+        return unit
+
+    def slack(self, unit: Array) -> Array:
+        """Room that the interactions leave at points of the unit cube, shape (n,)."""
+        return self.domain.slack(self.points(unit), self.alpha)
+
+    def contains(self, points: Array) -> Mask:
+        """Mask of the points (n, inputs) that lie in the cut, shape (n,)."""
+        return np.asarray(self.domain.inside(points)[self.level])
+
+    def values(self, unit: Array, bound: Bound) -> Array:
+        """Values of sign · output at points of the unit cube; inf where not allowed or failed."""
+        inside = self.slack(unit) >= 0
+        values: Array = np.full(len(unit), np.inf)
+        if inside.any():
+            rows = self.campaign(self.points(unit[inside]))
+            values[inside] = bound.sign * rows.array[:, rows.column(bound.output)]
+        return np.where(np.isnan(values), np.inf, values)
+
+    def output_range(self, output: str) -> float:
+        """Range of an output over all samples, or 1: the unit of its slopes."""
+        values = self.campaign.samples.values
+        column = values.array[:, values.column(output)]
+        span = float(np.nanmax(column) - np.nanmin(column))
+        return span if span >= np.finfo(float).tiny else 1.0
+
+    def steepest(self, point: Array, output: str) -> float:
+        """Largest slope at a point (inputs,) along inputs that are not at an end there.
+
+        Both sides along each input, in ranges of the output over the width of the cut: nearly 0 at
+        a smooth optimum, not at a kink or a jump, nor where a descent stalled.
+        """
+        unit = self.unit(point[None])[0]
+        inner = np.flatnonzero((unit > _LARGE_DIFFERENCE) & (unit < 1 - _LARGE_DIFFERENCE))
+        steps = _LARGE_DIFFERENCE * np.eye(len(unit))[inner]
+        probes = np.concatenate([unit[None], unit + steps, unit - steps])
+        here, *around = self.values(probes, Bound(output, 1.0))
+        allowed = np.array([value for value in around if np.isfinite(value)])
+        slopes = np.abs(allowed - here) / _LARGE_DIFFERENCE / self.output_range(output)
+        return float(slopes.max(initial=0.0))
+
+    def descend(self, start: Array, bound: Bound, rounds: int = 50) -> Optimum:
+        """Result of a descent by gradients inside the cut; its samples stay in the campaign.
+
+        Args:
+            start: Allowed point in unit coordinates, shape (moving,).
+            bound: What is minimised.
+            rounds: Most iterations.
+        """
+        from scipy.optimize import minimize
+
+        scale = self.output_range(bound.output) / _STEEPNESS
+        first = self.values(start[None], bound)[0]
+
+        def objective(unit: Array) -> tuple[float, Array]:
+            steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
+            rows = self.campaign(self.points(np.concatenate([unit[None], unit + np.diag(steps)])))
+            values = bound.sign * rows.array[:, rows.column(bound.output)]
+            scaled = np.nan_to_num((values - first) / scale, nan=_FAILED)
+            return float(scaled[0]), (scaled[1:] - scaled[0]) / steps
+
+        cube = [(0.0, 1.0)] * len(start)
+        settings = {"jac": True, "bounds": cube, "options": {"maxiter": rounds}}
+        if not self.domain.interactions:
+            end = minimize(objective, start, method="L-BFGS-B", **settings)
+            value, slope = first + scale * float(end.fun), _free_slope(end.x, end.jac / _STEEPNESS)
+            return Optimum(self, bound, self.points(end.x[None])[0], value, slope)
+        room = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
+        end = minimize(objective, start, method="SLSQP", constraints=[room], **settings)
+        both = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
+        values = self.values(both, bound)
+        best = int(values.argmin())
+        return Optimum(self, bound, self.points(both)[best], float(values[best]), np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Result of a descent.
+
+    Args:
+        cut: Where it was made.
+        bound: What was minimised.
+        point: Inputs, shape (inputs,).
+        value: sign · output there.
+        slope: Largest slope along an input that can still change, in ranges of the output over the
+            width of the cut; infinite where it was not computed.
+    """
+
+    cut: Cut
+    bound: Bound
+    point: Array
+    value: float
+    slope: float
+
+    @cached_property
+    def is_smooth(self) -> bool:
+        """Whether the output has nearly no slope there, on any side: false at kinks and jumps.
+
+        False, too, where the budget does not carry the samples that tell.
+        """
+        if self.slope <= _MAX_SLOPE:
+            return True
+        try:
+            return self.cut.steepest(self.point, self.bound.output) <= _MAX_SLOPE
+        except SpentError:
+            return False
+
+    def holds_in(self, cut: Cut) -> bool:
+        """Whether it is an optimum of another cut, too.
+
+        It is one of a narrower cut that it lies in, and of a wider one unless a face of its own cut
+        stopped the descent.
+        """
+        if self.cut.level <= cut.level:
+            return bool(cut.contains(self.point[None])[0])
+        stopped = (self.point <= self.cut.lower + self.cut.near) & (self.cut.lower > cut.lower)
+        stopped |= (self.point >= self.cut.upper - self.cut.near) & (self.cut.upper < cut.upper)
+        return not stopped.any()
+
+
+def _free_slope(unit: Array, gradient: Array) -> float:
+    """Largest slope of a minimum along inputs that the cube does not stop from falling."""
+    stopped = ((unit <= 0) & (gradient > 0)) | ((unit >= 1) & (gradient < 0))
+    return float(np.abs(np.where(stopped, 0.0, gradient)).max(initial=0.0))
+
+
+def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[Cut]:
+    """Cuts that have a width, from the narrowest on."""
+    for level in reversed(range(len(domain.alpha))):
+        cut = Cut(campaign, domain, level)
+        if len(cut.moving):
+            yield cut
+
+
+def attained(campaign: Campaign, domain: Domain, method: str, *, spent: bool) -> Bounds:
+    """Bounds from all samples of a search, with a note where the budget ended it."""
+    bounds = of_samples(domain, campaign.samples, method)
+    note = "the budget ended the search: a larger one may find more"
+    return replace(bounds, notes=(note,)) if spent else bounds

@@ -1,0 +1,299 @@
+"""Multi-level single linkage over all α-cuts (Rinnooy Kan and Timmer, 1987, part II).
+
+Each cut has N uniform samples, shared by all bounds. A descent starts from a sample only if none
+within the critical distance r of it is better, with
+
+    r = (4 Γ(1 + d/2) V ln N / N)^(1/d) / √π
+
+for d inputs and the share V of the box that the interactions allow. The search of a bound ends by
+the rule of Boender and Rinnooy Kan (1987): with W different optima, the basins not yet seen cover
+W (W + 1) / (N (N − 1)) of the cut, as Bayes' rule tells from a uniform prior.
+
+Samples of a cut that lie in a narrower one are uniform there too and count for it. Optima of other
+cuts raise W and the bound, but not N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+from math import ceil, gamma, inf, log, pi, sqrt
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.campaign.campaign import Campaign
+from alphacut.fuzzy.plans.cut import Bound, Cut, Optimum, cuts_with_width
+from alphacut.fuzzy.sets.boxes import Domain
+
+MIN_SAMPLES = 100
+"""Samples N from which the rule of Boender and Rinnooy Kan decides: with fewer its prior does."""
+VALUE_TOLERANCE = 1e-5
+"""Of an output's range in the widest cut: values that differ by less count as one."""
+ROUNDING = 1e-9
+"""The same of an output's size."""
+_SAME_PLACE = 0.01  # of the width: optima of one value are the same there without a look between
+_BETWEEN = np.array([0.25, 0.5, 0.75])  # places between two optima of one value
+_MIN_NEW = 15  # samples that a round adds
+_MAX_DRAWS = 10**6  # points drawn for one round where the interactions allow few
+
+
+def critical_distance(samples: int, inputs: int, volume: float = 1.0) -> float:
+    """Distance r in the unit cube within which a better sample makes a descent superfluous."""
+    ball = 4 * gamma(1 + inputs / 2) * volume * log(samples) / samples
+    return float(ball ** (1 / inputs) / sqrt(pi))
+
+
+def uncovered_share(samples: int, optima: int) -> float:
+    """Expected share of the basins not yet seen; infinite before two samples and an optimum."""
+    if samples < 2 or not optima:
+        return inf
+    return optima * (optima + 1) / (samples * (samples - 1))
+
+
+def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
+    """Rows of the points (n, d) with finite values (n,) that have no better one within reach."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(unit).query_pairs(distance, output_type="ndarray")
+    first, second = values[pairs[:, 0]], values[pairs[:, 1]]
+    worse = np.concatenate([pairs[first > second, 0], pairs[second > first, 1]])
+    return np.setdiff1d(np.flatnonzero(np.isfinite(values)), worse)
+
+
+@dataclass
+class BoundSearch:
+    """State of the search of one bound in one cut.
+
+    Args:
+        started: Rows of the samples from which a descent has started.
+        samples: N, samples all of whose descents are done.
+        optima: W different results of descents, in any cut, that are optima of this cut.
+    """
+
+    started: set[int] = field(default_factory=set)
+    samples: int = 0
+    optima: list[Optimum] = field(default_factory=list)
+
+    @property
+    def best(self) -> Optimum:
+        """The best optimum; some must have been found."""
+        return min(self.optima, key=lambda optimum: optimum.value)
+
+    @property
+    def share(self) -> float:
+        """Share of the cut that is not yet covered."""
+        return uncovered_share(self.samples, len(self.optima))
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether the output is smooth at the best optimum, so that the descent did not stall."""
+        return bool(self.optima) and self.best.is_smooth
+
+    def is_estimate(self, uncovered: float) -> bool:
+        """Whether the bound is known to a tolerance, as far as the rule tells."""
+        return self.samples >= MIN_SAMPLES and self.share < uncovered and self.is_smooth
+
+    def is_open(self, uncovered: float) -> bool:
+        """Whether more samples are wanted; none where the best optimum is at a kink or a jump."""
+        if self.samples < MIN_SAMPLES or not self.optima:
+            return True
+        return self.share >= uncovered and self.is_smooth
+
+    def asked(self, uncovered: float) -> int:
+        """Samples with which the rule is met if no other optimum appears; at most doubled."""
+        count = len(self.optima)
+        rule = ceil(0.5 + sqrt(0.25 + count * (count + 1) / uncovered)) + 1
+        return max(MIN_SAMPLES, min(max(rule, self.samples + _MIN_NEW), 2 * self.samples))
+
+
+class SingleLinkage:
+    """Search of some outputs' bounds in all cuts of a domain.
+
+    Args:
+        campaign: The model.
+        domain: Inputs and levels.
+        outputs: Outputs whose bounds are searched.
+        uncovered: Share of a cut below which its search ends.
+        seed: Seed of the samples.
+
+    Attributes:
+        cuts: Cuts that have a width, from the widest on.
+        bounds: Bounds that are searched.
+        states: State of each bound by the level of its cut.
+    """
+
+    def __init__(
+        self,
+        campaign: Campaign,
+        domain: Domain,
+        outputs: tuple[str, ...],
+        *,
+        uncovered: float,
+        seed: int,
+    ) -> None:
+        self.campaign, self.domain = campaign, domain
+        self.uncovered, self.seed = uncovered, seed
+        self.cuts = list(cuts_with_width(campaign, domain))[::-1]
+        self.bounds = [Bound(output, sign) for output, sign in product(outputs, (1.0, -1.0))]
+        self.states = {
+            (cut.level, bound): BoundSearch() for cut, bound in product(self.cuts, self.bounds)
+        }
+        # uniform samples of all cuts, and the level of the cut in which each was drawn
+        self._points: Array = np.empty((0, len(domain.names)))
+        self._values: dict[Bound, Array] = {bound: np.empty(0) for bound in self.bounds}
+        self._levels: Rows = np.empty(0, int)
+        self._volumes = {cut.level: 1.0 for cut in self.cuts}  # that the interactions leave
+        self._exhausted: set[int] = set()  # levels of cuts that the interactions leave no volume
+
+    def run(self, first: Array) -> None:
+        """Sample and descend, all cuts in turn, until every bound meets the rule.
+
+        Args:
+            first: Uniform samples of the widest cut, in unit coordinates, shape (n, moving).
+
+        Raises:
+            SpentError: The budget ended the search.
+        """
+        self._add(self.cuts[0], first)
+        rounds = 0
+        while visits := [(cut, bounds) for cut in self.cuts if (bounds := self._open(cut))]:
+            rounds += 1
+            for number, (cut, bounds) in enumerate(visits, start=1):
+                asked = max(self.states[cut.level, x].asked(self.uncovered) for x in bounds)
+                self._fill(cut, asked, rounds)
+                self._descend(cut, bounds)
+                self.campaign.report(1 - (1 - 0.8 * number / len(visits)) / rounds)
+
+    def is_estimate(self, output: str) -> bool:
+        """Whether both bounds of an output are known to the tolerance in all cuts."""
+        states = [state for (_, bound), state in self.states.items() if bound.output == output]
+        return bool(states) and all(state.is_estimate(self.uncovered) for state in states)
+
+    def is_rough(self, output: str) -> bool:
+        """Whether the best optimum of a bound lies at a kink or a jump in a cut."""
+        states = [state for (_, bound), state in self.states.items() if bound.output == output]
+        return any(state.optima and not state.is_smooth for state in states)
+
+    def summary(self) -> str:
+        """Sentence about the bound whose cut is covered least."""
+        worst = max(self.states.values(), key=lambda state: state.share)
+        return (
+            f"W = {len(worst.optima)} optima found from N = {worst.samples} samples: of each cut"
+            f" {worst.share:.2%} or less is not yet covered"
+        )
+
+    def sample(self) -> None:
+        """Run the fewest samples of each cut, without any descent."""
+        for cut in self.cuts:
+            self._fill(cut, MIN_SAMPLES, 0)
+
+    def _open(self, cut: Cut) -> list[Bound]:
+        """Bounds of a cut that do not meet the rule; descents from better values come first."""
+        for bound in self.bounds:
+            self._descend_from_better(cut, bound)
+        if cut.level in self._exhausted:
+            return []
+        states = [(bound, self.states[cut.level, bound]) for bound in self.bounds]
+        return [bound for bound, state in states if state.is_open(self.uncovered)]
+
+    def _descend_from_better(self, cut: Cut, bound: Bound) -> None:
+        """Descend from the best sample of any search if it is better than all optima."""
+        state, samples = self.states[cut.level, bound], self.campaign.samples
+        if not state.optima:
+            return
+        inside = cut.contains(samples.points)
+        values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
+        best = int(np.nanargmin(values))
+        if values[best] < state.best.value - self._near(bound):
+            self._keep(cut.descend(cut.unit(samples.points[inside][best][None])[0], bound))
+
+    def _keep(self, optimum: Optimum) -> None:
+        """Add an optimum to all cuts of which it is a new one, or a better value of one."""
+        for cut in self.cuts:
+            if not optimum.holds_in(cut):
+                continue
+            optima = self.states[cut.level, optimum.bound].optima
+            number = self._number(cut, optimum)
+            if number == len(optima):
+                optima.append(optimum)
+            elif optimum.value < optima[number].value:
+                optima[number] = optimum
+
+    def _number(self, cut: Cut, optimum: Optimum) -> int:
+        """Index of the same optimum among those of a cut; their count if it is a new one.
+
+        Optima of nearly one value are the same if they are close, or if no value between them is
+        larger: a valley is where many descents end, and symmetric hills are several.
+        """
+        optima, near = self.states[cut.level, optimum.bound].optima, self._near(optimum.bound)
+        alike = [k for k, other in enumerate(optima) if abs(other.value - optimum.value) <= near]
+        unit = cut.unit(np.stack([optimum.point, *(optima[k].point for k in alike)]))
+        steps = unit[1:] - unit[0]
+        for number, step in zip(alike, steps, strict=True):
+            if np.abs(step).max() <= _SAME_PLACE:
+                return number
+        for number, step in zip(alike, steps, strict=True):
+            between = cut.values(unit[0] + _BETWEEN[:, None] * step, optimum.bound)
+            if (between <= max(optimum.value, optima[number].value) + near).all():
+                return number
+        return len(optima)
+
+    def _near(self, bound: Bound) -> float:
+        """Difference of values within which optima count as one."""
+        values = self._values[bound][np.isfinite(self._values[bound])]
+        span = VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max()
+        return float(span)
+
+    def _fill(self, cut: Cut, asked: int, rounds: int) -> None:
+        """Run the model at new uniform samples of a cut until there are as many as asked."""
+        missing = asked - len(self._rows(cut))
+        if missing > 0:
+            rng = np.random.default_rng([self.seed, 1 + cut.level, rounds])
+            self._add(cut, self._draw(cut, missing, rng))
+
+    def _descend(self, cut: Cut, bounds: list[Bound]) -> None:
+        """Run the descents that the samples of a cut start."""
+        rows = self._rows(cut)
+        if len(rows) < 2:  # the interactions leave next to nothing
+            return
+        unit = cut.unit(self._points[rows])
+        distance = critical_distance(len(rows), len(cut.moving), self._volumes[cut.level])
+        for bound in bounds:
+            state = self.states[cut.level, bound]
+            for start in linkage_starts(unit, self._values[bound][rows], distance):
+                if rows[start] not in state.started:
+                    state.started.add(int(rows[start]))
+                    self._keep(cut.descend(unit[start], bound))
+            state.samples = len(rows)
+
+    def _rows(self, cut: Cut) -> Rows:
+        """Rows of the samples that are uniform in a cut: its own, and those of wider ones."""
+        return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
+
+    def _draw(self, cut: Cut, count: int, rng: np.random.Generator) -> Array:
+        """Uniform points of a cut that the interactions allow, in unit coordinates.
+
+        There may be fewer than `count` where the interactions allow next to nothing.
+        """
+        allowed: Array = np.empty((0, len(cut.moving)))
+        drawn = 0
+        while len(allowed) < count and drawn < _MAX_DRAWS:
+            unit = rng.random((count, len(cut.moving)))
+            allowed, drawn = np.concatenate([allowed, unit[cut.slack(unit) >= 0]]), drawn + count
+        self._volumes[cut.level] = len(allowed) / drawn
+        if len(allowed) < count:
+            self._exhausted.add(cut.level)
+        return allowed[:count]
+
+    def _add(self, cut: Cut, unit: Array) -> None:
+        """Run the model at uniform samples of a cut."""
+        if len(unit):
+            points = cut.points(unit)
+            rows = self.campaign(points)
+            for bound, values in self._values.items():
+                added = bound.sign * rows.array[:, rows.column(bound.output)]
+                added[np.isnan(added)] = inf
+                self._values[bound] = np.concatenate([values, added])
+            self._points = np.concatenate([self._points, points])
+            self._levels = np.concatenate([self._levels, np.full(len(points), cut.level)])

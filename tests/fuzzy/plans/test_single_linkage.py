@@ -1,0 +1,151 @@
+"""Estimates by single linkage: optima that are found, samples that the rule asks for, and kinks."""
+
+import numpy as np
+import pytest
+from scipy.special import gamma
+
+from alphacut.fuzzy import Automatic, Interval, Nature, Triangular, propagate
+from alphacut.fuzzy.plans.single_linkage import (
+    critical_distance,
+    linkage_starts,
+    uncovered_share,
+)
+from tests.calibration.functions import FAMILIES, named, numbers, true_ends
+
+SQUARE = {"x": Interval(0, 1), "y": Interval(0, 1)}
+# least and greatest value over the unit square: a grid of 801² points, polished by L-BFGS-B, and
+# scipy.optimize.direct with 10,000 evaluations
+HUMPS = {
+    "sines": (
+        lambda x, y: np.sin(20 * x) + np.sin(17 * y) + np.sin(9 * x + 13 * y),
+        (-2.958992, 2.987918),
+    ),
+    "growing sines": (lambda x, y: x * np.sin(12 * x) + y * np.sin(15 * y), (-1.656111, 1.604548)),
+    "Rastrigin": (
+        lambda x, y: 20 + sum(z * z - 10 * np.cos(2 * np.pi * z) for z in (4 * x - 2, 4 * y - 1)),
+        (0.0, 48.543300),
+    ),
+    "Schwefel": (
+        lambda x, y: -sum(z * np.sin(np.sqrt(abs(z))) for z in (1000 * x - 500, 1000 * y - 500)),
+        (-837.965775, 837.965775),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HUMPS)
+def test_no_hump_is_missed(name):
+    function, (low, high) = HUMPS[name]
+    result = propagate(function, SQUARE, alpha=[0.0], vectorised=True)
+    near = result.error[0, 0] + 1e-6 * (high - low)
+    assert result.lower[0, 0] == pytest.approx(low, abs=near)
+    assert result.upper[0, 0] == pytest.approx(high, abs=near)
+    assert result.nature is Nature.ESTIMATED
+    assert result.error[0, 0] <= 2e-5 * (high - low)
+    assert result.evaluations < 4000
+
+
+def test_the_note_says_samples_optima_and_share():
+    result = propagate(HUMPS["Schwefel"][0], SQUARE, alpha=[0.0], vectorised=True)
+    words = next(note for note in result.notes if note.startswith("W = ")).split()
+    optima, samples, share = int(words[2]), int(words[8].strip(":")), float(words[12].strip("%"))
+    assert share == pytest.approx(100 * uncovered_share(samples, optima), abs=0.005)
+    assert share < 0.2
+    assert samples >= 100
+
+
+def test_symmetric_optima_are_several_and_a_valley_is_one():
+    """Four corners of one value ask for as many samples as four of different values."""
+    notes = [
+        propagate(function, SQUARE, alpha=[0.0], vectorised=True).notes[0]
+        for function in (
+            lambda x, y: (x - 0.5) ** 2 + (y - 0.5) ** 2,
+            lambda x, y: (x + y - 1) ** 2,
+        )
+    ]
+    assert notes[0].startswith("W = 4 ")
+    assert notes[1].startswith("W = 2 ")  # both corners off the diagonal
+
+
+def test_critical_distance_and_share_are_those_of_the_papers():
+    for d, n in ((1, 100), (3, 200)):
+        ball = np.pi ** (d / 2) / gamma(1 + d / 2) * critical_distance(n, d) ** d
+        assert ball == pytest.approx(4 * np.log(n) / n)
+        assert critical_distance(n, d, 0.25) == pytest.approx(
+            critical_distance(n, d) / 4 ** (1 / d)
+        )
+    assert uncovered_share(100, 3) == pytest.approx(12 / 9900)
+
+
+def test_descents_start_where_no_better_sample_is_near():
+    line = np.array([[0.0], [0.1], [0.2], [0.8], [0.9]])
+    starts = linkage_starts(line, np.array([1.0, 3.0, 2.0, np.inf, 5.0]), 0.15)
+    assert list(starts) == [0, 2, 4]
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda x, y: np.abs(x - 0.3) + (y - 0.4) ** 2,
+        lambda x, y: (x - 0.5) ** 2 + (y - 0.5) ** 2 + 1.0 * (x + 0.3 * y > 0.6),
+    ],
+    ids=["kink", "jump"],
+)
+def test_a_bound_at_a_kink_or_a_jump_is_attained(function):
+    result = propagate(function, SQUARE, alpha=[0.0], vectorised=True)
+    assert result.nature is Nature.ATTAINED
+    assert (result.error == 0).all()
+    assert any("kink or a jump" in note for note in result.notes)
+    assert result.evaluations < 2000
+
+
+def test_corners_bound_a_monotone_function_at_little_cost():
+    inputs = {f"x{i}": Triangular(0.0, 0.3, 1.0) for i in range(4)}
+    result = propagate(lambda **x: sum(np.exp(v) for v in x.values()), inputs, vectorised=True)
+    assert result.nature is Nature.ESTIMATED
+    assert result.evaluations == 20 * 4 + 1 + 2 * 2 * 4 + 2 * 4 + 1
+    assert "differences of each input keep their sign at 24 points" in result.notes[0]
+    np.testing.assert_allclose(result.upper[0, 0], 4 * np.e, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda x, y: (x - 0.02) ** 2 + y,  # turns beside a corner
+        lambda x, y: x + y - 0.5 * (x + y > 1.7),  # jumps beside one
+        lambda x, y: x + y + 3 * np.maximum(1 - ((x - 0.4) ** 2 + (y - 0.6) ** 2) / 0.04, 0) ** 2,
+    ],
+    ids=["hump", "jump", "spike"],
+)
+def test_corners_that_do_not_suffice_are_seen(function):
+    result = propagate(function, SQUARE, alpha=[0.0], vectorised=True)
+    assert not any(note.startswith("corners") for note in result.notes)
+
+
+def test_seeds_differ_and_agree_within_both_errors():
+    function = HUMPS["sines"][0]
+    one, other = (
+        propagate(function, SQUARE, Automatic(seed=seed), alpha=[0.0, 0.5], vectorised=True)
+        for seed in (1, 2)
+    )
+    assert one.evaluations != other.evaluations
+    assert (np.abs(one.lower - other.lower) <= one.error + other.error).all()
+    assert (np.abs(one.upper - other.upper) <= one.error + other.error).all()
+
+
+def test_errors_of_the_default_cover_in_every_family():
+    estimated, missed = 0, []
+    for family in FAMILIES:
+        for seed in range(4):
+            rng = np.random.default_rng(seed)
+            function, inputs = family(rng, n := int(rng.integers(1, 4))), numbers(rng, n)
+            result = propagate(named(function), inputs, alpha=(0.0, 0.5), vectorised=True)
+            if result.nature is not Nature.ESTIMATED:
+                continue
+            estimated += 1
+            for level, alpha in enumerate(result.alpha):
+                low, high = true_ends(function, inputs, alpha)
+                lack = max(result.lower[level, 0] - low, high - result.upper[level, 0])
+                if lack > result.error[level, 0] + 1e-9 * (high - low):
+                    missed.append((family.__name__, seed, alpha, lack))
+    assert estimated >= 8
+    assert not missed
