@@ -13,8 +13,8 @@ from alphacut.case.types import Quantity
 from alphacut.figures import style
 from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
 from alphacut.frame.questions.peaks import ANY
-from alphacut.frame.questions.probability import Probability as Bounds
 from alphacut.frame.questions.probability import CONFIDENCE, probabilities
+from alphacut.frame.questions.probability import Probability as Bounds
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array

@@ -180,7 +180,7 @@ class SingleLinkage:
         worst = max(self.states.values(), key=lambda state: state.share)
         return (
             f"W = {len(worst.optima)} optima found from N = {worst.samples} samples: of each cut"
-            f" {worst.share:.2%} or less is not yet covered"
+            f" {worst.share:.3%} or less is not yet covered"
         )
 
     def sample(self) -> None:
