@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from alphacut.frame.boxes import UnitFlow
-from alphacut.frame.dynamics.flow import Flow, LinearFlow, StepError
+from alphacut.frame.dynamics.flow import Flow, StepError
+from alphacut.frame.dynamics.nonlinear import LagrangianFlow
 from alphacut.frame.envelope import Envelope
+from alphacut.frame.verification.reference_motion import ReferenceMotion
 from alphacut.fuzzy.arrays import Array
 
 OPTIMA = 64
@@ -17,6 +19,13 @@ MARGIN = 1.5
 """Factor on the largest error or stray at these, since other points of the box may exceed it."""
 DIVERGED = 10.0
 """Error of a scheme, as a multiple of the motion's peak, from which on it has left the motion."""
+REFERENCES = 32
+"""Points at peaks that are compared with a reference motion, at most."""
+COARSE = 0.02
+"""Error at such a point, as a share of the output's peak, from which on a step is refused: bounds
+are then attained by other motions than those they name. A tenth of it is enough."""
+FINEST = 64
+"""Most parts of a step that are tried to find a step which would do."""
 AT_ONCE = 16
 """Trajectories that are held at once."""
 FLOOR = 0.1
@@ -52,7 +61,7 @@ def with_step_error(of: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
         flow: These trajectories.
         steps: From `step_error`, shape (T, m).
     """
-    if isinstance(flow.flow, LinearFlow) and not flow.flow.exact:
+    if not flow.flow.exact:
         steps = np.maximum(steps, _at_bounds(of, flow.flow))
     alike = [unit == flow.units[flow.reference] for unit in flow.units]
     error, basis = of.error + steps, of.basis
@@ -63,17 +72,60 @@ def with_step_error(of: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     return replace(of, error=error, basis=basis, facts=facts)
 
 
-def _at_bounds(of: Envelope, flow: LinearFlow) -> Array:
-    """Errors of a linear scheme from some points at which bounds are reached, (T, m).
+def _at_bounds(of: Envelope, flow: Flow) -> Array:
+    """Errors of a scheme from some points at which bounds are reached, (T, m).
 
-    A structure may resonate between the corners, and the scheme at other parameters than the truth.
+    A structure may resonate between the corners, and the scheme at other parameters than the truth;
+    or a motion may pass near an unstable equilibrium there. Of a system that is not linear the
+    points of the peaks are compared with a method of another kind besides.
+
+    Raises:
+        StepError: The step is too coarse there.
     """
     at, d = np.stack([of.lower_at, of.upper_at]), len(of.inputs)
     peaks = np.abs([of.lower, of.upper]).argmax(2)[:, :, None, :, None]
-    highest = np.take_along_axis(at, peaks, 2).reshape(-1, d)
+    highest = np.unique(np.take_along_axis(at, peaks, 2).reshape(-1, d), axis=0)
     others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
-    _, error = flow.deviations(np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0))
-    return np.asarray(MARGIN * np.maximum.accumulate(error.max(0), axis=0))
+    points = np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0)
+    error = flow.deviations(points)[1].max(0)
+    if isinstance(flow, LagrangianFlow):
+        error = np.maximum(error, _from_reference(of, flow, highest[:REFERENCES]))
+    return np.asarray(MARGIN * np.maximum.accumulate(error, axis=0))
+
+
+def _from_reference(of: Envelope, flow: LagrangianFlow, points: Array) -> Array:
+    """Largest distance of trajectories at points (S, d) from reference motions, (T, m).
+
+    Raises:
+        StepError: It passes `COARSE` of an output's peak; the message says which step would do.
+    """
+    reference, parameters = ReferenceMotion(flow.system), flow.system.parameters
+    truth = np.stack(
+        [
+            reference.outputs({**parameters, **dict(zip(flow.names, point, strict=True))}, of.time)
+            for point in points
+        ]
+    )
+    off = np.abs(flow.values(points) - truth)
+    share = off.max(1) / np.maximum(np.abs(truth).max((0, 1)), 1e-300)
+    if (share > COARSE).any():
+        worst, output = np.unravel_index(int(share.argmax()), share.shape)
+        at = ", ".join(f"{x} = {y:.6g}" for x, y in zip(flow.names, points[worst], strict=True))
+        what = f"step: {flow.step:g} s is too coarse where a bound is attained, at {at}: there"
+        what += f" {flow.outputs[output]} is off by {off[worst, :, output].max():.3g}"
+        raise StepError(what, _enough(flow, points[worst : worst + 1], truth[worst : worst + 1]))
+    return np.asarray(off.max(0))
+
+
+def _enough(flow: LagrangianFlow, point: Array, truth: Array) -> str:
+    """The step that keeps a trajectory, shape (1, T, m), near the truth, in words."""
+    fine, parts = flow, 1
+    while parts < FINEST:
+        fine, parts = fine.finer()[0], 2 * parts
+        off = np.abs(fine.values(point)[:, ::parts] - truth).max(1)
+        if (off <= COARSE / 10 * np.abs(truth).max(1)).all():
+            return f"a step of {fine.step:g} s would do"
+    return f"no step down to {fine.step:g} s would do; take a shorter duration or narrower inputs"
 
 
 def with_stray(of: Envelope, flow: UnitFlow) -> Envelope:
