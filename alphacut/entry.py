@@ -27,6 +27,7 @@ COMMANDS = {
     "envelope": "stage",
     "identify": "stage",
     "report": "run",
+    "verify": "verify",
 }
 """Commands by the names that a user writes, each with its file in `alphacut.commands`."""
 STATUSES = """\

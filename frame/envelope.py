@@ -36,6 +36,7 @@ class Envelope(Bounds):
             proof; `search_error`: what a search may have missed; `estimated_error`: the largest
             error; `between_nodes`: the largest value of `between`;
             `motions_tested`: exact motions that were compared with proved bounds.
+        tested_structures: Their structures as arrays with axes, for `alphacut verify`.
     """
 
     time: Array
@@ -43,6 +44,7 @@ class Envelope(Bounds):
     attained_error: Array | None = None
     least_peaks: Ends | None = None
     facts: Mapping[str, float] = field(default_factory=dict)
+    tested_structures: Mapping[str, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
 
     @property
     def peak_words(self) -> str:
@@ -81,6 +83,10 @@ class Envelope(Bounds):
             dataset[name].attrs["units"] = units[0] if len(units) == 1 else "SI, by output"
         for name in ("lower_at", "upper_at"):
             dataset[name].attrs["units"] = "SI, by parameter"
+        if self.tested_structures:
+            ends = [[number.cut(float(a)) for number in self.inputs.values()] for a in self.alpha]
+            dataset["cut"] = (("alpha", "parameter", "end"), np.array(ends, float))
+            dataset = dataset.assign(self.tested_structures)
         notes: dict[str, str | int] = {"nature": str(self.nature), "notes": "; ".join(self.notes)}
         notes["trajectories"] = self.evaluations
         return dataset.assign_attrs(notes | dict(self.facts))

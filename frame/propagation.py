@@ -30,7 +30,7 @@ from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.frame.verification.self_test import tested
+from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
@@ -112,7 +112,7 @@ def envelope(
     bounds = _judged(with_step_error(bounds, over, steps), over, way)
     bounds = with_stray(bounds, over)
     if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
-        bounds = tested(bounds, model)
+        bounds = with_motions_tested(bounds, model)
     return _on_levels(bounds, every.alpha, which)
 
 

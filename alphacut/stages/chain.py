@@ -9,8 +9,10 @@ from functools import partial
 
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
+from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io.columns import columns_text
 from alphacut.questions.question import Motion, Question
 from alphacut.stages import cell, envelope, identify, image, microstructure, modulus, shares
 from alphacut.stages.envelope import EnvelopeTask
@@ -110,7 +112,11 @@ class Chain:
         results.tasks = envelope.tasks(self.content.envelope, self.content.study if studies else ())
         longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest]
-        every = self.store.take_all(stages, self.executor)
+        try:
+            every = self.store.take_all(stages, self.executor)
+        except ContradictionError as error:
+            self.store.put_text("contradiction.csv", columns_text(error.table))
+            raise
         for task in results.tasks:
             data = every[f"envelope_{task.name}"]
             envelope.require_tolerance(data, task, structure)

@@ -125,6 +125,7 @@ def document(result: StageResult, fuzzy: Sequence[str]) -> Document:
         "alpha": data["alpha"].values,
         "peak": result.document["peak"],
         **{name: data.attrs[name] for name in facts},
+        "motions_tested": int(data.attrs.get("motions_tested", 0)),
         "step": float(data["time"].values[1]),
     }
 

@@ -9,7 +9,7 @@ the attained bound.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count, islice, product
@@ -20,6 +20,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.quantities import Output
 from alphacut.frame.verification.exact_motion import LinearMotion
+from alphacut.frame.verification.stored import variables
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import ROUND_OFF
@@ -57,18 +58,47 @@ class ContradictionError(FailedError):
         return ContradictionError, (what, dict(self.table))
 
 
-def tested(envelope: Envelope, system: LinearSystem) -> Envelope:
+def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
     """The envelope with the number of exact motions that agree with it as a fact.
 
     Raises:
         ContradictionError: An exact motion leaves proved bounds, strays farther between nodes than
             is proved, or differs from the attained bound that names its inputs.
     """
-    trial = Trial(envelope, system)
-    points = trial.points()
-    for k, motion in enumerate(trial.motions(points)):
-        trial.require_agreement(points[k], *motion.outputs(trial.times))
-    return replace(envelope, facts={**envelope.facts, "motions_tested": len(points)})
+    trial = Trial(envelope, cuts_of(envelope))
+    count = trial.allowed(structures_at(system, envelope, trial.cuts[0, :1])[0].rows.shape[1])
+    points = trial.points(count)
+    motions = structures_at(system, envelope, points)
+    trial.require_agreement(points, motions)
+    facts = {**envelope.facts, "motions_tested": len(points)}
+    return replace(envelope, facts=facts, tested_structures=variables(points, motions))
+
+
+def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
+    """A structure at inputs (S, n) of an envelope, ready to move."""
+    matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
+    ground = system.ground
+    record, step = (np.zeros(0), 0.0) if ground is None else (ground.acceleration, ground.step)
+    return [
+        LinearMotion(
+            mass=matrices.mass.value[s],
+            damping=matrices.damping.value[s],
+            stiffness=matrices.stiffness.value[s],
+            rows=rows.value[s],
+            start=matrices.start.value[s, :, 0],
+            pattern=matrices.rigid[:, 0],
+            record=record,
+            record_step=step,
+        )
+        for s in range(len(points))
+    ]
+
+
+def cuts_of(envelope: Envelope) -> Array:
+    """Lower and upper ends of the inputs on all levels, shape (2, A, n)."""
+    numbers = envelope.inputs.values()
+    ends = [[number.cut(float(a)) for number in numbers] for a in envelope.alpha]
+    return np.moveaxis(np.array(ends, float), -1, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +107,11 @@ class Trial:
 
     Args:
         envelope: Bounds, guaranteed or with guaranteed ones outside (`outer`).
-        system: Its structure.
+        cuts: Lower and upper ends of its inputs on all levels, shape (2, A, n).
     """
 
     envelope: Envelope
-    system: LinearSystem
-
-    @cached_property
-    def cuts(self) -> Array:
-        """Lower and upper ends of the inputs on all levels, shape (2, A, n)."""
-        numbers = self.envelope.inputs.values()
-        ends = [[number.cut(float(a)) for number in numbers] for a in self.envelope.alpha]
-        return np.moveaxis(np.array(ends, float), -1, 0)
+    cuts: Array
 
     @cached_property
     def times(self) -> Array:
@@ -97,49 +120,33 @@ class Trial:
         inside = time[:-1, None] + np.diff(time)[:, None] * np.arange(QUARTERS) / QUARTERS
         return np.append(inside.ravel(), time[-1])
 
-    def motions(self, points: Array) -> list[LinearMotion]:
-        """The structure at points (S, n), ready to move."""
-        matrices, rows = evaluate(
-            self.system, tuple(self.envelope.inputs), points, derivatives=False
-        )
-        ground = self.system.ground
-        record, step = (np.zeros(0), 0.0) if ground is None else (ground.acceleration, ground.step)
-        return [
-            LinearMotion(
-                mass=matrices.mass.value[s],
-                damping=matrices.damping.value[s],
-                stiffness=matrices.stiffness.value[s],
-                rows=rows.value[s],
-                start=matrices.start.value[s, :, 0],
-                pattern=matrices.rigid[:, 0],
-                record=record,
-                record_step=step,
-            )
-            for s in range(len(points))
-        ]
+    def allowed(self, unknowns: int) -> int:
+        """Motions of so many unknowns that a share of the proof's work allows.
 
-    @property
-    def allowed(self) -> int:
-        """Motions that a share of the proof's work allows, counted in multiplications."""
-        bounds = 2 * self.envelope.lower.size
-        unknowns = self.motions(self.cuts[0, :1])[0].rows.shape[1]
+        Work is counted in multiplications.
+        """
         nodes, outputs = self.envelope.lower.shape[1:]
+        proof = 2 * self.envelope.lower.size * BOUND_WORK
         motion = QUARTERS * nodes * outputs * unknowns * TERMS
-        return int(np.clip(SHARE * BOUND_WORK * bounds / motion, LEAST, MOST))
+        return int(np.clip(SHARE * proof / motion, LEAST, MOST))
 
-    def points(self) -> Array:
-        """Inputs to be tested, shape (S, n)."""
-        most, distinct = self.allowed, dict[tuple[float, ...], None]()
+    def points(self, most: int) -> Array:
+        """Inputs to be tested, at most so many, shape (S, n)."""
+        distinct = dict[tuple[float, ...], None]()
         for point in islice(self._in_order(), 4 * most):
             if len(distinct) < most and np.isfinite(point).all():
                 distinct[tuple(map(float, point))] = None
         return np.array(list(distinct))
 
+    def named(self) -> Array:
+        """Inputs that the envelope names at the peaks of the lowest level, shape (P, n)."""
+        return np.array(list(dict.fromkeys(tuple(map(float, x)) for x in self._named(0))))
+
     def _in_order(self) -> Iterator[Array]:
         """Points in the order of their worth, some of them more than once."""
         (low, high), levels = self.cuts, len(self.envelope.alpha)
         yield from self._named(0)
-        yield np.array([number.modal for number in self.envelope.inputs.values()])
+        yield np.array([number.modal for number in self.envelope.inputs.values()], float)
         yield from _corners(low[0], high[0])
         for level in range(1, levels):
             yield from self._named(level)
@@ -154,29 +161,33 @@ class Trial:
             yield of.upper_at[level, of.upper[level, :, o].argmax(), o]
             yield of.lower_at[level, of.lower[level, :, o].argmin(), o]
 
-    def require_agreement(self, point: Array, values: Array, rounding: Array) -> None:
-        """Refuse bounds that a motion at nodes and quarter points, (4 (T − 1) + 1, m), contradicts.
-
-        Args:
-            point: Its inputs, shape (n,).
-            values: Its outputs.
-            rounding: Their round-off.
+    def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
+        """Refuse an envelope that the exact motion at one of some inputs (S, n) contradicts.
 
         Raises:
-            ContradictionError: It does.
+            ContradictionError: One does.
         """
-        check = _Check(self, point, values, rounding)
-        near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
-        inside = (self.cuts[0] <= point + near) & (point - near <= self.cuts[1])
-        for level in np.flatnonzero(inside.all(1)):
-            check.require_inside(int(level))
-            check.require_attained(int(level))
-        check.require_straight()
+        for k, motion in enumerate(motions):
+            point = points[k]
+            check = _Check(self, point, *motion.outputs(self.times))
+            near = 4 * np.finfo(float).eps * np.abs(point)  # as inputs are rounded
+            inside = (self.cuts[0] <= point + near) & (point - near <= self.cuts[1])
+            for level in np.flatnonzero(inside.all(1)):
+                check.require_inside(int(level))
+                check.require_attained(int(level))
+            check.require_straight()
 
 
 @dataclass(frozen=True, eq=False)
 class _Check:
-    """One exact motion beside an envelope; the fields are those of `Trial.require_agreement`."""
+    """An exact motion beside an envelope.
+
+    Args:
+        trial: The envelope.
+        point: Inputs of the motion, shape (n,).
+        values: Its outputs at nodes and quarter points, shape (4 (T − 1) + 1, m).
+        rounding: Their round-off.
+    """
 
     trial: Trial
     point: Array

@@ -23,7 +23,7 @@ def spoken(capfd, *words):
 
 
 def test_commands_and_their_options_are_few():
-    assert len(COMMANDS) == 8
+    assert len(COMMANDS) == 9
     for parser in parsers("alphacut", COMMANDS)[1].values():
         options = [a for a in parser._actions if a.option_strings and a.dest != "help"]
         assert len(options) <= 12

@@ -1,0 +1,127 @@
+"""Command ``verify``: stored envelopes against exact motions, without their proofs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+import numpy as np
+
+from alphacut.commands.options import Command, add_quiet, answer
+from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.verification.self_test import ContradictionError, Trial
+from alphacut.frame.verification.stored import stored_motions
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.numbers import Interval
+from alphacut.io.columns import columns_text
+from alphacut.io.files import Document, alone
+from alphacut.io.manifest import ResultsFolder
+from alphacut.io.netcdf import dataset_of
+from alphacut.stages.store import put_text
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Adds the folder."""
+    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/building")
+    add_quiet(parser)
+
+
+def verify(options: argparse.Namespace, out: TextIO) -> int:
+    """Tests all stored envelopes that have proved bounds, and writes motions of their inputs."""
+    path = Path(options.folder)
+    folder = ResultsFolder.opened(path)
+    document: Document = {}
+    names = [name for name in folder.parts if name.startswith("envelope_")]
+    require(bool(names), "FOLDER", str(path), "results of a run with an envelope")
+    with alone("FOLDER", path):
+        for name in names:
+            data = dataset_of(folder.content(f"{name}.nc"))
+            if "motion_inputs" not in data:
+                document[name] = {"nature": str(data.attrs["nature"]), "motions_tested": 0}
+                continue
+            document[name] = verified(data, name, folder)
+    lines = (
+        f"{name}: {one['motions_tested']} exact motions agree with it ({one['nature']})\n"
+        if one["motions_tested"]
+        else f"{name}: nothing in it is proved ({one['nature']})\n"
+        for name, one in document.items()
+    )
+    answer(options, document, out, "".join(lines))
+    return 0
+
+
+def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document:
+    """What a stored envelope was tested with; motions of the inputs it names go to a CSV file.
+
+    Raises:
+        ContradictionError: A motion contradicts it; contradiction.csv holds it.
+    """
+    points, motions = stored_motions(data)
+    trial = Trial(envelope_of(data), np.moveaxis(data["cut"].values, -1, 0))
+    try:
+        trial.require_agreement(points, motions)
+    except ContradictionError as error:
+        put_text(folder, "contradiction.csv", columns_text(error.table))
+        raise
+    places = {tuple(point): k for k, point in enumerate(points.tolist())}
+    named = [places[point] for x in trial.named().tolist() if (point := tuple(x)) in places]
+    files = {
+        f"{name}_motions.csv": motions_table(trial, [motions[k] for k in named]),
+        f"{name}_inputs.csv": {
+            "motion": np.arange(1.0, len(named) + 1),
+            **{f"{x} [SI]": points[named, k] for k, x in enumerate(trial.envelope.inputs)},
+        },
+    }
+    for file, table in files.items():
+        put_text(folder, file, columns_text(table))
+    tested = {"motions_tested": len(points), "files": list(files)}
+    return {"nature": str(data.attrs["nature"]), **tested}
+
+
+def motions_table(trial: Trial, motions: list) -> dict[str, Array]:
+    """Time and outputs of motions at the nodes, by titles of columns."""
+    of, table = trial.envelope, {"time [s]": trial.envelope.time}
+    for k, motion in enumerate(motions, 1):
+        values = motion.outputs(of.time)[0]
+        table |= {f"motion {k}: {x}": values[:, o] for o, x in enumerate(of.named)}
+    return table
+
+
+def envelope_of(data: xarray.Dataset) -> Envelope:
+    """The envelope in a dataset, as far as it is tested; its inputs are those of its support."""
+    values = {name: variable.values for name, variable in data.data_vars.items()}
+    cut = values["cut"][0].tolist()
+    pairs = {
+        kind: Ends(values[f"{key}_lower"], values[f"{key}_upper"])
+        for kind, key in (("inner", "inner"), ("outer", "proved"))
+        if f"{key}_lower" in values
+    }
+    labels = [str(label) for label in values["label"]]
+    return Envelope(
+        alpha=data["alpha"].values,
+        time=data["time"].values,
+        outputs=tuple(map(str, data["output"].values)),
+        inputs={str(x): Interval(*cut[k]) for k, x in enumerate(data["parameter"].values)},
+        nature=Nature(data.attrs["nature"]),
+        method=str(data.attrs["method"]),
+        units=tuple(x.partition("[")[2].rstrip("]") for x in labels),
+        between=values.get("between"),
+        attained_error=values.get("attained_error"),
+        **{name: values[name] for name in ("lower", "upper", "lower_at", "upper_at", "error")},
+        **pairs,
+    )
+
+
+COMMANDS = {
+    "verify": Command(
+        "test the proved envelopes of a run by exact motions, without the proof",
+        add_options,
+        verify,
+    )
+}
