@@ -22,8 +22,8 @@ from math import comb, perm
 
 import numpy as np
 
-from alphacut.frame.response.duhamel import require_decaying, responses_at_nodes
-from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF
+from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF, require_in_range
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.fuzzy.arrays import Array
 
@@ -66,7 +66,8 @@ class Oscillators:
     def __init__(self, grid: Grid, ground: Accelerogram | None, time: Array) -> None:
         self.grid, self.ground, self.time = grid, ground, time
         sigma = grid.sigma.ravel()
-        require_decaying(sigma, float(time[-1]))
+        duration = float(time[-1])
+        require_in_range(sigma, duration, duration)
         self.free = np.exp(sigma * time[:, None])
         self.free_error = UNIT_ROUNDOFF * (4 + np.abs(sigma) * time[:, None]) * np.abs(self.free)
         decay = float((grid.quotient[:, None] * grid.omega).min())

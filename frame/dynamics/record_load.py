@@ -143,21 +143,3 @@ def linear_load(ground: Accelerogram, step: float, count: int) -> Array:
     """
     level, tilt = Segments(ground, step, count).moments(step, count, 2).T / step
     return np.stack([level + 3 * tilt, level - 3 * tilt], -1)
-
-
-def responses(rate: Array, ground: Accelerogram, step: float, steps: int) -> Array:
-    """R at all nodes, shape (S, steps + 1, K), for λ (S, K).
-
-    From node to node R is multiplied by exp(λ h), and what the record adds within the step is a sum
-    over points (`LoadRule`): a recursion of order one in time.
-    """
-    from scipy.signal import lfilter  # which takes time to import
-
-    flat = rate.ravel()
-    fastest = float(np.abs(flat).max())
-    rule = load_rule(ground, step, steps, parts_of(fastest, step))
-    decay, added = np.exp(step * flat), rule.weight @ np.exp(rule.tau[:, None] * flat)
-    out = np.zeros((steps + 1, len(flat)), complex)
-    for k, d in enumerate(decay):
-        out[1:, k] = lfilter([1.0], [1.0, -d], added[:, k])
-    return np.moveaxis(out.reshape(-1, *rate.shape), 0, 1)

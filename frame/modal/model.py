@@ -19,8 +19,8 @@ from alphacut.frame.boxes import Boxes
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.record_load import responses
 from alphacut.frame.modal.ground_response import LoadTables
+from alphacut.frame.response.duhamel import responses_at_nodes
 
 PIECE = 20_000
 """Points whose values are computed together."""
@@ -105,8 +105,8 @@ class ModalModel:
         rate = parts[:, :n]
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
         if self.load is not None and self.flow.system.ground is not None:
-            steps = len(time) - 1
-            waves.append(responses(rate, self.flow.system.ground, self.flow.step, steps))
+            (driven,), _ = responses_at_nodes(rate.ravel(), self.flow.system.ground, time, 0)
+            waves.append(np.moveaxis(driven.reshape(len(time), *rate.shape), 0, 1))
         shares = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
         wave = np.concatenate(waves, -1)
         return np.asarray(2 * (wave.real @ shares.real - wave.imag @ shares.imag))

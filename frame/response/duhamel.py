@@ -21,7 +21,7 @@ from numba import njit, prange
 from alphacut.frame.response.step_integrals import (
     UNIT_ROUNDOFF,
     error_of_integrals,
-    require_step_in_range,
+    require_in_range,
     step_integrals,
 )
 from alphacut.frame.structures.linear import Accelerogram
@@ -93,7 +93,7 @@ def responses_at_nodes(
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
-    require_decaying(sigma, ground.step)
+    require_in_range(sigma, ground.step, max(ground.step, float(time[-1])))
     out = np.empty((1 + derivatives, len(time), len(sigma)), complex)
     error = np.empty(out.shape[1:])
     with PARALLEL_LOOP:
@@ -112,21 +112,12 @@ def responses_at_named_nodes(
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
-    require_decaying(sigma, ground.step)
+    require_in_range(sigma, ground.step, max(ground.step, float(time[-1])))
     out = np.empty((1 + derivatives, *sigma.shape), complex)
     error = np.empty(sigma.shape)
     with PARALLEL_LOOP:
         _walk_to_named(sigma, walk(ground, time), (0,) * derivatives, node, out, error)
     return out, error
-
-
-def require_decaying(sigma: Array, step: float) -> None:
-    """Refuse exponents that grow, or are out of the range of a step's integrals.
-
-    Raises:
-        UnprovedError: One is so.
-    """
-    require_step_in_range(np.where(sigma.real > 0, np.inf, sigma), step)
 
 
 @njit(cache=True, parallel=True)

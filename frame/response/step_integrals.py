@@ -27,30 +27,36 @@ FROM_RECURRENCE = 2.0
 LARGEST_TURN = 1e8
 """|σ h| at most: beyond, rounding of the phase σ h alone passes 1e-8."""
 LARGEST_GROWTH = 700.0
-"""Re σ h at most: exp(709.8) is the largest floating-point number."""
+"""Re σ t at most: exp(709.8) is the largest floating-point number."""
 ERROR_OF_INTEGRALS = 12.0
 """Error of φ_n at small |z| and Re z ≤ 0 at most, in u / (n + 1); a test reaches 6."""
 
 
-def require_step_in_range(sigma: Array, step: float) -> None:
-    """Refuse exponents σ for which a step's integrals are not computed to round-off.
+def require_in_range(sigma: Array, step: float, duration: float) -> None:
+    """Refuse exponents σ (1/s) whose responses are not computed to round-off.
+
+    Args:
+        sigma: Exponents.
+        step: Longest interval h over which they are integrated at once, in s.
+        duration: Time over which they may grow, in s.
 
     Raises:
-        UnprovedError: One is not finite, |σ h| passes `LARGEST_TURN`, or Re σ h `LARGEST_GROWTH`.
+        UnprovedError: One is not finite, |σ h| passes `LARGEST_TURN`, or it grows by more than
+            exp(`LARGEST_GROWTH`).
     """
     turn = float(np.abs(sigma).max(initial=0.0)) * step
-    growth = float(sigma.real.max(initial=-np.inf)) * step
+    growth = float(sigma.real.max(initial=-np.inf)) * duration
     if not (turn <= LARGEST_TURN and growth <= LARGEST_GROWTH):
         raise UnprovedError(
-            f"a motion turns by {turn:.3g} rad and grows by exp({growth:.3g}) within {step:g} s;"
-            f" allowed: up to {LARGEST_TURN:g} rad and exp({LARGEST_GROWTH:g})",
+            f"a motion turns by {turn:.3g} rad within {step:g} s and grows by exp({growth:.3g})"
+            f" within {duration:g} s; allowed: {LARGEST_TURN:g} rad, exp({LARGEST_GROWTH:g})",
             "take a shorter step of the record, or less stiff members",
         )
 
 
 @njit(cache=True)
 def step_integrals(sigma: complex, h: float, out: Array) -> None:
-    """Writes J_n, n = 0 … 3, to `out`, for σ h in the range of `require_step_in_range`."""
+    """Writes J_n, n = 0 … 3, to `out`, for σ h in the range of `require_in_range`."""
     z = sigma * h
     if abs(z) < FROM_RECURRENCE:
         for n in range(4):
@@ -71,11 +77,13 @@ def step_integrals(sigma: complex, h: float, out: Array) -> None:
 
 @njit(cache=True)
 def error_of_integrals(sigma: complex, h: float) -> float:
-    """Bound of the rounding of J₀ and of 2 J₁ / h at Re σ ≤ 0, in s.
+    """Bound of the rounding of J₀ and of 2 J₁ / h, in s.
 
     At large |z| it is that of exp(z), whose phase is rounded by u |z|, and of the sums, both over
     |z|.
     """
     size = abs(sigma) * h
-    share = 1.0 if size < FROM_RECURRENCE else min(1.0, np.exp(sigma.real * h) / 4 + 4 / size)
-    return ERROR_OF_INTEGRALS * UNIT_ROUNDOFF * h * share
+    share = (
+        1.0 if size < FROM_RECURRENCE else min(1.0, np.exp(min(sigma.real * h, 0.0)) / 4 + 4 / size)
+    )
+    return ERROR_OF_INTEGRALS * UNIT_ROUNDOFF * h * share * np.exp(max(sigma.real * h, 0.0))

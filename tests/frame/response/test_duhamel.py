@@ -154,10 +154,10 @@ def test_nodes_stay_where_they_are():
     assert found.interval.tolist() == [0, 1, 1, 3, 7, 11]
 
 
-@pytest.mark.parametrize("sigma", [np.nan, 1.0 + 3j, -1e12 + 1j, -1 + 1e10j])
+@pytest.mark.parametrize("sigma", [np.nan, 2e3 + 3j, -1e12 + 1j, -1 + 1e10j])
 def test_exponents_out_of_range_are_refused(sigma):
     ground, time = Accelerogram(0.1, np.ones(20)), np.arange(5) * 0.1
     with pytest.raises(UnprovedError, match="take a shorter step of the record"):
         responses_at_nodes(np.array([-1 + 2j, sigma]), ground, time, 0)
-    with pytest.raises(UnprovedError, match="allowed: up to 1e"):
+    with pytest.raises(UnprovedError, match="allowed: 1e"):
         responses_at_named_nodes(np.array([[sigma]]), ground, time, np.array([2]), 1)
