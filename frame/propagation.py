@@ -27,7 +27,7 @@ from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
-from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.structures.modes import ModalError, require_modal_order
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
@@ -188,7 +188,19 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             positive = False
         require(positive, "mass", f"not positive definite at {at}", "a mass for every unknown")
         moved = moved or matrices.q0.value.any() or matrices.v0.value.any()
+    _require_modal_order(system, cuts)
     require(moved, "q0, v0 and ground", "zero", "a start or a record that moves something")
+
+
+def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:
+    """Refuse modes of unequal damping ratio that may cross over the boxes."""
+    ratios = getattr(system, "ratios", ())
+    if len(ratios) < 2:
+        return
+    values = [system.parameters[x] if isinstance(x, str) else x for x in ratios]
+    points = np.vstack([cuts.modal, cuts.probes])
+    matrices = evaluate(system, cuts.names, points, derivatives=False)[0]
+    require_modal_order(matrices.mass.value, matrices.stiffness.value, np.array(values))
 
 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:

@@ -112,6 +112,8 @@ class Proof:
             raise UnprovedError(
                 f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {d}"
             )
+        if len(getattr(flow.system, "ratios", ())) > 1:
+            raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
         ends = zip(boxes.lower[0].tolist(), boxes.upper[0].tolist(), strict=True)
         degrees(without_ratio(flow.system), dict(zip(boxes.names, ends, strict=True)))
         return float(BOXES_OF_INPUT**d)

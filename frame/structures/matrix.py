@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, variables
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.modes import ratio_damping
+from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import chosen, real, require, require_numbers
@@ -39,8 +39,9 @@ class MatrixStructure:
         v0: Initial velocities, shape (n,), in m/s; zero when None.
         ground: Base excitation, or None.
         pattern: ι, how the unknowns move rigidly with the ground, shape (n,); ones when None.
-        ratios: The damping ratio ζ of all modes, a number or the name of a parameter; added to
-            `damping`, it follows the parameters through the modes. Empty for none.
+        ratios: The damping ratio ζ of all modes, a number or the name of a parameter, or one of
+            each mode by rising frequency; added to `damping`, they follow the parameters through
+            the modes. Empty for none.
         row_factors: Factor of an output's row by the output's name, as that of a member force; 1
             where none is given.
 
@@ -78,8 +79,10 @@ class MatrixStructure:
         positive = np.linalg.eigvalsh(modal).min() > 0
         require(positive, "mass", "not positive definite", "a mass for every unknown")
         own = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
-        fits = len(own) < 2 and all(Parameter("", range=RATIO).admits(x, x) for x in own)
-        require(fits, "ratios", self.ratios, f"one number or parameter, {RATIO}")
+        fits = len(own) in (0, 1, self.size) and all(
+            Parameter("", range=RATIO).admits(x, x) for x in own
+        )
+        require(fits, "ratios", self.ratios, f"one number or parameter, or one a mode, {RATIO}")
 
     @property
     def size(self) -> int:
@@ -160,7 +163,7 @@ class MatrixStructure:
         rigid = np.ones(n) if self.pattern is None else np.asarray(self.pattern, float)
         mass, damping, stiffness = (total(getattr(self, kind)) for kind in KINDS)
         if self.ratios:
-            damping = damping + ratio_damping(mass, stiffness, lifted(self.ratios[0], p))
+            damping = damping + modal_damping(mass, stiffness, [lifted(x, p) for x in self.ratios])
         return Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:

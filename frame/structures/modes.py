@@ -141,6 +141,64 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
     return Jet(values, slope, np.einsum("...kk->...k", second)), right, inverse(right)
 
 
+def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
+    """D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ at S parameter sets, V = (S, n, n), in N s/m.
+
+    It follows the parameters through the modes, and is not frozen at their modal values.
+
+    Args:
+        mass: M, symmetric and positive definite, V = (S, n, n), in kg.
+        stiffness: K, symmetric and positive definite, V = (S, n, n), in N/m.
+        ratios: ζ, V = (S,): one of all modes, or one of each mode by rising frequency.
+
+    Raises:
+        RefusedError: A stiffness is not positive definite.
+    """
+    if len(ratios) == 1:
+        return ratio_damping(mass, stiffness, ratios[0])
+    squared, X, Y = (jet.map(np.real) for jet in eigenvectors(inverse(mass) @ stiffness))
+    _require_stiff(squared.value)
+    rate = squared**0.5
+    each = [2.0 * ratio * rate[:, k] for k, ratio in enumerate(ratios)]
+    scaled = [X[:, :, k] * x[:, None] for k, x in enumerate(each)]
+    columns = concatenate([column[..., None] for column in scaled], -1)
+    return mass @ (columns @ Y)
+
+
+def _require_stiff(squared: Array) -> None:
+    """Refuse squared frequencies (S, n) that rounding may hide.
+
+    Raises:
+        RefusedError: One is that small, or negative.
+    """
+    share = (squared / abs(squared).max(-1, keepdims=True)).min()
+    key, what = "squared frequency of a damped mode", f"{share:.1e} of the greatest"
+    cure = "give dampers, or join storeys that are too stiff"
+    require(share > 1e-12, key, what, "above rounding, 1e-12", cure)
+
+
+def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
+    """Refuse modes of unequal damping ratio that change places between parameter sets.
+
+    Args:
+        mass: M at S parameter sets, the modal ones first, shape (S, n, n).
+        stiffness: K there.
+        ratios: ζ of the modes by rising frequency, shape (n,).
+
+    Raises:
+        RefusedError: Shapes of one set are those of the modal set in another order.
+    """
+    below = np.linalg.inv(np.linalg.cholesky(mass))
+    U = np.linalg.eigh(below @ stiffness @ below.swapaxes(-1, -2))[1]
+    shapes = below.swapaxes(-1, -2) @ U
+    alike = np.abs(shapes[0].T @ mass[0] @ shapes)  # of modal shapes and the others'
+    place = alike.argmax(1)
+    for _, k in np.argwhere(ratios[place] != ratios):
+        pair = f"modes {min(k, place[:, k].min()) + 1} and {max(k, place[:, k].max()) + 1}"
+        cure = "give both the same ratio, or take narrower inputs"
+        require(False, "damping ratios", f"unequal where {pair} may cross", "modes apart", cure)
+
+
 def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
     """D = 2 ζ M √(M⁻¹K) at S parameter sets: every mode has the ratio ζ, V = (S, n, n), in N s/m.
 
@@ -158,10 +216,7 @@ def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
     operator, lower = inverse(mass) @ stiffness, np.linalg.cholesky(mass.value)
     below = np.linalg.inv(lower)
     squared, U = np.linalg.eigh(below @ (mass.value @ operator.value) @ below.swapaxes(-1, -2))
-    share = (squared / abs(squared).max(-1, keepdims=True)).min()
-    key, what = "squared frequency of a damped mode", f"{share:.1e} of the greatest"
-    cure = "give dampers, or join storeys that are too stiff"
-    require(share > 1e-12, key, what, "above rounding, 1e-12", cure)
+    _require_stiff(squared)
     omega = np.sqrt(squared)
     X = below.swapaxes(-1, -2) @ U
     Y = U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2)

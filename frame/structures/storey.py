@@ -16,7 +16,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
 from alphacut.frame.structures.linear import Accelerogram, Matrices
-from alphacut.frame.structures.modes import ratio_damping
+from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import chosen, real, require, require_numbers
@@ -38,7 +38,7 @@ class StoreyFrame:
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
     storey), or "k1" … where stiffnesses are given (and "l1" … with gravity alone); "d1" …, "q1_0" …
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
-    and "zeta" where there is a damping ratio.
+    and "zeta", or "zeta1" … of single modes, where there are damping ratios.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
@@ -57,8 +57,8 @@ class StoreyFrame:
         rayleigh: Mass and stiffness factors a (1/s), b (s) of a damping a M + b K added to the
             dampers.
         ground: Base excitation, if any; displacements are then relative to the ground.
-        damping_ratio: ζ of all modes, added to the other damping; it follows the parameters through
-            the modes.
+        damping_ratio: ζ of all modes, or a list with one of each mode by rising frequency, added to
+            the other damping; it follows the parameters through the modes.
         columns: Columns in each storey, each with the second moment I; where a storey's are
             stiffer, their number times that ratio. Two in each when empty.
         stiffness: Stiffness k_z of each storey, in N/m, in place of modulus, second moment and
@@ -84,7 +84,7 @@ class StoreyFrame:
     outputs: tuple[str, ...] = ()
     rayleigh: tuple[float, float] = (0.0, 0.0)
     ground: Accelerogram | None = None
-    damping_ratio: float | None = None
+    damping_ratio: float | Sequence[float] | None = None
     columns: Sequence[float] = ()
     stiffness: Sequence[float] = ()
     gravity: float = 0.0
@@ -116,13 +116,14 @@ class StoreyFrame:
             values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
             if values is None:
                 continue
-            single = name in SINGLE or np.ndim(values) == 0
+            single = np.ndim(values) == 0 or name == "modulus"
             (real if single else require_numbers)(name, values)
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, f"{value:g}", allowed)
-            sizes = (1, n) if name == "second_moment" else (0, n)
-            fits = name not in SYMBOLS or np.size(values) in sizes
+            sizes = {"second_moment": (1, n), "damping_ratio": (n,)}.get(name, (0, n))
+            free = name == "rayleigh" or (single and name not in SYMBOLS)
+            fits = free or np.size(values) in sizes
             what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
             require(fits, name, what, allowed)
         chosen("damper_placement", self.damper_placement, ("ground", "storey"))
@@ -152,8 +153,12 @@ class StoreyFrame:
 
     @property
     def ratios(self) -> dict[str, float]:
-        """Damping ratio by the name of its parameter; empty where there is none."""
-        return {} if self.damping_ratio is None else {"zeta": float(self.damping_ratio)}
+        """Damping ratios by the names of their parameters; empty where there are none."""
+        return (
+            {}
+            if self.damping_ratio is None
+            else _named("zeta{}", np.atleast_1d(self.damping_ratio))
+        )
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -212,7 +217,8 @@ class StoreyFrame:
         if self.gravity:
             stiffness = elastic - self.softening(p).map(chain)
         if self.ratios:
-            damping = damping + ratio_damping(mass, stiffness, p["zeta"])
+            ratios = [p[name] for name in self.ratios]
+            damping = damping + modal_damping(mass, stiffness, ratios)
         q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
         return Matrices(mass, damping, stiffness, q0, v0, np.ones((self.floors, 1)))
 

@@ -1,0 +1,111 @@
+"""Damping ratios of single modes: exact motions, derivatives, proofs, and modes that cross."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh, expm
+
+from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.structures.modes import modal_damping
+from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy.refused import RefusedError
+
+RATIOS = (0.02, 0.05, 0.08)
+RECORD = Accelerogram(0.05, 3 * np.random.default_rng(8).standard_normal(60))
+FRAME = StoreyFrame(
+    (2e4, 2e4, 1.5e4),
+    stiffness=(9e6, 8e6, 6e6),
+    damping_ratio=RATIOS,
+    ground=RECORD,
+    outputs=("q3", "drift2", "v1"),
+)
+FUZZY = {
+    "k1": Triangular(8.5e6, 9e6, 9.5e6),
+    "m3": Interval(1.4e4, 1.6e4),
+    "zeta1": Triangular(0.01, 0.02, 0.03),
+    "zeta3": Triangular(0.07, 0.08, 0.09),
+}
+
+
+def exact(k1, m3, zeta1, zeta3, duration=3.0, step=0.05):
+    """Motion by modes of SciPy and the exponential of the state, (T, 3)."""
+    k, m = np.array([k1, 8e6, 6e6]), np.array([2e4, 2e4, m3])
+    below = np.eye(3) - np.eye(3, k=-1)
+    K, M = below.T @ np.diag(k) @ below, np.diag(m)
+    squared, shape = eigh(K, M)
+    damping = 2 * np.array([zeta1, RATIOS[1], zeta3]) * np.sqrt(squared)
+    D = M @ shape @ np.diag(damping) @ shape.T @ M
+    A = np.zeros((8, 8))
+    A[:3, 3:6], A[3:6, :3], A[3:6, 3:6] = np.eye(3), -np.linalg.solve(M, K), -np.linalg.solve(M, D)
+    A[3:6, 6], A[6, 7] = -1.0, 1.0
+    turn, state, out = expm(A * step), np.zeros(6), [np.zeros(3)]
+    a = np.append(RECORD.acceleration, 0.0)
+    for i in range(round(duration / step)):
+        slope = (a[i + 1] - a[i]) / step if i < len(a) - 2 else 0.0
+        start = a[i] if i < len(a) - 2 else 0.0
+        state = (turn @ np.array([*state, start, slope]))[:6]
+        out.append(np.array([state[2], state[1] - state[0], state[3]]))
+    return np.array(out)
+
+
+def test_motions_are_those_of_an_independent_calculation():
+    flow = LinearFlow(FRAME, tuple(FUZZY), 3.0, 0.05, Exact())
+    points = np.random.default_rng().uniform(
+        *np.array([x.support for x in FUZZY.values()]).T, (4, 4)
+    )
+    for point, motion in zip(points, flow.values(points), strict=True):
+        reference = exact(*point)
+        assert motion == pytest.approx(reference, abs=1e-9 * np.abs(reference).max())
+
+
+def test_bounds_hold_motions_and_are_near():
+    given = {"duration": 3.0, "step": 0.05, "alpha": (0,), "progress": False}
+    found = envelope(FRAME, FUZZY, **given)
+    assert found.method == "dual"
+    low, high = np.array([x.support for x in FUZZY.values()]).T
+    unit = np.random.default_rng().random((40, 4))
+    unit[::2] = unit[::2].round()
+    values = np.stack([exact(*point) for point in low + unit * (high - low)])
+    slack = 1e-9 * np.abs(values).max()
+    assert (values <= found.upper[0] + slack).all()
+    assert (values >= found.lower[0] - slack).all()
+    assert found.facts["gap_of_peaks"] <= 2e-3
+
+
+def test_equal_ratios_of_all_modes_are_the_ratio_of_all():
+    rng = np.random.default_rng(2)
+    root = rng.normal(size=(2, 4, 4))
+    M, K = (x @ x.T + 4 * np.eye(4) for x in root)
+    first = rng.normal(size=(2, 2, 1, 4, 4))
+    first = first + first.swapaxes(-1, -2)
+    bend = np.zeros((2, 2, 1, 4, 4))
+    mass, stiffness = (
+        Jet(x[None].copy(), slope, bend.copy()) for x, slope in zip((M, K), first, strict=True)
+    )
+    ratio = Jet(np.full(1, 0.04), np.array([[0.3], [0.0]]), np.zeros((2, 2, 1)))
+    one, four = (modal_damping(mass, stiffness, [ratio] * count) for count in (1, 4))
+    for part in ("value", "first", "second"):
+        assert getattr(four, part) == pytest.approx(getattr(one, part), abs=1e-9)
+
+
+def test_modes_of_unequal_ratios_must_not_cross():
+    system = MatrixStructure(
+        {"k": 1.0, "z": 0.02},
+        [(1.0, np.eye(2))],
+        [("k", np.diag([100.0, 0.0])), (1.0, np.diag([0.0, 110.0])), (1.0, [[1, -1], [-1, 1]])],
+        {"q": np.array([1.0, 1.0])},
+        q0=np.ones(2),
+        ratios=("z", 0.05),
+    )
+    given = {"duration": 1.0, "step": 0.05, "alpha": (0,), "progress": False}
+    with pytest.raises(RefusedError, match="unequal where modes 1 and 2 may cross"):
+        envelope(system, {"k": Interval(0.8, 1.3)}, **given)
+    assert envelope(system, {"k": Interval(0.9, 1.0)}, **given).nature == "guaranteed"
+
+
+@pytest.mark.parametrize("ratios", [(0.02, 0.03), (0.02, 0.03, 1.2), (0.02, 0.03, -0.1)])
+def test_lists_that_do_not_fit_are_refused(ratios):
+    with pytest.raises(RefusedError, match="damping_ratio"):
+        StoreyFrame((1.0,) * 3, stiffness=(1.0,) * 3, damping_ratio=ratios)
