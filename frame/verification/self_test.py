@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import count, islice, product
+from itertools import islice, product
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from alphacut.frame.verification.stored import variables
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import ROUND_OFF
+from alphacut.fuzzy.sets.low_discrepancy import low_discrepancy
 
 LEAST, MOST = 24, 240
 """Fewest and most motions of a test; more than the most find little that these do not."""
@@ -292,16 +293,6 @@ def _within_steps(upper: Array, between: Array) -> Array:
     inside = np.maximum(upper[1:], upper[:-1]) + between[1:]
     parts = [upper[:-1], *[inside] * (QUARTERS - 1)]
     return np.append(np.stack(parts, 1).reshape(-1, upper.shape[1]), upper[-1:], axis=0)
-
-
-def low_discrepancy(dimension: int) -> Iterator[Array]:
-    """Points of [0, 1]^d, one after the other: the additive recurrence of Roberts (2018)."""
-    root = 2.0
-    for _ in range(64):
-        root = (1 + root) ** (1 / (dimension + 1))
-    step = root ** -np.arange(1.0, dimension + 1)
-    for k in count(1):
-        yield (0.5 + k * step) % 1.0
 
 
 def _corners(low: Array, high: Array) -> Iterator[Array]:

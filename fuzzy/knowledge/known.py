@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import chosen, require
+from alphacut.fuzzy.refused import chosen, real, require
 
 Signs = NDArray[np.int8]
 ROUND_OFF = 1e-11
@@ -27,16 +27,19 @@ class Known:
         monotone: Inputs in which every output is monotone while the others are fixed, in whatever
             direction; inputs with a sign need not be named again.
         source: Where the facts come from, named beside every guarantee that rests on them.
+        tests: Points of each cut at which a guarantee is tested, as far as the budget goes.
 
     Raises:
-        RefusedError: A sign is neither 1 nor −1.
+        RefusedError: A sign is neither 1 nor −1, or the number of tests no whole number.
     """
 
     signs: Mapping[str, int | Mapping[str, int]] = field(default_factory=dict)
     monotone: tuple[str, ...] = ()
     source: str = "as stated by the caller"
+    tests: int = 16
 
     def __post_init__(self) -> None:
+        real("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
                 require(value in (-1, 1), f"sign of {name}", value, "1 (rises), -1 (falls)")

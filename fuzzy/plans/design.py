@@ -15,6 +15,7 @@ from alphacut.fuzzy.knowledge.known import contradiction, negligible
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Ends, Nature
 from alphacut.fuzzy.sets.boxes import Domain
+from alphacut.fuzzy.sets.low_discrepancy import low_discrepancy
 
 
 class Method(Protocol):
@@ -107,6 +108,7 @@ def proving(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
     """
     if not proved.any():
         return bounds
+    campaign(_test_points(Domain(bounds.inputs, tuple(bounds.alpha)), campaign))
     samples, known = campaign.samples, campaign.known
     signs = known.stated(tuple(bounds.inputs), bounds.outputs)
     beyond = _beyond(bounds, samples)
@@ -125,6 +127,23 @@ def proving(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
         basis=tuple(f"{fact}, {agree}" for fact in known.words),
         inner=Ends(bounds.lower, bounds.upper),
     )
+
+
+def _test_points(domain: Domain, campaign: Campaign) -> Array:
+    """Points inside the cuts that the corners know nothing of, shape (n, inputs).
+
+    The narrowest cut that has a width takes all tests, a wider one a quarter besides: what lies in
+    a narrower cut tests a wider one, too.
+    """
+    lower, upper = domain.boxes
+    widths, tests, points = upper - lower, campaign.known.tests, list[Array]()
+    shares = low_discrepancy(len(domain.names))
+    ends = np.hstack([lower, upper])
+    is_new = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
+    for level in np.flatnonzero(is_new & widths.any(axis=1))[::-1]:
+        count = -(-tests // 4) if points else tests
+        points += [lower[level] + widths[level] * next(shares) for _ in range(count)]
+    return np.array(points[: campaign.left]).reshape(-1, len(domain.names))
 
 
 def _beyond(bounds: Bounds, samples: Samples) -> Mask:
