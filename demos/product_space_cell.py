@@ -25,8 +25,8 @@ from dolfinx import fem
 
 from alphacut.export.mesh import ORDER
 from alphacut.rve import LOADS, Phase, PrismModel, effective_modulus
-from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import reference_radius, triangulate
+from alphacut.rve.mesh.columns import extrude
+from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.rve.mesh.wedge import slab_rule
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.rve.prism.problem import PrismProblem
@@ -51,8 +51,7 @@ matrix, fibre = Phase(20e9, 0.3), Phase(80e9, 0.3)
 # displacements and for the geometry, so the cone is curved.
 
 # %%
-plane = triangulate(size=0.15, radius=reference_radius(radius))
-grid = PrismGrid(plane, layers=12)
+grid = extrude(size=0.15, radius=reference_radius(radius), layers=12)
 problem = PrismProblem(grid, MPI.COMM_SELF)
 problem.move(radius)
 mesh, space = problem.form.mesh, problem.form.space

@@ -73,15 +73,13 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
         size: Of the triangles, in halves of the cell's side.
         layers: In θ.
     """
-    from alphacut.rve.mesh.prism_grid import PrismGrid
-    from alphacut.rve.mesh.triangulation import reference_radius, triangulate
+    from alphacut.rve.mesh.columns import extrude
+    from alphacut.rve.mesh.triangulation import reference_radius
 
     outline = cell.outline
     radius = reference_radius(cell.radius, outline)
-    plane = triangulate(size=size, radius=radius, outline=outline)
-    grid = PrismGrid(plane, layers)
-    phase = np.tile(plane.inside.astype(np.int64), grid.layers)
-    return wedges(grid.positions(cell.radius), grid.cells, phase)
+    grid = extrude(size=size, radius=radius, layers=layers, outline=outline)
+    return wedges(grid.positions(cell.radius), grid.cells, grid.inside.astype(np.int64))
 
 
 def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:

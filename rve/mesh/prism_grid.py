@@ -7,7 +7,6 @@ half-way between levels, the planar vertices (a serendipity wedge has no midpoin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -42,20 +41,32 @@ def moved(mesh: Triangulation, radii: Array) -> Array:
     return np.asarray(points)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PrismGrid:
     """Wedges over a planar mesh; topology only, positions follow from a radius map.
 
     Args:
         plane: The planar mesh.
-        layers: Number of equal layers in θ, at least 1.
+        cells: Nodes of each wedge in Basix's order, shape (wedges, 15), layer by layer, in each in
+            the order of the triangles.
+        heights: Levels of θ as shares of its support, from 0 to 1, shape (layers + 1,).
+        phase: Phase of each wedge, a place in `names`, shape (wedges,).
+        names: Names of the phases.
         conforming: Whether the nodes follow the cone; if not they stay where the planar mesh has
             them.
     """
 
     plane: Triangulation
-    layers: int
+    cells: Rows
+    heights: Array
+    phase: Rows
+    names: tuple[str, ...]
     conforming: bool = True
+
+    @property
+    def layers(self) -> int:
+        """Number of layers in θ."""
+        return len(self.heights) - 1
 
     @property
     def inside(self) -> Mask:
@@ -67,22 +78,9 @@ class PrismGrid:
         """Number of nodes in all."""
         return (self.layers + 1) * len(self.plane.points) + self.layers * self.plane.vertices
 
-    @cached_property
-    def cells(self) -> Rows:
-        """Nodes of each wedge in Basix's order, shape (wedges, 15), layer by layer."""
-        planar = len(self.plane.points)
-        v0, v1, v2, e01, e02, e12 = self.plane.triangles.T
-        layer = np.arange(self.layers)[:, None]
-        below, above = planar * layer, planar * (layer + 1)
-        middle = planar * (self.layers + 1) + self.plane.vertices * layer
-        columns = [v0 + below, v1 + below, v2 + below, v0 + above, v1 + above, v2 + above]
-        columns += [e01 + below, e02 + below, v0 + middle, e12 + below, v1 + middle, v2 + middle]
-        columns += [e01 + above, e02 + above, e12 + above]
-        return np.stack(columns, axis=-1).reshape(-1, 15)
-
     def levels(self, law: ThetaLaw) -> Array:
         """θ of all levels, shape (layers + 1,)."""
-        return np.asarray(np.linspace(law.lower, law.upper, self.layers + 1))
+        return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
     def positions(self, radius: RadiusMap) -> Array:
         """(x1, x2, θ) of all nodes, shape (nodes, 3)."""

@@ -31,23 +31,28 @@ def triangles(
         outline: Of the particle.
         sizes: Edge length at (x1, x2), in place of `size`.
     """
-    with _model() as gmsh:
-        geo = gmsh.model.geo
-        surfaces = _particle(geo, size, radius, outline) if radius else _square(geo, size)
+    with model() as gmsh:
+        tags_of_surfaces = surfaces(gmsh, size, radius, outline)
         if sizes:
-            _grade(gmsh, sizes)
+            grade(gmsh, sizes)
         gmsh.model.mesh.generate(2)
         tags, xyz, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(tags.max()) + 1, np.int64)
         number[tags] = np.arange(len(tags))
         blocks = [
             number[gmsh.model.mesh.getElementsByType(2, s)[1].astype(np.int64)].reshape(-1, 3)
-            for s in surfaces
+            for s in tags_of_surfaces
         ]
     inside = np.concatenate([np.full(len(b), radius > 0 and k == 0) for k, b in enumerate(blocks)])
     # the centres of arcs are points without triangles
     used, packed = np.unique(np.concatenate(blocks), return_inverse=True)
     return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), inside
+
+
+def surfaces(gmsh: Any, size: float, radius: float, outline: Outline) -> tuple[int, ...]:
+    """Surfaces of the particle, if there is one, and of the matrix."""
+    geo = gmsh.model.geo
+    return _particle(geo, size, radius, outline) if radius else _square(geo, size)
 
 
 def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
@@ -64,7 +69,7 @@ def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
 
 
 @contextmanager
-def _model() -> Iterator[Any]:
+def model() -> Iterator[Any]:
     """Gmsh with an empty model, quiet, on one thread."""
     import gmsh
 
@@ -76,7 +81,7 @@ def _model() -> Iterator[Any]:
         gmsh.finalize()
 
 
-def _grade(gmsh: Any, sizes: Sizes) -> None:
+def grade(gmsh: Any, sizes: Sizes) -> None:
     """Take edge lengths from a function alone."""
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)

@@ -1,16 +1,13 @@
-"""Planar mesh under the prisms: Gmsh triangles at a reference radius."""
+"""Planar mesh under the prisms, at a reference radius."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.rve.mesh import square
-from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading
-from alphacut.rve.mesh.outline import Outline, circle, is_round, reach, require_fit
+from alphacut.rve.mesh.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, require_map
 
 
@@ -53,39 +50,3 @@ def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
     require_fit(outline, float(radii.max()))
     middle = np.round((radii.min() + radii.max()) * 10) / 20
     return float(np.clip(middle, 0.1, 0.9 / reach(outline)))
-
-
-def triangulate(
-    *, size: float, radius: float, outline: Outline = circle, refinement: float = REFINEMENTS[0]
-) -> Triangulation:
-    """Mesh the cell with triangles of about `size`, opposite sides matching.
-
-    Args:
-        size: Wanted edge length, in halves of the cell's side, in (0, 1].
-        radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
-            it.
-        outline: Of the particle.
-        refinement: Of the edges along an outline that is not round; see `bend_grading`.
-    """
-    sizes = None
-    if radius and not is_round(outline):
-        sizes = partial(_at_most, size, bend_grading(outline, radius, refinement))
-    points, triangles, inside = square.triangles(size, radius, outline, sizes)
-    ends, edges, on_arc = square.edges(triangles, inside)
-    arc = np.zeros(len(points) + len(ends), bool)
-    arc[ends[on_arc]] = True
-    arc[len(points) :] = on_arc
-    return Triangulation(
-        points=np.concatenate([points, points[ends].mean(axis=1)]),
-        vertices=len(points),
-        ends=ends,
-        triangles=np.hstack([triangles, len(points) + edges[:, ::-1]]),
-        inside=inside,
-        arc=arc,
-        radius=radius,
-        outline=outline,
-    )
-
-
-def _at_most(size: float, bend: Sizes, x: float, y: float) -> float:
-    return size * min(1.0, bend(x, y))

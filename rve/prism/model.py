@@ -21,10 +21,10 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import LOADS, THREE_LOADS, AnyPhase, Cell, Phase
 from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
+from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.grading import REFINEMENTS
 from alphacut.rve.mesh.outline import Outline, circle, is_round
-from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import reference_radius, triangulate
+from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.rve.prism.error_estimate import judged
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
@@ -228,6 +228,6 @@ def _problem(
     size: float, radius: float, outline: Outline, refinement: float, layers: int, parallel: bool
 ) -> PrismProblem:
     """Mesh, form and numbering: they do not depend on the map, only on these."""
-    plane = triangulate(size=size, radius=radius, outline=outline, refinement=refinement)
+    grid = extrude(size=size, radius=radius, layers=layers, outline=outline, refinement=refinement)
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    return PrismProblem(PrismGrid(plane, layers, radius > 0), comm)
+    return PrismProblem(grid, comm)

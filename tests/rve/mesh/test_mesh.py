@@ -7,12 +7,13 @@ pytest.importorskip("dolfinx")
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.fenicsx import basix
+from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
 from alphacut.rve.mesh.jacobian import jacobian_ratios
 from alphacut.rve.mesh.outline import Ellipse, area, circle, is_round
 from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
-from alphacut.rve.mesh.prism_grid import PrismGrid, moved
-from alphacut.rve.mesh.triangulation import reference_radius, triangulate
+from alphacut.rve.mesh.prism_grid import moved
+from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.stochastic import HermiteMap
 
 
@@ -31,7 +32,7 @@ def areas(points, triangles):
 
 @pytest.mark.parametrize("outline", OUTLINES)
 def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline):
-    mesh = triangulate(size=0.2, radius=0.5, outline=outline)
+    mesh = extrude(size=0.2, radius=0.5, outline=outline, layers=1).plane
     signs = np.sign(areas(mesh.points, mesh.triangles))
     for radius in (0.05, 0.3, 0.65):
         points = moved(mesh, np.array([radius]))[0]
@@ -45,7 +46,7 @@ def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline)
 
 
 def test_opposite_nodes_are_one_unknown_and_all_corners_none():
-    plane = triangulate(size=0.3, radius=0.6)
+    plane = extrude(size=0.3, radius=0.6, layers=1).plane
     unknown = identify(plane).unknown
     keys = {tuple(np.round(p, 7)): u for p, u in zip(plane.points, unknown, strict=True)}
     for (x, y), u in keys.items():
@@ -60,7 +61,7 @@ def test_opposite_nodes_are_one_unknown_and_all_corners_none():
 
 
 def test_a_node_without_a_partner_is_refused():
-    plane = triangulate(size=0.4, radius=0.5)
+    plane = extrude(size=0.4, radius=0.5, layers=1).plane
     points = plane.points.copy()
     side = np.flatnonzero((points[:, 0] == 1) & (abs(points[:, 1]) < 0.9))
     points[side[0], 1] += 1e-3
@@ -134,7 +135,7 @@ def test_meshes_of_round_particles_stay_as_they_were():
 
 
 def test_the_sign_of_z_marks_the_cone():
-    grid = PrismGrid(triangulate(size=0.5, radius=0.0), 2, conforming=False)
+    grid = extrude(size=0.5, radius=0.0, layers=2)
     cone = HermiteMap(0.2, 0, 0.8, 0)
     points = np.array([[0.49, 0, 0.0], [0.51, 0, 0.0], [0.3, 0, -3], [0.3, 0, 3]])
     assert grid.sign(points, cone).tolist() == [1, 0, 0, 1]

@@ -9,8 +9,8 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Phase, VoigtPhase
 from alphacut.rve.certificate import CertificateError
+from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.outline import Ellipse
-from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.mesh.wedge import slice_weights
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
@@ -218,7 +218,9 @@ def test_wedges_about_a_sharp_outline_are_sound_at_all_radii():
     problem = model.problem(HermiteMap(0.078, 0, 0.405, 0))
     determinants = problem.form.areas / slice_weights()
     assert (determinants > 0.2 * determinants.mean(axis=(1, 2), keepdims=True)).all()
-    first = triangulate(size=0.6, radius=problem.form.grid.plane.radius, outline=model.outline)
+    first = extrude(
+        size=0.6, radius=problem.form.grid.plane.radius, outline=model.outline, layers=1
+    ).plane
     assert len(problem.form.grid.plane.triangles) > len(first.triangles)
 
 

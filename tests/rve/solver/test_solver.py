@@ -11,9 +11,8 @@ pytest.importorskip("dolfinx")
 
 from alphacut.rve.cell import LOADS, Phase
 from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.periodicity import identify
-from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import triangulate
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver import theta_preconditioner as preconditioner
 from alphacut.rve.solver.krylov import krylov_solver, solve
@@ -27,7 +26,7 @@ PHASES = Phase(20e9).stiffness, Phase(80e9).stiffness
 
 @pytest.fixture(scope="module")
 def problem():
-    one = PrismProblem(PrismGrid(triangulate(size=0.5, radius=0.5), 3), MPI.COMM_SELF)
+    one = PrismProblem(extrude(size=0.5, radius=0.5, layers=3), MPI.COMM_SELF)
     one.move(CRISP)
     one.assemble(PHASES)
     return one
@@ -57,7 +56,7 @@ def test_the_preconditioner_is_exact_where_nothing_changes_with_theta(problem):
 
 
 def test_the_preconditioner_is_symmetric_and_definite_where_the_radius_changes():
-    one = PrismProblem(PrismGrid(triangulate(size=0.7, radius=0.5), 2), MPI.COMM_SELF)
+    one = PrismProblem(extrude(size=0.7, radius=0.5, layers=2), MPI.COMM_SELF)
     cone = HermiteMap(0.2, 0.3, 0.8, 0.9)
     one.move(cone)
     one.assemble(PHASES)

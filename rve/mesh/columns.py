@@ -1,0 +1,170 @@
+"""Levels and columns of prisms that were extruded, found by their vertical edges."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.rve.mesh import square
+from alphacut.rve.mesh.gmsh_prisms import INCLUSION, Prisms, extruded
+from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading
+from alphacut.rve.mesh.outline import Outline, circle, is_round
+from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.triangulation import Triangulation
+
+BELOW, ABOVE = [0, 1, 2, 6, 7, 9], [3, 4, 5, 12, 13, 14]
+"""Nodes of a prism's triangles in Basix's order: vertices, then edges 01, 02, 12."""
+HALF_WAY = [8, 10, 11]
+"""Middles of its vertical edges, above vertices 0, 1, 2."""
+
+
+def extrude(
+    *,
+    size: float,
+    radius: float,
+    layers: int,
+    outline: Outline = circle,
+    refinement: float = REFINEMENTS[0],
+) -> PrismGrid:
+    """Gmsh's prisms over triangles of about `size`, opposite sides matching.
+
+    Args:
+        size: Wanted edge length, in halves of the cell's side, in (0, 1].
+        radius: Radius of the particle in the mesh, in (0, 1), or 0 for a mesh that knows nothing of
+            it.
+        layers: Along θ, at least 1.
+        outline: Of the particle.
+        refinement: Of the edges along an outline that is not round; see `bend_grading`.
+    """
+    sizes = None
+    if radius and not is_round(outline):
+        sizes = partial(_at_most, size, bend_grading(outline, radius, refinement))
+    prisms = extruded(size, radius, outline, layers, sizes)
+    return grid_of(prisms, radius, outline)
+
+
+def grid_of(prisms: Prisms, radius: float, outline: Outline = circle) -> PrismGrid:
+    """The prisms numbered level by level, with the planar mesh below them.
+
+    Args:
+        prisms: Of any numbering; their planar positions are those of the planar mesh.
+        radius: Of the particle in the mesh, 0 if it has none.
+        outline: Of the particle.
+
+    Raises:
+        MeshError: They do not lie in columns, or a column does not pass all levels.
+    """
+    heights, level = _levels(prisms)
+    column, count = _columns(prisms)
+    layer = level[prisms.cells[:, 0]]
+    lowest = prisms.cells[layer == 0]
+    corners = np.unique(column[lowest[:, :3]])
+    planar: Rows = np.full(count, -1)
+    planar[corners] = np.arange(len(corners))
+    middles = np.setdiff1d(column[lowest[:, BELOW]], corners)
+    planar[middles] = len(corners) + np.arange(len(middles))
+    number = _numbers(prisms, level, planar[column], len(heights) - 1, len(corners))
+    triangle = _triangles(planar[column[prisms.cells[:, :3]]], layer)
+    order = np.lexsort((triangle, layer))
+    cells = number[prisms.cells[order]]
+    phase = prisms.phase[order]
+    positions: Array = np.empty((count, 2))
+    lowest_nodes = np.flatnonzero(number < count)
+    positions[number[lowest_nodes]] = prisms.points[lowest_nodes, :2]
+    triangles = int(triangle.max()) + 1
+    inside = phase[:triangles] == (prisms.names.index(INCLUSION) if radius else -1)
+    plane = _plane(positions, cells[:triangles], inside, radius, outline)
+    shares = (heights - heights[0]) / (heights[-1] - heights[0])
+    return PrismGrid(plane, cells, shares, phase, prisms.names, radius > 0)
+
+
+def _levels(prisms: Prisms) -> tuple[Array, Rows]:
+    """θ of the levels, rising, and the level of each node, −1 half-way; shapes (k,) and (n,)."""
+    on_levels = np.unique(prisms.cells[:, BELOW + ABOVE])
+    theta = prisms.points[:, 2]
+    rising = np.sort(theta[on_levels])
+    heights = rising[np.append(True, np.diff(rising) > SAME_PLACE)]
+    level: Rows = np.full(len(theta), -1)
+    level[on_levels] = np.searchsorted(heights, theta[on_levels] + SAME_PLACE, side="right") - 1
+    below, above = level[prisms.cells[:, BELOW]], level[prisms.cells[:, ABOVE]]
+    if (below != below[:, :1]).any() or (above != below[:, :1] + 1).any():
+        wrong = (below != below[:, :1]).any(axis=1) | (above != below[:, :1] + 1).any(axis=1)
+        place = prisms.points[prisms.cells[np.argmax(wrong), 0]]
+        raise MeshError(
+            f"the prism at ({place[0]:.4g}, {place[1]:.4g}, θ = {place[2]:.4g}) does not stand on"
+            " one level with its top on the next",
+            "extrude the plane along θ, all columns by the same layers",
+        )
+    return np.asarray(heights), level
+
+
+def _columns(prisms: Prisms) -> tuple[Rows, int]:
+    """Column of each node by the vertical edges of the prisms, and their number."""
+    below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
+    above = prisms.cells[:, ABOVE + HALF_WAY].ravel()
+    size = len(prisms.points)
+    links = sp.coo_matrix((np.ones(len(below), np.int8), (below, above)), (size, size))
+    count, column = connected_components(links, directed=False)
+    return np.asarray(column), int(count)
+
+
+def _numbers(prisms: Prisms, level: Rows, planar: Rows, layers: int, corners: int) -> Rows:
+    """Number of each node: level by level, then half-way by half-way, shape (n,)."""
+    per_level = int(planar.max()) + 1
+    number = level * per_level + planar
+    half = prisms.cells[:, HALF_WAY]
+    below = level[prisms.cells[:, :3]]
+    number[half] = (layers + 1) * per_level + below * corners + planar[half]
+    expected = (layers + 1) * per_level + layers * corners
+    if (planar < 0).any() or not np.array_equal(np.sort(number), np.arange(expected)):
+        raise MeshError("columns of prisms do not pass all levels", "extrude the whole plane")
+    return np.asarray(number)
+
+
+def _triangles(vertices: Rows, layer: Rows) -> Rows:
+    """Triangle below each prism, numbered as those of the lowest layer by their vertices."""
+    triangle = np.unique(np.sort(vertices, axis=1), axis=0, return_inverse=True)[1].ravel()
+    counts = np.bincount(triangle)
+    if (counts != layer.max() + 1).any():
+        raise MeshError("layers of prisms differ", "extrude the whole plane")
+    return np.asarray(triangle)
+
+
+def _plane(
+    points: Array, cells: Rows, inside: Mask, radius: float, outline: Outline
+) -> Triangulation:
+    """The planar mesh of the lowest level.
+
+    Args:
+        points: Positions of its nodes, vertices first, shape (n, 2).
+        cells: Prisms of the lowest layer, shape (m, 15).
+        inside: Whether they belong to the particle, shape (m,).
+        radius: Of the particle, 0 for none.
+        outline: Of the particle.
+    """
+    triangles = cells[:, BELOW]
+    vertices = int(triangles[:, :3].max()) + 1
+    ends: Rows = np.empty((len(points) - vertices, 2), np.intp)
+    for middle, (first, second) in zip((3, 4, 5), ((0, 1), (0, 2), (1, 2)), strict=True):
+        ends[triangles[:, middle] - vertices] = triangles[:, [first, second]]
+    edge_ends, _, on_interface = square.edges(triangles[:, :3], inside)
+    arc = np.zeros(len(points), bool)
+    arc[edge_ends[on_interface]] = True
+    pairs = np.sort(ends, axis=1)
+    arc[vertices:] = _rows_in(pairs, edge_ends[on_interface])
+    return Triangulation(points, vertices, ends, triangles, inside, arc, radius, outline)
+
+
+def _rows_in(rows: Rows, others: Rows) -> Mask:
+    """Whether each row of pairs is among others, shape (n,)."""
+    size = int(rows.max(initial=0)) + 1
+    return np.isin(rows @ [size, 1], others @ [size, 1])
+
+
+def _at_most(size: float, bend: Sizes, x: float, y: float) -> float:
+    return size * min(1.0, bend(x, y))

@@ -1,0 +1,127 @@
+"""Gmsh's quadratic prisms of the product space, and their names: to and from its model.
+
+Gmsh triangulates the cell and extrudes it along θ. Its 15-node prisms ("Prism 15", type 18) have
+Basix's order of nodes. Physical groups name phases, sides and the two ends of θ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.rve.mesh import square
+from alphacut.rve.mesh.outline import Outline
+from alphacut.rve.mesh.periodicity import MeshError
+
+PRISM_15 = 18
+"""Gmsh's type of the element."""
+MATRIX, INCLUSION = "matrix", "inclusion"
+SIDES = {"x1 = -1": (0, -1.0), "x1 = 1": (0, 1.0), "x2 = -1": (1, -1.0), "x2 = 1": (1, 1.0)}
+"""Names of the sides with their axis and place."""
+LEVELS = "lowest level", "highest level"
+
+
+@dataclass(frozen=True, eq=False)
+class Prisms:
+    """Prisms of the product space as Gmsh numbers them.
+
+    Args:
+        points: (x1, x2, θ) of all nodes, shape (n, 3).
+        cells: Nodes of each prism in Basix's order, shape (m, 15).
+        phase: Phase of each prism, a place in `names`, shape (m,).
+        names: Names of the phases.
+    """
+
+    points: Array
+    cells: Rows
+    phase: Rows
+    names: tuple[str, ...]
+
+
+def extruded(
+    size: float, radius: float, outline: Outline, layers: int, sizes: square.Sizes | None = None
+) -> Prisms:
+    """Prisms over the triangulation of the cell, θ from 0 to 1 in equal layers.
+
+    Args:
+        size: Edge length in the plane, in halves of the cell's side.
+        radius: Radius of the particle; 0 for a mesh that knows nothing of it.
+        outline: Of the particle.
+        layers: Along θ.
+        sizes: Edge length at (x1, x2), in place of `size`.
+    """
+    with square.model() as gmsh:
+        names = (INCLUSION, MATRIX) if radius else (MATRIX,)
+        surfaces = square.surfaces(gmsh, size, radius, outline)
+        made = gmsh.model.geo.extrude(
+            [(2, surface) for surface in surfaces], 0, 0, 1, numElements=[layers], recombine=True
+        )
+        gmsh.model.geo.synchronize()
+        volumes = [tag for dimension, tag in made if dimension == 3]
+        for name, volume in sorted(zip(names, volumes, strict=True), reverse=True):
+            gmsh.model.addPhysicalGroup(3, [volume], name=name)
+        _name_surfaces(gmsh)
+        if sizes:
+            square.grade(gmsh, sizes)
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
+        gmsh.option.setNumber("Mesh.SecondOrderLinear", 1)  # nodes are moved to the cone later
+        gmsh.model.mesh.generate(3)
+        return read(gmsh)
+
+
+def _name_surfaces(gmsh: Any) -> None:
+    """Name the sides of the cell and the ends of θ."""
+    ends = {LEVELS[0]: (2, 0.0), LEVELS[1]: (2, 1.0)}
+    for name, (axis, place) in (SIDES | ends).items():
+        tags = []
+        for dimension, tag in gmsh.model.getEntities(2):
+            box = gmsh.model.getBoundingBox(dimension, tag)
+            if abs(box[axis] - place) + abs(box[axis + 3] - place) < 1e-5:  # boxes are enlarged
+                tags.append(tag)
+        gmsh.model.addPhysicalGroup(2, tags, name=name)
+
+
+def read(gmsh: Any) -> Prisms:
+    """The prisms of Gmsh's current model by their physical groups.
+
+    Raises:
+        MeshError: A volume has no physical group or two, or a mesh of other elements.
+    """
+    tags, xyz, _ = gmsh.model.mesh.getNodes()
+    place = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
+    place[tags] = np.arange(len(tags))
+    names, cells, phases = [], [], []
+    seen: set[int] = set()
+    for _, group in gmsh.model.getPhysicalGroups(3):
+        name = gmsh.model.getPhysicalName(3, group) or f"group {group}"
+        volumes = gmsh.model.getEntitiesForPhysicalGroup(3, group).tolist()
+        if seen & set(volumes):
+            raise MeshError(f"prisms of the physical group {name!r} are in another one too")
+        seen |= set(volumes)
+        for volume in volumes:
+            cells.append(_cells_of(gmsh, volume, name))
+            phases.append(np.full(len(cells[-1]), len(names)))
+        names.append(name)
+    lone = [tag for _, tag in gmsh.model.getEntities(3) if tag not in seen]
+    if lone or not names:
+        what = f"volume {lone[0]}" if lone else "the mesh"
+        raise MeshError(f"{what} has no physical group that names its phase")
+    used, packed = np.unique(place[np.concatenate(cells)], return_inverse=True)
+    points: Array = np.asarray(xyz, float).reshape(-1, 3)[used]
+    return Prisms(points, packed.reshape(-1, 15), np.concatenate(phases), tuple(names))
+
+
+def _cells_of(gmsh: Any, volume: int, name: str) -> Rows:
+    """Node tags of the prisms of a volume, shape (m, 15)."""
+    kinds, _, nodes = gmsh.model.mesh.getElements(3, volume)
+    if list(kinds) != [PRISM_15]:
+        found = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)
+        raise MeshError(
+            f"the physical group {name!r} holds {found or 'no elements'}",
+            "mesh with Prism 15: extrude with recombine, Mesh.SecondOrderIncomplete = 1, order 2",
+        )
+    return np.asarray(nodes[0].astype(np.int64)).reshape(-1, 15)

@@ -1,0 +1,116 @@
+"""Gmsh's prisms: all of them arrive, numbered level by level, with their names."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.rve.fenicsx import MPI
+from alphacut.rve.mesh import gmsh_prisms, square
+from alphacut.rve.mesh.columns import extrude, grid_of
+from alphacut.rve.mesh.outline import Ellipse, circle
+from alphacut.rve.mesh.periodicity import MeshError
+from alphacut.rve.mesh.wedge import slab_rule, wedge
+from alphacut.rve.prism.form import PrismForm
+from alphacut.stochastic import HermiteMap
+
+MAP = HermiteMap(0.3, 0, 0.6, 0)
+
+
+def volumes(points, cells):
+    """Of prisms of 15 nodes in Basix's order, by quadrature, shape (m,)."""
+    at, weights = slab_rule()
+    slopes = wedge(1).tabulate(1, at)[1:].reshape(3, len(at), 15)
+    jacobians = np.einsum("dqn,mnx->mqdx", slopes, points[cells])
+    return np.linalg.det(jacobians) @ weights
+
+
+@pytest.mark.parametrize("outline", [circle, Ellipse(2.0, 30.0)])
+def test_a_prism_that_gmsh_does_not_return_is_missed_by_its_volume(outline):
+    prisms = gmsh_prisms.extruded(0.5, 0.4, outline, 3)
+    each = volumes(prisms.points, prisms.cells)
+    assert (each > 0).all()
+    assert each.sum() == pytest.approx(4.0, rel=1e-12)  # 2 × 2 × 1
+    kept = np.arange(len(each)) != 17
+    rest = replace(prisms, cells=prisms.cells[kept], phase=prisms.phase[kept])
+    lost = 4.0 - volumes(rest.points, rest.cells).sum()
+    assert lost == pytest.approx(each[17], rel=1e-10)
+    with pytest.raises(MeshError, match=r"layers of prisms differ|do not pass all levels"):
+        grid_of(rest, 0.4, outline)
+
+
+def test_dolfinx_takes_all_prisms_of_gmsh():
+    form = PrismForm(extrude(size=0.5, radius=0.4, layers=3), MPI.COMM_SELF)
+    form.place(MAP)
+    assert form.areas.sum() == pytest.approx(4.0 * 3 * 3, rel=1e-12)  # slices of all layers
+
+
+def test_nodes_are_numbered_level_by_level():
+    grid = extrude(size=0.4, radius=0.5, layers=4)
+    points = grid.positions(MAP)
+    theta = np.repeat(np.linspace(-3, 3, 5), len(grid.plane.points))
+    half = np.repeat(np.linspace(-2.25, 2.25, 4), grid.plane.vertices)
+    assert points[:, 2] == pytest.approx(np.concatenate([theta, half]), abs=1e-12)
+    assert sorted(set(grid.cells.ravel())) == list(range(grid.nodes))
+    mids = points[grid.cells[:, [0, 1, 2]]] + points[grid.cells[:, [3, 4, 5]]]
+    assert mids[..., 2] / 2 == pytest.approx(points[grid.cells[:, [8, 10, 11]], 2], abs=1e-12)
+
+
+def test_the_order_of_prisms_does_not_matter():
+    prisms = gmsh_prisms.extruded(0.5, 0.4, circle, 3)
+    rng = np.random.default_rng(1)
+    cells, nodes = rng.permutation(len(prisms.cells)), rng.permutation(len(prisms.points))
+    place = np.argsort(nodes)
+    mixed = replace(
+        prisms,
+        points=prisms.points[nodes],
+        cells=place[prisms.cells[cells]],
+        phase=prisms.phase[cells],
+    )
+    for grid in (grid_of(mixed, 0.4), grid_of(prisms, 0.4)):
+        assert volumes(grid.positions(MAP), grid.cells).sum() == pytest.approx(24.0, rel=1e-12)
+        inside = volumes(grid.positions(MAP), grid.cells)[grid.inside].sum()
+        assert inside == pytest.approx(particle_volume(), rel=3e-3)
+
+
+def particle_volume():
+    """∫ π r² dθ of the map."""
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    return 3 * weights @ (np.pi * MAP(3 * nodes) ** 2)
+
+
+def test_phases_sides_and_levels_have_names():
+    seen = {}
+
+    def groups(gmsh):
+        for dimension, tag in gmsh.model.getPhysicalGroups():
+            name = gmsh.model.getPhysicalName(dimension, tag)
+            seen[name] = gmsh.model.mesh.getNodesForPhysicalGroup(dimension, tag)[1].reshape(-1, 3)
+        return original(gmsh)
+
+    original = gmsh_prisms.read
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gmsh_prisms, "read", groups)
+        gmsh_prisms.extruded(0.5, 0.4, circle, 2)
+    for name, (axis, place) in gmsh_prisms.SIDES.items():
+        assert seen[name][:, axis] == pytest.approx(np.full(len(seen[name]), place), abs=1e-12)
+        assert np.ptp(seen[name][:, 2]) == 1.0
+    for name, height in zip(gmsh_prisms.LEVELS, (0.0, 1.0), strict=True):
+        assert seen[name][:, 2] == pytest.approx(np.full(len(seen[name]), height), abs=1e-12)
+    radius = np.hypot(*seen["inclusion"].T[:2])
+    assert radius.max() == pytest.approx(0.4, rel=1e-12)
+    assert {*seen} == {"matrix", "inclusion", *gmsh_prisms.SIDES, *gmsh_prisms.LEVELS}
+
+
+def test_a_volume_without_a_name_is_refused():
+    with square.model() as gmsh:
+        gmsh.model.geo.extrude([(2, square.surfaces(gmsh, 0.5, 0.0, circle)[0])], 0, 0, 1)
+        gmsh.model.geo.synchronize()
+        gmsh.model.mesh.generate(3)
+        with pytest.raises(MeshError, match="volume 1 has no physical group"):
+            gmsh_prisms.read(gmsh)
+        gmsh.model.addPhysicalGroup(3, [1], name="clay")
+        with pytest.raises(MeshError, match="'clay' holds Tetrahedron 4"):
+            gmsh_prisms.read(gmsh)
