@@ -189,7 +189,7 @@ def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:
     steps = polynomial * (2 + turned) + 12 * model.count + 4 * d**3 + 50
     if forced and model.load is not None:
         longest = max(len(table.time) for table in model.load.tables)
-        steps = steps + (longest + MOST_TERMS) * np.exp(REACH)
+        steps = steps + (8 * longest + MOST_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * steps
 
 

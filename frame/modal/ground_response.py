@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.dynamics.record_load import load_rule, parts_of
+from alphacut.frame.response.duhamel import responses_in_windows
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Rows
@@ -20,6 +20,8 @@ from alphacut.fuzzy.arrays import Rows
 Complex = NDArray[np.complex128]
 REACH = 6.0
 """Largest change of phase (rad) over the box within a window."""
+LEAST_PHASE = 1.0
+"""Least radius in rad of the circle that coefficients come from; a smaller one lifts rounding."""
 MOST_STEPS = 40_000  # of a table
 
 
@@ -54,11 +56,11 @@ class LoadTable:
         time = np.linspace(time[0], time[-1], every * (len(time) - 1) + 1) if every > 1 else time
         h, steps = time[1] - time[0], len(time) - 1
         length = min(steps, max(1, int(REACH / max(spread, 1e-12) / h)))
-        phase = spread * length * h
-        order = max(6, ceil(2.72 * phase + 18))
+        phase = max(spread * length * h, LEAST_PHASE)
+        order = ceil(2.72 * phase + 18)
         self.middle, self.scale, self.time, self.every = middle, 1 / (length * h), time, every
-        self.moment = _moments(ground, middle, h, (steps, length), spread, order)
-        self.ends, self.truncation = np.arange(length, steps, length), left_out(phase, order)
+        self.moment = _moments(ground, middle, time, length, phase, order)
+        self.ends, self.truncation = np.arange(length, steps, length), 2 * left_out(phase, order)
 
     def response(self, rate: Array, node: Array) -> Array:
         """R, dR/dλ and d²R/dλ² at one node per point, shape (3, N), for eigenvalues (N,)."""
@@ -114,43 +116,25 @@ def left_out(phase: float, order: int) -> float:
 
 
 def _moments(
-    ground: Accelerogram,
-    middle: complex,
-    h: float,
-    nodes: tuple[int, int],
-    spread: float,
-    order: int,
+    ground: Accelerogram, middle: complex, time: Array, length: int, phase: float, order: int
 ) -> Array:
-    """Taylor coefficients of the window's own part of R, shape (steps + 1, order).
+    """Taylor coefficients of the window's own part of R, shape (T, order).
 
-    Per step: ∫ of exp((λ + x/window) τ) a over the step as a truncated series in x, by a rule that
-    takes the record as it is; from node to node the series is multiplied by that of exp((λ +
-    x/window) h). A node that ends one window starts the next from nothing.
+    By Cauchy's integral over a circle, of radius `phase` in the series' variable, at as many points
+    as coefficients; what that mixes into them are coefficients beyond, which are left out anyway.
 
     Args:
         ground: The record.
         middle: λ.
-        h: Step, in s.
-        nodes: Steps, and steps of a window.
-        spread: Bound of what |x|/window adds to |λ|, in 1/s.
+        time: Nodes, shape (T,), in s.
+        length: Steps of a window.
+        phase: Largest change of phase over the box within a window, or more.
         order: Number of coefficients.
     """
-    steps, length = nodes
-    rule = load_rule(ground, h, steps, parts_of(abs(middle) + spread, h))
-    powers, factorial = np.arange(order), np.cumprod([1.0, *range(1, order)])
-    series = (rule.tau[:, None] / (length * h)) ** powers / factorial
-    pushed = rule.weight @ (np.exp(middle * rule.tau)[:, None] * series)
-    windows = -(-steps // length)
-    padded = np.zeros((windows * length, order), complex)
-    padded[:steps] = pushed
-    out = padded.reshape(windows, length, order)
-    advance = np.exp(middle * h) / factorial / length ** powers.astype(float)
-    product = np.zeros((order, order), complex)  # truncated, with `advance`
-    for i in range(order):
-        product[i, i:] = advance[: order - i]
-    for j in range(1, length):
-        out[:, j] += out[:, j - 1] @ product
-    return np.concatenate([np.zeros((1, order)), out.reshape(-1, order)[:steps]])
+    turns = np.exp(2j * np.pi / order * np.arange(order))
+    rate = middle + phase * turns / (length * (time[1] - time[0]))
+    values = responses_in_windows(rate, ground, time, length)
+    return np.asarray(np.fft.fft(values, axis=1) / order / phase ** np.arange(order))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

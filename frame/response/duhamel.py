@@ -6,8 +6,9 @@ at the slope s, to a₁ (piecewise linear load: Clough, Penzien 1993, chapter 7)
     ρ(t + h) = exp(σ h) ρ(t) + a₁ J₀ − s J₁,   J_n = ∫₀ʰ τⁿ exp(σ τ) dτ,
 
 and so are its derivatives by σ. Nodes lie anywhere, samples need not be nodes. All responses to a
-record are walked by the one kernel here, at all nodes for each σ or at a named node for each row of
-σ. Rounding is bounded beside the values (running error analysis: Higham 2002, section 3.3).
+record are walked by the one kernel here: at all nodes for each σ, from rest at the first node or at
+each window's beginning, or at a named node for each row of σ. Rounding is bounded beside the values
+(running error analysis: Higham 2002, section 3.3).
 """
 
 from __future__ import annotations
@@ -120,12 +121,29 @@ def responses_at_named_nodes(
     return out, error
 
 
+def responses_in_windows(sigma: Array, ground: Accelerogram, time: Array, length: int) -> Array:
+    """The part of ρ at each node that arises in its window, shape (T, S), for σ (S,).
+
+    Windows begin at every `length`-th node, which itself ends the one before. Exponents may grow.
+
+    Raises:
+        UnprovedError: A σ is out of the kernel's range within a window.
+    """
+    window = float(time[min(length, len(time) - 1)] - time[0])
+    require_in_range(sigma, ground.step, max(ground.step, window))
+    out = np.zeros((1, len(time), len(sigma)), complex)
+    with PARALLEL_LOOP:
+        _walk_in_windows(sigma, walk(ground, time), length, out)
+    return np.asarray(out[0])
+
+
 @njit(cache=True, parallel=True)
 def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Array) -> None:
     """Walks each σ (S,) to all nodes and writes `out` (derivatives, T, S) and `error` (T, S)."""
     for s in prange(len(sigma)):
-        nodes = walk.interval, walk.phase, walk.phases, walk.doubt
-        _walk_along(sigma[s], walk, orders, nodes, out[:, :, s], error[:, s])
+        nodes = walk.interval, walk.phase, walk.doubt
+        parts = _parts(sigma[s], walk.phases)
+        _walk_along(sigma[s], walk, orders, nodes, parts, (0, 0j), out[:, :, s], error[:, s])
 
 
 @njit(cache=True, parallel=True)
@@ -135,10 +153,49 @@ def _walk_to_named(
     """Walks each σ (S, n) to the node of its row and writes `out` (…, S, n) and `error`."""
     for s in prange(len(sigma)):
         here, own = slice(node[s], node[s] + 1), walk.phase[node[s]]
-        phases = walk.phases[own : own + 1]
-        nodes = walk.interval[here], np.zeros(1, np.int64), phases, walk.doubt[here]
+        nodes = walk.interval[here], np.zeros(1, np.int64), walk.doubt[here]
         for k in range(sigma.shape[1]):
-            _walk_along(sigma[s, k], walk, orders, nodes, out[:, s : s + 1, k], error[s : s + 1, k])
+            parts = _parts(sigma[s, k], walk.phases[own : own + 1])
+            end = out[:, s : s + 1, k], error[s : s + 1, k]
+            _walk_along(sigma[s, k], walk, orders, nodes, parts, (0, 0j), *end)
+
+
+@njit(cache=True, parallel=True)
+def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
+    """Walks each σ (S,) to all nodes, from rest at each window's beginning; writes (1, T, S).
+
+    The state at the sample before a beginning is chosen so that it is at rest there.
+    """
+    for s in prange(len(sigma)):
+        parts, error = _parts(sigma[s], walk.phases), np.empty(length)
+        for first in range(0, len(walk.interval) - 1, length):
+            inside = slice(first + 1, min(first + length + 1, len(walk.interval)))
+            begin, x, P = walk.interval[first], parts[0][walk.phase[first]], parts[2]
+            slope = (walk.last[begin] - walk.first[begin]) / walk.step
+            moved = (walk.first[begin] + slope * x) * P[walk.phase[first], 0]
+            moved -= slope * P[walk.phase[first], 1]
+            start = begin, -moved / parts[1][walk.phase[first]]
+            nodes = walk.interval[inside], walk.phase[inside], walk.doubt[inside]
+            _walk_along(sigma[s], walk, (), nodes, parts, start, out[:, inside, s], error)
+
+
+@njit(cache=True)
+def _parts(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
+    """What a walk takes of the time to a node within an interval, for all phases (P,).
+
+    Returns:
+        The phases; exp(σ x), (P,); J_n, (P, 4); rounding, as shares of ρ and of a, and |exp(σ x)|,
+        (P, 3).
+    """
+    turns, parts = np.empty(len(phases), np.complex128), np.empty((len(phases), 4), np.complex128)
+    rounding, rate = np.empty((len(phases), 3)), abs(sigma.real) + abs(sigma.imag)
+    for j in range(len(phases)):
+        x = phases[j]
+        turns[j] = np.exp(sigma * x)
+        step_integrals(sigma, x, parts[j])
+        rounding[j, 0] = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * x)
+        rounding[j, 1], rounding[j, 2] = error_of_integrals(sigma, x), abs(turns[j])
+    return phases, turns, parts, rounding
 
 
 @njit(cache=True)
@@ -146,32 +203,35 @@ def _walk_along(
     sigma: complex,
     walk: Walk,
     orders: Orders,
-    nodes: tuple[Rows, Rows, Array, Array],
+    nodes: tuple[Rows, Rows, Array],
+    of_phases: tuple[Array, Array, Array, Array],
+    start: tuple[int, complex],
     out: Array,
     error: Array,
 ) -> None:
-    """Walks one σ over the record to nodes (interval, phase, phases, doubt).
+    """Walks one σ over the record, from a state before an interval, to nodes.
 
-    Writes ρ and its derivatives, `out` (derivatives, N), and bounds of the rounding of ρ, (N,).
+    Args:
+        sigma: σ.
+        walk: The record.
+        orders: As many zeros as derivatives.
+        nodes: Interval, phase and doubt of each node, shape (N,).
+        of_phases: As of `_parts`.
+        start: The first interval, and ρ at its beginning.
+        out: Written: ρ and its derivatives, shape (derivatives, N).
+        error: Written: bounds of the rounding of ρ, shape (N,).
     """
-    interval, phase, phases, doubt = nodes
-    h = walk.step
-    turns, parts = np.empty(len(phases), np.complex128), np.empty((len(phases), 4), np.complex128)
-    rounding = np.empty((len(phases), 3))  # shares of ρ and of a, and what is left of its error
-    rate = abs(sigma.real) + abs(sigma.imag)
-    for j in range(len(phases)):
-        x = phases[j]
-        turns[j] = np.exp(sigma * x)
-        step_integrals(sigma, x, parts[j])
-        rounding[j, 0] = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * x)
-        rounding[j, 1], rounding[j, 2] = error_of_integrals(sigma, x), abs(turns[j])
+    interval, phase, doubt = nodes
+    phases, turns, parts, rounding = of_phases
+    h, rate = walk.step, abs(sigma.real) + abs(sigma.imag)
     J, turn = np.empty(4, np.complex128), np.exp(sigma * h)
     step_integrals(sigma, h, J)
     of_turn, of_integrals = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * h), error_of_integrals(sigma, h)
     fade = abs(turn)
-    r0 = r1 = r2 = 0.0 + 0.0j
+    begin, r0 = start
+    r1 = r2 = 0.0 + 0.0j
     wrong, node = 0.0, 0
-    for i in range(interval[-1] + 1):
+    for i in range(begin, interval[-1] + 1):
         slope = (walk.last[i] - walk.first[i]) / h
         while node < len(interval) and interval[node] == i:
             j = phase[node]

@@ -6,7 +6,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from alphacut.frame.response.duhamel import responses_at_named_nodes, responses_at_nodes, walk
+from alphacut.frame.response.duhamel import (
+    responses_at_named_nodes,
+    responses_at_nodes,
+    responses_in_windows,
+    walk,
+)
 from alphacut.frame.response.step_integrals import (
     ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,
@@ -142,6 +147,19 @@ def test_derivatives_are_those_of_the_response():
     first, second = (near[2] - near[0]) / (2 * h), (near[0] - 2 * near[1] + near[2]) / h**2
     assert np.allclose(value[1], first, rtol=1e-6, atol=1e-8)
     assert np.allclose(value[2], second, rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("node_step", [0.02, 0.05, 0.0371])
+def test_windows_begin_at_rest(node_step):
+    """What arose before a window goes on freely; the rest is the window's own."""
+    ground = Accelerogram(0.05, np.random.default_rng(1).normal(size=30))
+    time, sigma, length = np.arange(41) * node_step, np.array([-0.3 + 9j, 0.4 - 20j, -30 + 2j]), 7
+    whole, _ = responses_at_nodes(sigma, ground, time, 0)
+    found = responses_in_windows(sigma, ground, time, length)
+    before = (np.maximum(np.arange(41) - 1, 0) // length) * length
+    free = np.exp(sigma * (time - time[before])[:, None]) * whole[0, before]
+    assert np.allclose(found + free, whole[0], atol=1e-13 * np.abs(whole).max(), rtol=1e-11)
+    assert (found[0] == 0).all()
 
 
 def test_nodes_stay_where_they_are():
