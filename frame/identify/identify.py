@@ -24,11 +24,14 @@ from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
-from alphacut.fuzzy.result import Ends
+from alphacut.fuzzy.result import ROUND_OFF, Ends
 from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
+LEEWAY = 0.1
+"""Share of the box's width by which samples may leave it; a larger one finds a wrong box that is
+much too narrow, but its walks meet the set less often."""
 
 
 class RefutedError(FailedError):
@@ -152,8 +155,11 @@ class Identified:
 
         `evidence.chain.modes` gives their modes, which lie in all measured cuts.
 
+        The walks may leave the box by `LEEWAY`, so that the points test what is proved.
+
         Raises:
-            FailedError: No point of the set was met.
+            FailedError: No point of the set was met, or one lies outside the box or has a frequency
+                outside the predictions: the proof is wrong.
         """
         of, level, chance = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
         nominal, modes = of.chain.nominal, of.modes(level)
@@ -170,7 +176,31 @@ class Identified:
         if start is None:
             what = f"no parameters with modes in all measured cuts at α = {level:g} were met"
             raise FailedError(what, "take samples of a lower level, or the box alone")
-        return place(walk(beyond, start, box, number, chance))
+        leeway = LEEWAY * (box.upper - box.lower)
+        wider = Ends(box.lower - leeway, box.upper + leeway)
+        points = place(walk(beyond, start, wider, number, chance))
+        self._require_contained(points, row)
+        return points
+
+    def _require_contained(self, points: Array, row: int) -> None:
+        """Refuse a box, or predictions of frequencies, that a point of the set lies outside.
+
+        Raises:
+            FailedError: One does.
+        """
+        chain, slack = self.evidence.chain, 1 + ROUND_OFF
+        inside = (points * slack >= self.lower[row]) & (points <= self.upper[row] * slack)
+        logs = [np.log(ends[row] / chain.nominal) for ends in (self.lower, self.upper)]
+        least, most = eigenvalue_ranges(chain, *logs)
+        values = chain.modes(points)[0]
+        predicted = (values * slack >= least) & (values <= most * slack)
+        for what, holds in (("parameters", inside), ("squared frequencies", predicted)):
+            if not holds.all():
+                sample = points[np.argmin(holds.all(1))]
+                pairs = zip(self.names, map(float, sample), strict=True)
+                at = ", ".join(f"{x} = {y!r}" for x, y in pairs)
+                text = f"the proof is wrong: {what} that agree with the modes lie outside, at {at}"
+                raise FailedError(text, "keep the case and report it")
 
     def predictions(self) -> Ends:
         """Proved ends of the natural frequencies of all n modes, measured or not, (A, n), in Hz."""

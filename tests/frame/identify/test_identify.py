@@ -412,6 +412,14 @@ def test_samples_are_in_the_set_and_their_modes_in_the_predictions(
         assert (found.samples(150, row=row, seed=3) != points).any()
 
 
+def test_samples_outside_a_box_that_is_too_narrow_refuse_it(rng: np.random.Generator) -> None:
+    found = identify(FRAME, PRIOR, measured(np.array([1.9, 2.1, 2.0]), rng))
+    width = found.upper - found.lower
+    for change in ({"upper": found.upper - 0.1 * width}, {"lower": found.lower + 0.1 * width}):
+        with pytest.raises(FailedError, match="the proof is wrong: parameters that agree"):
+            replace(found, **change).samples(200)
+
+
 def test_samples_scatter_like_points_of_the_box_that_agree(rng: np.random.Generator) -> None:
     found = identify(FRAME, PRIOR, measured(np.array([1.9, 2.1, 2.2]), rng), alpha=(0.05,))
     low, high = np.log([found.lower[0], found.upper[0]])
