@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -42,6 +43,8 @@ GRACE = 8
 WIDE = 0.1
 """Gap of a peak, as a share of it, above which bounds are worth nothing elsewhere either. It is
 left where parts cannot halve all inputs that share in it."""
+OWN_WORK = 0.5
+"""Share of a part's expected work that its own bounds take, and not its halves."""
 ADDED = ("boxes", "evaluations")
 """Facts of parts that are added; of the others the largest counts."""
 NARROWED = 0.5
@@ -60,6 +63,7 @@ class Goal:
         incumbent: Largest attained value on each side, shape (L, m, 2).
         workers: Threads.
         last: Whether the part is not bisected any more, so that wide bounds are better than none.
+        tick: Takes the share of the part that is done.
     """
 
     scale: Array
@@ -69,6 +73,7 @@ class Goal:
     incumbent: Array
     workers: int
     last: bool
+    tick: Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,6 +172,7 @@ class Part:
         needed: Bounds that are asked for, shape (L, T, m, 2).
         outer: Bounds that are known, the same.
         urgency: The largest of them above the incumbent, in units of the gap asked for.
+        work: Share of all work that it is expected to take, its halves included.
     """
 
     boxes: Boxes
@@ -174,6 +180,7 @@ class Part:
     needed: Mask
     outer: Array
     urgency: float = np.inf
+    work: float = 1.0
 
     def restricted(self, chosen: Sequence[int], needed: Mask) -> Part:
         """Some of its levels, with other bounds that are asked for."""
@@ -187,6 +194,24 @@ class Part:
             levels = [self.levels[k] for k in reached]
             halves.append(Part(boxes, levels, self.needed[reached], self.outer[reached]))
         return halves
+
+
+class _Tick:
+    """Progress of all parts from that of a batch of them."""
+
+    def __init__(
+        self, progress: Progress | None, waiting: Sequence[Part], batch: Sequence[Part]
+    ) -> None:
+        self.progress, self.work = progress, [part.work for part in batch]
+        self.left = sum(part.work for part in waiting)
+        self.done = [0.0] * len(batch)
+
+    def __call__(self, place: int, share: float) -> None:
+        self.done[place] = max(share, self.done[place])
+        if self.progress is not None:
+            pairs = zip(self.work, self.done, strict=True)
+            left = self.left + sum(work * (1 - OWN_WORK * done) for work, done in pairs)
+            self.progress(1 - left)
 
 
 Key = tuple[int, int, int]
@@ -235,12 +260,14 @@ class Queue:
         """
         with ThreadPoolExecutor(self.workers) as pool:
             while batch := self._next():
-                goals = [self._goal(part, self.workers // len(batch)) for part in batch]
+                tick = _Tick(progress, self.open, batch)
+                goals = [
+                    self._goal(part, self.workers // len(batch), partial(tick, place))
+                    for place, part in enumerate(batch)
+                ]
                 found = list(pool.map(self._bounds, batch, goals))
                 for part, levels in zip(batch, found, strict=True):
                     self._settle(part, levels)
-                if progress is not None:
-                    progress(self.facts["parts"] / (self.facts["parts"] + len(self.open)))
 
     def _next(self) -> list[Part]:
         """The most urgent parts, without the peaks whose gap is left as it is."""
@@ -270,11 +297,11 @@ class Queue:
         """Largest attained value of each output and side in a level, (m, 2); 0 at least."""
         return np.asarray(np.maximum(self.inner[level:].max((0, 1)), 0.0))
 
-    def _goal(self, part: Part, workers: int) -> Goal:
+    def _goal(self, part: Part, workers: int, tick: Progress) -> Goal:
         incumbent = np.stack([self._incumbent(level) for level in part.levels])
         known = part.needed, part.outer, incumbent
         last = self.refusals >= self.proof.parts - 1
-        return Goal(self.scale, self.peak, *known, max(workers, 1), last)
+        return Goal(self.scale, self.peak, *known, max(workers, 1), last, tick)
 
     def _bounds(self, part: Part, goal: Goal) -> Sequence[PartBounds | UnprovedError]:
         try:
@@ -292,18 +319,21 @@ class Queue:
                     part.needed[k], np.minimum(part.outer[k], own.outer), part.outer[k]
                 )
                 self._take(level, own)
-        votes = np.zeros(len(self.boxes.names))
+        votes, children = np.zeros(len(self.boxes.names)), list[Part]()
         wide = np.zeros_like(part.needed)
         for k, level in enumerate(part.levels):
             if isinstance(own := found[k], PartBounds):
-                wide[k] = self._split(part, k, level, own, votes)
+                wide[k] = self._split(part, k, level, own, votes, children)
             else:
                 wide[k] = part.needed[k]
                 self._refused(own, votes)
         levels = [k for k in range(len(part.levels)) if wide[k].any()]
         if levels:
             rest = part.restricted(levels, wide[levels])
-            self._put(rest.bisected(self._axis(rest.boxes, votes)))
+            children += rest.bisected(self._axis(rest.boxes, votes))
+        for child in children:
+            child.work = (1 - OWN_WORK) * part.work / len(children)
+        self._put(children)
 
     def _refused(self, refusal: UnprovedError, votes: Array) -> None:
         self.refusals, self.refusal = self.refusals + 1, refusal
@@ -327,8 +357,20 @@ class Queue:
                 value = known + value if name in ADDED else max(known, value)
             self.facts[name] = value
 
-    def _split(self, part: Part, k: int, level: int, own: PartBounds, votes: Array) -> Mask:
-        """Close what holds no higher peak; which bounds are left for the halves, (T, m, 2)."""
+    def _split(
+        self,
+        part: Part,
+        k: int,
+        level: int,
+        own: PartBounds,
+        votes: Array,
+        children: list[Part],
+    ) -> Mask:
+        """Close what holds no higher peak, and append narrowed parts to `children`.
+
+        Returns:
+            The bounds that are left for the halves, shape (T, m, 2).
+        """
         needed, outer = part.needed[k], part.outer[k]
         top, worthless = self._incumbent(level) + self.gap[:, None], False
         above = needed & (outer > top)
@@ -361,7 +403,7 @@ class Queue:
             rest.boxes, pruned = rest.boxes.within(*ends), rest.boxes.radius
             share = 1 - rest.boxes.radius / np.where(pruned > 0, pruned, 1.0)
             whole = [rest] if share[pruned > 0].sum() >= NARROWED else []
-            self._put(whole or rest.bisected(self._axis(rest.boxes, own.shares[output, side])))
+            children += whole or rest.bisected(self._axis(rest.boxes, own.shares[output, side]))
         return np.asarray(above)
 
     @staticmethod

@@ -10,6 +10,7 @@ from time import monotonic
 Progress = Callable[[float], None]
 _WAIT = 1.0  # seconds before a bar appears
 _EVERY = 0.2  # seconds between its moves
+_LINES = 10.0  # seconds between lines where there is no terminal
 _WIDTH = 30
 
 
@@ -25,13 +26,13 @@ def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
     """Function that the share done goes to.
 
     Args:
-        progress: The caller's function; None (or True) for a bar, if there is a terminal to show
-            it; False for nothing.
+        progress: The caller's function; None (or True) for a bar on a terminal, and a line now and
+            then where standard error is none; False for nothing.
     """
-    if callable(progress) or progress is False or not sys.stderr.isatty():
+    if callable(progress) or progress is False:
         yield progress if callable(progress) else None
         return
-    bar = _Bar()
+    bar = _Bar() if sys.stderr.isatty() else _Lines()
     try:
         yield bar
     finally:
@@ -55,6 +56,24 @@ class _Bar:
         """Remove the bar."""
         if self.moved:
             _on_terminal("")
+
+
+class _Lines:
+    """A line every ten seconds, with the end that is foreseen, for a file or a pipe."""
+
+    def __init__(self) -> None:
+        self.begun = self.written = monotonic()
+
+    def __call__(self, share: float) -> None:
+        now = monotonic()
+        if now - self.written >= _LINES:
+            self.written, spent = now, now - self.begun
+            left = f", some {spent / share - spent:.0f} s left" if share > 0 else ""
+            sys.stderr.write(f"{share:4.0%} after {spent:.0f} s{left}\n")
+            sys.stderr.flush()
+
+    def close(self) -> None:
+        """Nothing is left behind."""
 
 
 def _on_terminal(text: str) -> None:

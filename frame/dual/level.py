@@ -19,6 +19,7 @@ from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.progress_bar import Progress, share
 
 FINE = 0.07
 """Distance of the points of a mode's table along ω and g, as a share of its decay."""
@@ -34,6 +35,8 @@ AT_PEAKS = 6
 """Multiple of the slabs that nodes are worth whose bounds lie above the peak."""
 FLOORS = 1.0, 0.25
 """Multiples of the remainders' own part below which no effort is made: elsewhere, and there."""
+WORK_OF_PASSES = 0.0, 0.05, 0.75, 1.0
+"""Shares of the work at which the passes of a level begin and end, about."""
 BLOCK = 40
 """Nodes of a piece, about."""
 OF_GROUP = (160, 8)
@@ -171,7 +174,9 @@ class Level:
         made = tables(single, group, ground, time, sources, orders)
         return cls(structure, single, group, made, sources)
 
-    def bounds(self, enough: Array, slabs: int, steps: int, workers: int) -> tuple[Array, Array]:
+    def bounds(
+        self, enough: Array, slabs: int, steps: int, workers: int, tick: Progress | None = None
+    ) -> tuple[Array, Array]:
         """Upper bounds of (−output, output), shape (T, m, 2), and inputs that lead there.
 
         A first pass at all nodes shows the peaks; a second one halves ranges where gaps are wide; a
@@ -182,6 +187,7 @@ class Level:
             slabs: Most slabs of a bound away from the peaks.
             steps: Most evaluations of the dual function for each.
             workers: Threads.
+            tick: Takes the share done.
 
         Returns:
             The bounds, and unit coordinates, shape (T, m, 2, d).
@@ -196,7 +202,7 @@ class Level:
             (AT_PEAKS * slabs, steps, 1.0, FLOORS[1]),
         )
         with ThreadPoolExecutor(workers) as pool:
-            for slabs, steps, loose, floor in passes:
+            for number, (slabs, steps, loose, floor) in enumerate(passes):
                 # what a pass compares with is fixed before its first block: no result depends on
                 # which thread ends first
                 efforts = [problem.effort(slabs, steps, loose, floor) for problem in problems]
@@ -205,8 +211,10 @@ class Level:
                     for problem, effort in zip(problems, efforts, strict=True)
                     for nodes in _blocks(problem.left(loose))
                 ]
-                for job in jobs:
+                advance = share(tick, *WORK_OF_PASSES[number : number + 2])
+                for done, job in enumerate(jobs, start=1):
                     job.result()
+                    advance(done / len(jobs))
         out = np.stack([problem.out[0] for problem in problems], -1)
         at = np.stack([problem.at for problem in problems], 1)
         shape = (len(out), len(enough), 2)

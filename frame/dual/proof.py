@@ -164,7 +164,8 @@ class _Bounding:
         if self.needed.all():
             self._require_narrow()
             effort = self.proof.slabs, self.proof.steps, self.goal.workers
-            bounds, self.unit = self.level.bounds(self.proof.gap * self.goal.peak, *effort)
+            gap, tick = self.proof.gap * self.goal.peak, self.goal.tick
+            bounds, self.unit = self.level.bounds(gap, *effort, tick)
             self.outer = np.minimum(self.outer, bounds)
         else:
             self._at_peaks(self._bound)

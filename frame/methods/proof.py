@@ -133,6 +133,7 @@ class Proof:
             scale=goal.scale,
             workers=goal.workers,
             budget=self.boxes,
+            progress=goal.tick,
         )
         facts = {
             "model_error": float((error / goal.scale).max()),

@@ -146,3 +146,25 @@ def test_a_soil_spring_known_within_a_factor_of_four_is_proved_in_parts(method):
     )
     assert (again.upper == found.upper).all()
     assert (again.lower == found.lower).all()
+
+
+def test_progress_rises_in_parts_and_within_them():
+    told = []
+    prove(Lipschitz(), FLOW, told.append)
+    assert told == []  # a proof that tells nothing of its parts
+    proof = Lipschitz()
+    bounds = proof.bounds
+    proof.bounds = lambda flow, cuts, goal: (goal.tick(0.5), bounds(flow, cuts, goal))[1]
+    prove(proof, FLOW, told.append)
+    assert len(told) == len(proof.seen)
+    assert (np.diff(told) >= -1e-12).all()
+    assert 0 < told[0] < 0.5
+    assert 0.9 < told[-1] <= 1
+
+
+def test_the_dual_bound_tells_how_many_nodes_are_done():
+    told = []
+    given = {"duration": 3.0, "step": 0.02, "alpha": (0,), "progress": told.append}
+    envelope(spring(), {"s": Interval(0.9, 1.1)}, method=DualProof(workers=1), **given)
+    assert len(set(told)) > 5
+    assert (np.diff(told) >= 0).all()
