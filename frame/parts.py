@@ -43,6 +43,8 @@ GRACE = 8
 WIDE = 0.1
 """Gap of a peak, as a share of it, above which bounds are worth nothing elsewhere either. It is
 left where parts cannot halve all inputs that share in it."""
+NAMED = 3
+"""Inputs that are named with their shares in a gap."""
 OWN_WORK = 0.5
 """Share of a part's expected work that its own bounds take, and not its halves."""
 ADDED = ("boxes", "evaluations")
@@ -249,6 +251,7 @@ class Queue:
         self.gap = self.proof.peak_gap(self.scale, self.peak)
         whole = Part(self.boxes, [*range(shape[0])], np.ones(shape, bool), np.full(shape, np.inf))
         self.open = [whole]
+        self.gap_shares = dict[Key, Array]()
         self.spent, self.begun = dict[Key, int](), dict[Key, float]()
         self.abandoned = set[Key]()
 
@@ -379,6 +382,7 @@ class Queue:
         for output, side in _peaks(above):
             key = (level, output, side)
             peak = float(outer[:, output, side].max())
+            self.gap_shares[key] = own.shares[output, side]
             if self._is_hopeless(key, peak, own.shares[output, side]):
                 self.abandoned.add(key)
                 above[:, output, side] = False
@@ -427,6 +431,22 @@ class Queue:
         if count >= GRACE and gap > begun - MIN_PROGRESS * even:
             return True
         return count > most or (gap > WIDE * self.peak[output] and not can_be_halved(shares, most))
+
+    def notes(self, outer: Array, inner: Array) -> Iterator[str]:
+        """Lines on the widest gap of a peak that is left: the inputs to be narrowed first."""
+        gaps = (outer.max(1) - inner.max(1)) / self.peak[:, None]  # (A, m, 2)
+        key: Key = max(self.gap_shares, key=lambda key: gaps[key], default=(-1, 0, 0))
+        if key not in self.gap_shares or gaps[key] * self.peak[key[1]] <= self.gap[key[1]]:
+            return
+        shares = self.gap_shares[key]
+        first = [place for place in np.argsort(-shares)[:NAMED] if shares[place] > 0]
+        words = ", ".join(f"{self.boxes.names[place]} {shares[place]:.0%}" for place in first)
+        if first:
+            name = self.boxes.names[first[0]]
+            yield (
+                f"gap of {self.flow.outputs[key[1]]}, {gaps[key]:.2g} of its peak, by input:"
+                f" {words}; narrow {name} first"
+            )
 
     def _axis(self, boxes: Boxes, votes: Array) -> int:
         """Input with most votes, else the relatively widest."""
@@ -508,6 +528,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         evaluations=int(facts.pop("evaluations", inner.size)),
         seconds=time.perf_counter() - begun,
         facts=facts,
+        notes=(*queue.notes(outer, inner),),
     )
 
 

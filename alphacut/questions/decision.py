@@ -9,7 +9,7 @@ import numpy as np
 from alphacut.figures import style
 from alphacut.figures.style import GREY, INK, ORANGE, Look, colours
 from alphacut.frame import Auto, envelope
-from alphacut.frame.questions.peaks import ANY, Passing, passing, peaks
+from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
@@ -22,8 +22,11 @@ PRECISION = 5e-3
 """Error of the peaks that is aimed at, as a share of each."""
 
 
-def _document(name: str, one: Passing, limits: dict[str, float]) -> Document:
+def _document(name: str, one: Passing, limits: dict[str, float], peaks: Peaks) -> Document:
+    """Degrees and margins of a limit, and on each level the greatest peak, proved and reached."""
+    most = None if name == ANY else peaks.most(name)
     return {
+        "peak": {} if most is None else {"proved": most.upper, "reached": most.lower},
         "limit": limits.get(name, 1.0),
         "unit": "" if name == ANY else Output(name).unit,
         "possibility": one.possibility,
@@ -47,13 +50,27 @@ def _left(one: Document) -> str:
     return engineering(left, one["unit"]) if one["unit"] else f"{left:.1%}"
 
 
+def _peak(one: Document) -> Row:
+    """Greatest peak at the lowest level, proved and reached, and the gap as a share of it."""
+    if not one.get("peak"):
+        return ("", "", "")
+    proved, reached = one["peak"]["proved"][0], one["peak"]["reached"][0]
+    if proved is None or not np.isfinite(proved):
+        return ("not known", engineering(reached, one["unit"]), "")
+    gap = f"{(proved - reached) / proved:.1%}" if proved > 0 else ""
+    return (*(engineering(peak, one["unit"]) for peak in (proved, reached)), gap)
+
+
 class Decision(Question):
     """Possibility and necessity that limits are exceeded."""
 
     key = "decision"
     title = "Can or must limits be exceeded?"
     caption = "Fuzzy peak of each limited output over its limit"
-    head = ("limit", "verdict", "nature", "possibility", "necessity", "least margin")
+    head = (
+        *("limit", "verdict", "nature", "possibility", "necessity", "least margin"),
+        *("peak at most", "peak reached", "gap"),
+    )
 
     def answer(self, motion: Motion) -> Document:
         """Degrees and margins of every limit, from the envelope of the limited outputs."""
@@ -68,8 +85,9 @@ class Decision(Question):
             relative=True,
             progress=motion.progress or False,
         )
-        answers = passing(peaks(bounds), limits)
-        each = {name: _document(name, one, limits) for name, one in answers.items()}
+        of = peaks(bounds)
+        answers = passing(of, limits)
+        each = {name: _document(name, one, limits, of) for name, one in answers.items()}
         return {"alpha": motion.alpha, "step": motion.step, "limits": each}
 
     @staticmethod
@@ -85,6 +103,7 @@ class Decision(Question):
                 degree(one["possibility"]),
                 degree(one["necessity"]),
                 _left(one),
+                *_peak(one),
             )
             for name, one in document["limits"].items()
         ]
