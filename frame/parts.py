@@ -285,11 +285,12 @@ class Queue:
         for k, level in enumerate(part.levels):
             for own, output, side in self.abandoned:
                 if own == level and part.needed[k, :, output, side].any():
-                    place = (k, slice(None), output, side)
+                    place = (slice(None), output, side)
                     mask = np.zeros_like(part.needed[k])
-                    mask[:, output, side] = part.needed[place]
+                    # a part that was refused before has no bounds to leave it with
+                    mask[place] = part.needed[k][place] & np.isfinite(part.outer[k][place])
                     self._close(level, mask, part.outer[k])
-                    part.needed[place] = False
+                    part.needed[k] &= ~mask
 
     def _close(self, level: int, mask: Mask, outer: Array) -> None:
         """Take bounds over a part into the hull."""
@@ -424,7 +425,7 @@ class Queue:
             if own == level
         ]
         top, most = self._incumbent(level)[output, side], self.proof.parts
-        gap = max(peak, *others) - top if others else peak - top
+        gap = max([peak, *(bound for bound in others if np.isfinite(bound))]) - top
         count = self.spent[key] = self.spent.get(key, 0) + 1
         begun = self.begun.setdefault(key, gap)
         even = (begun - self.gap[output]) * count / most

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, envelope
+from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -173,3 +173,21 @@ def test_the_dual_bound_tells_how_many_nodes_are_done():
     envelope(spring(), {"s": Interval(0.9, 1.1)}, method=DualProof(workers=1), **given)
     assert len(set(told)) > 5
     assert (np.diff(told) >= 0).all()
+
+
+def test_parts_left_after_a_refusal_have_bounds():
+    """A gap that is left as it is leaves no half of a refused part without bounds."""
+    frame = StoreyFrame(
+        masses=[1e3] * 4,
+        stiffness=[4e5] * 4,
+        damping_ratio=0.02,
+        v0=(0.0, 0.0, 0.0, 1.0),
+        outputs=("q4",),
+    )
+    inputs = {f"k{z}": Triangular(3.2e5, 4e5, 4.8e5) for z in (1, 2, 3, 4)}
+    inputs |= {f"m{z}": Triangular(800.0, 1e3, 1200.0) for z in (1, 2, 3)}
+    motion = {"duration": 1.6, "step": 0.16, "alpha": (0.0,), "progress": False}
+    found = envelope(frame, inputs, method=DualProof(), **motion)
+    assert found.facts["parts"] > 1
+    assert found.facts["motions_tested"] >= 24
+    assert np.isfinite(found.upper).all()
