@@ -6,6 +6,8 @@ modulus G12 is not and lies below the isotropic lower bound, so it is not tested
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
@@ -28,6 +30,36 @@ def reuss(fraction: Array, matrix: Array, inclusion: Array) -> Array:
     """Stiffness at uniform stress, as `voigt`."""
     soft = (np.asarray(np.linalg.inv(one), float) for one in (matrix, inclusion))
     return np.asarray(np.linalg.inv(voigt(fraction, *soft)), float)
+
+
+def voigt_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
+    """Stiffness at uniform strain of any number of phases, shape (…, k, k).
+
+    Args:
+        fractions: Of area or volume, shape (phases, …).
+        stiffness: Of the phases, (k, k) each.
+    """
+    return np.asarray(np.tensordot(fractions, np.stack(stiffness), axes=([0], [0])))
+
+
+def reuss_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
+    """Stiffness at uniform stress, as `voigt_of_phases`."""
+    compliance = [np.asarray(np.linalg.inv(one), float) for one in stiffness]
+    return np.asarray(np.linalg.inv(voigt_of_phases(fractions, compliance)), float)
+
+
+def bulk_bounds_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
+    """Bounds of the in-plane bulk modulus of any number of isotropic phases, shape (2, …).
+
+    Hashin and Shtrikman's with the extreme shear moduli of all phases (Walpole 1969).
+    """
+    bulk = np.array([float(bulk_modulus(one)) for one in stiffness])
+    shear = [float(one[2, 2]) for one in stiffness]
+    ends = [
+        1 / np.tensordot(1 / (bulk + around), fractions, axes=1) - around
+        for around in (min(shear), max(shear))
+    ]
+    return np.array(ends)
 
 
 def bulk_modulus(stiffness: Array) -> Array:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.bounds import hashin_shtrikman, reuss, voigt
+from alphacut.rve.bounds import bulk_bounds_of_phases, reuss_of_phases, voigt_of_phases
 from alphacut.rve.cell import AnyPhase, Phase
 from alphacut.rve.result import Homogenised
 
@@ -71,7 +71,7 @@ def certified(result: Homogenised) -> Homogenised:
 
 
 def stress_checks(
-    stress: Array, loads: Array, fraction: Array, weights: Array, phases: tuple[AnyPhase, AnyPhase]
+    stress: Array, loads: Array, fractions: Array, weights: Array, phases: Sequence[AnyPhase]
 ) -> dict[str, float]:
     """Symmetry and bounds of the mean stiffness, as the loads see it.
 
@@ -79,18 +79,22 @@ def stress_checks(
         stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in
             Pa.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3), ε11 = ε22 in their span.
-        fraction: Area fraction of the particle at the nodes, shape (n,).
+        fractions: Area fractions of the phases at the nodes, shape (phases, n), or of the second of
+            two, shape (n,).
         weights: Weights of the nodes, shape (n,).
-        phases: Matrix and inclusion.
+        phases: Materials, in the order of their fractions.
     """
-    pair = phases[0].stiffness, phases[1].stiffness
+    if fractions.ndim == 1:
+        fractions = np.stack([1 - fractions, fractions])
+    stiffness = [phase.stiffness for phase in phases]
     energy = loads @ mean(weights, stress)
     low, high = (
-        loads @ mean(weights, bound(fraction, *pair)) @ loads.T for bound in (reuss, voigt)
+        loads @ mean(weights, bound(fractions, stiffness)) @ loads.T
+        for bound in (reuss_of_phases, voigt_of_phases)
     )
     checks = order_checks(energy, low, high)
     if all(isinstance(phase, Phase) for phase in phases):
-        least, greatest = hashin_shtrikman(fraction, *phases)[0] @ weights
+        least, greatest = bulk_bounds_of_phases(fractions, stiffness) @ weights
         even = np.linalg.lstsq(loads.T, np.array([1.0, 1.0, 0.0]), rcond=None)[0]
         bulk = even @ energy @ even / 4
         checks["hashin_shtrikman"] = float(max(0.0, least - bulk, bulk - greatest) / bulk)

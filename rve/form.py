@@ -18,6 +18,12 @@ WHOLE = slice(None)
 """All parts of a form."""
 
 
+def measure_of(mesh: Any, cells: Array, metadata: dict[str, Any]) -> Any:
+    """Measure of some cells of this rank; forms over any of them are compiled once."""
+    part = [(0, np.asarray(cells, np.int32))]
+    return ufl.Measure("dx", mesh, metadata=metadata, subdomain_data=part)(0)
+
+
 def strain(u: Any) -> Any:
     """In-plane strain (ε11, ε22, 2 ε12) of displacements; θ is not differentiated (eq. 5)."""
     gradient = ufl.grad(u)
@@ -25,37 +31,48 @@ def strain(u: Any) -> Any:
 
 
 class CellForm:
-    """Stiffness and loads of a fluctuation in two phases; what stands in them is set anew.
+    """Stiffness and loads of a fluctuation in n phases; what stands in them is set anew.
 
     Args:
         space: Displacements of two components.
         points: Values at quadrature points, or in cells.
-        parts: Measures of the parts of the mesh, which can be assembled one by one.
+        parts: Measures of the phases in their order, which can be assembled one by one; with
+            `mixed` one measure of all.
+        mixed: Whether `share` mixes two phases at the points, where a mesh ignores the interface.
 
     Attributes:
         density: f_Θ of eq. 1 at the points; 1 where there is no θ.
-        share: Part of the particle at the points, 0 or 1 (eq. 13).
+        share: Part of the particle at the points, 0 or 1 (eq. 13), if mixed.
     """
 
     def __init__(
-        self, space: fem.FunctionSpace, points: fem.FunctionSpace, parts: Sequence[Any]
+        self,
+        space: fem.FunctionSpace,
+        points: fem.FunctionSpace,
+        parts: Sequence[Any],
+        *,
+        mixed: bool = False,
     ) -> None:
-        mesh = space.mesh
+        mesh, count = space.mesh, 2 if mixed else len(parts)
         self.density, self.share = fem.Function(points), fem.Function(points)
-        self._phases = [fem.Constant(mesh, np.zeros((3, 3))) for _ in range(2)]
+        self._phases = [fem.Constant(mesh, np.zeros((3, 3))) for _ in range(count)]
         self._uniform = fem.Constant(mesh, np.zeros(3))
         u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-        density, (matrix, inclusion) = self.density, self._phases
-        stiffness = matrix + self.share * (inclusion - matrix)  # eq. 13
-        stress = stiffness * strain(u)  # eq. 6
-        # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
-        left = density * ufl.dot(stress, strain(v))
-        right = -density * ufl.dot(stiffness * self._uniform, strain(v))
-        self._stiffness = [compiled(left * dx) for dx in parts]
-        self._load = [compiled(right * dx) for dx in parts]
+        density, of_parts = self.density, list[Any](self._phases)
+        if mixed:
+            matrix, inclusion = self._phases
+            of_parts = [matrix + self.share * (inclusion - matrix)]  # eq. 13
+        self._stiffness, self._load = [], []
+        for stiffness, dx in zip(of_parts, parts, strict=True):
+            stress = stiffness * strain(u)  # eq. 6
+            # eq. 7: Galerkin's projection (eq. 4) of −div σ (eq. 2), weighted by f_Θ (eq. 1)
+            left = density * ufl.dot(stress, strain(v))
+            right = -density * ufl.dot(stiffness * self._uniform, strain(v))
+            self._stiffness.append(compiled(left * dx))
+            self._load.append(compiled(right * dx))
 
-    def set_phases(self, stiffness: tuple[Array, Array]) -> None:
-        """Take the Voigt matrices of matrix and particle, in Pa."""
+    def set_phases(self, stiffness: Sequence[Array]) -> None:
+        """Take the Voigt matrices of the phases in their order, in Pa."""
         for constant, value in zip(self._phases, stiffness, strict=True):
             constant.value[:] = value
 

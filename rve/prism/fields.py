@@ -25,10 +25,11 @@ class CellFields:
     Args:
         points: (x1, x2, θ), shape (n, 3).
         cells: Nodes of the wedges in Basix's order, shape (m, 15).
-        phase: 0 the matrix, 1 the particle, shape (m,).
+        phase: Place of the phase of each wedge in `names`, shape (m,).
         displacement: In halves of the cell's side, shape (n, 2, loads).
         stress: (σ11, σ22, σ12), means over the wedges of one phase that meet in a node, shape
             (n, 3, loads), in Pa.
+        names: Names of the phases.
     """
 
     points: Array
@@ -36,6 +37,7 @@ class CellFields:
     phase: Rows
     displacement: Array
     stress: Array
+    names: tuple[str, ...]
 
 
 def cell_fields(
@@ -64,13 +66,12 @@ def cell_fields(
         fluctuation.x.array[:] = u.ravel()
         strains = at_nodes.eval(form.mesh, own).reshape(len(own), NODES, 3)
         wedges[form.wedge, ..., k] = strains + uniform
-    inside: Rows = grid.inside.astype(np.intp)
-    stress = np.stack(cell.stiffness)[inside][:, None] @ wedges
-    numbered = grid.cells + inside[:, None] * grid.nodes
+    stress = np.stack(cell.stiffness)[grid.phase][:, None] @ wedges
+    numbered = grid.cells + grid.phase[:, None] * grid.nodes
     kept, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)
     mean = np.zeros((len(kept), 3, len(vectors)))
     np.add.at(mean, cells, stress)
     mean /= np.bincount(cells.ravel())[:, None, None]
     nodes = kept % grid.nodes
-    return CellFields(positions[nodes], cells, inside, total[nodes], mean)
+    return CellFields(positions[nodes], cells, grid.phase, total[nodes], mean, grid.names)

@@ -32,7 +32,8 @@ class PrismForm:
         node: Node of the grid that each of this rank's nodes is, shape (n,).
         wedge: Wedge of the grid that each of its cells is, shape (m,).
         layer: Its layer.
-        elastic: Stiffness and loads.
+        dx: Measure of each phase by its name, with the rule of the wedges, for forms of one's own.
+        elastic: Stiffness and loads; `elastic.density` is f_Θ at the points.
         areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
     """
 
@@ -59,10 +60,16 @@ class PrismForm:
             "quadrature_points": points,
             "quadrature_weights": weights,
         }
-        inside = self.grid.inside[self.wedge]
-        phases = [(k, np.flatnonzero(inside == k).astype(np.int32)) for k in (0, 1)]
-        dx = ufl.Measure("dx", self.mesh, metadata=rule, subdomain_data=phases)
-        self.elastic = CellForm(self.space, fem.functionspace(self.mesh, at_each), [dx(0), dx(1)])
+        phase = self.grid.phase[self.wedge]
+        cells = [
+            (k, np.flatnonzero(phase == k).astype(np.int32)) for k in range(len(self.grid.names))
+        ]
+        dx = ufl.Measure("dx", self.mesh, metadata=rule, subdomain_data=cells)
+        self.dx = {name: dx(k) for k, name in enumerate(self.grid.names)}
+        values = fem.functionspace(self.mesh, at_each)
+        self.elastic = CellForm(
+            self.space, values, list(self.dx.values()), mixed=not self.grid.conforming
+        )
         self._u = fem.Function(self.space)
         self._strain = at_points(strain(self._u), points)
         self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
@@ -87,7 +94,8 @@ class PrismForm:
         self.areas = self._areas()
         self._require_sound()
         self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
-        self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
+        if not self.grid.conforming:
+            self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
 
     def _require_sound(self) -> None:
         """Refuse inverted elements, and about outlines that are not round nearly inverted ones.
@@ -106,8 +114,6 @@ class PrismForm:
 
     def _inside(self, positions: Array, radius: RadiusMap) -> Array:
         """Share of the particle at the quadrature points, shape (cells, points)."""
-        if self.grid.conforming:
-            return np.repeat(self.grid.inside[self.wedge], len(slab_rule()[1])).astype(float)
         shapes: Array = wedge(1).tabulate(0, slab_rule()[0])[0].reshape(-1, 15)
         x = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
         return np.asarray(self.grid.sign(x, radius))
@@ -131,9 +137,13 @@ class PrismForm:
         values = np.asarray(expression.eval(self.mesh, cells))
         return values.reshape(len(cells), SLICES, -1, size)
 
-    def particle(self) -> Array:
-        """Share of the particle at the points of the slices, shape (cells, 3, points)."""
-        return np.asarray(self.elastic.share.x.array.reshape(len(self.wedge), SLICES, -1))
+    def phase_areas(self) -> Array:
+        """`areas` of the phases, the others' being 0, shape (phases, cells, 3, points)."""
+        if self.grid.conforming:
+            phase = self.grid.phase[self.wedge][:, None, None]
+            return np.array([self.areas * (phase == k) for k in range(len(self.grid.names))])
+        share = self.elastic.share.x.array.reshape(len(self.wedge), SLICES, -1)
+        return np.stack([self.areas * (1 - share), self.areas * share])
 
     def slices(self) -> tuple[Array, Array]:
         """θ of the slices at Gauss points of the layers, and their weights, shape (3 layers,)."""

@@ -203,7 +203,7 @@ class PrismModel:
         checks = {
             "residual": residual,
             "hill_mandel": float(abs(work.T - energy).max() / abs(energy).max()),
-            **stress_checks(stress, loads, strains.fraction, strains.weights, cell.phases),
+            **stress_checks(stress, loads, strains.fractions, strains.weights, cell.phases),
         }
         return replace(result, checks=require(checks, discretisation=ROUND_OFF + allowed))
 

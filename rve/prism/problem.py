@@ -27,30 +27,31 @@ class SliceStrains:
     Args:
         theta: θ of the slices, shape (n,).
         weights: Weights of the slices, sum 1, shape (n,).
-        strain: ⟨(ε11, ε22, 2 ε12)⟩ over the matrix's and the particle's part of the cell, in the
-            whole cell's area, shape (2, n, 3, fields).
-        fraction: Area fraction of the particle, shape (n,).
-        products: Mean of ε_a ⊗ ε_b over either phase and θ, shape (2, 3, fields, 3, fields).
+        strain: ⟨(ε11, ε22, 2 ε12)⟩ over the parts of the cell that the phases take, in the area of
+            the cell, shape (phases, n, 3, fields).
+        fractions: Area fractions of the phases, shape (phases, n).
+        products: Mean of ε_a ⊗ ε_b over the phases and θ, shape (phases, 3, fields, 3, fields).
     """
 
     theta: Array
     weights: Array
     strain: Array
-    fraction: Array
+    fractions: Array
     products: Array
 
     def combined(self, coefficients: Array) -> SliceStrains:
         """Those of sums of the fields, coefficients (fields, loads)."""
         products = np.einsum("piajb,ak,bl->pikjl", self.products, coefficients, coefficients)
         return SliceStrains(
-            self.theta, self.weights, self.strain @ coefficients, self.fraction, products
+            self.theta, self.weights, self.strain @ coefficients, self.fractions, products
         )
 
-    def stress(self, stiffness: tuple[Array, Array]) -> Array:
+    def stress(self, stiffness: Sequence[Array]) -> Array:
         """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
-        return np.asarray(stiffness[0] @ self.strain[0] + stiffness[1] @ self.strain[1])
+        stresses = [one @ strain for one, strain in zip(stiffness, self.strain, strict=True)]
+        return np.asarray(sum(stresses))
 
-    def energy(self, stiffness: tuple[Array, Array]) -> Array:
+    def energy(self, stiffness: Sequence[Array]) -> Array:
         """Mean of σ_a : ε_b over cell and θ, shape (fields, fields), in Pa."""
         return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), self.products))
 
@@ -88,11 +89,11 @@ class PrismProblem:
         self.map = radius_map
         self.form.place(radius_map)
 
-    def assemble(self, stiffness: tuple[Array, Array], parts: slice = WHOLE) -> PETSc.Mat:
+    def assemble(self, stiffness: Sequence[Array], parts: slice = WHOLE) -> PETSc.Mat:
         """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa.
 
         Args:
-            stiffness: Of matrix and particle, (3, 3) each.
+            stiffness: Of the phases in the order of the grid, (3, 3) each.
             parts: Of the mesh: all, or one phase alone.
         """
         self.form.elastic.set_phases(stiffness)
@@ -124,23 +125,22 @@ class PrismProblem:
         strain = np.empty((len(form.wedge), SLICES, POINTS, 3, len(fields)))
         for k, (uniform, u) in enumerate(fields):
             strain[..., k] = uniform if u is None else form.strains(u) + uniform
-        area, share = form.areas, form.particle()
-        parts = np.stack([area * (1 - share), area * share]) / AREA  # (2, cells, 3, points)
+        parts = form.phase_areas() / AREA  # (phases, cells, 3, points)
         sums = np.einsum("pmsq,msqif->pmsif", parts, strain)
         means = np.stack([form.by_layer(one) for one in sums])
-        fraction = form.by_layer(parts[1].sum(axis=-1))
+        fractions = np.array([form.by_layer(one.sum(axis=-1)) for one in parts])
         theta, weights = form.slices()
         weight = form.of_slices(weights)[None, :, :, None] * parts
         flat = strain.reshape(-1, 3 * len(fields))
         products = np.array([flat.T @ (one.reshape(-1, 1) * flat) for one in weight])
-        means, fraction, products = (
-            self.comm.allreduce(one) for one in (means, fraction, products)
+        means, fractions, products = (
+            self.comm.allreduce(one) for one in (means, fractions, products)
         )
-        count = len(fields)
+        phases, count = len(parts), len(fields)
         return SliceStrains(
             theta=theta,
             weights=weights,
-            strain=means.reshape(2, -1, 3, count),
-            fraction=fraction.ravel(),
-            products=products.reshape(2, 3, count, 3, count),
+            strain=means.reshape(phases, -1, 3, count),
+            fractions=fractions.reshape(phases, -1),
+            products=products.reshape(phases, 3, count, 3, count),
         )

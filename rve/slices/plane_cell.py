@@ -6,8 +6,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import AREA
-from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of, ufl
-from alphacut.rve.form import CellForm
+from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
+from alphacut.rve.form import CellForm, measure_of
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
 from alphacut.rve.mesh.jacobian import quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
@@ -36,12 +36,11 @@ class PlaneCell:
         plane = mesh_of(MPI.COMM_SELF, cells, len(nodes), element)
         plane.geometry.x[:, :2] = nodes[plane.geometry.input_global_indices]
         space = fem.functionspace(plane, element)
-        dx = ufl.Measure(
-            "dx", domain=plane, metadata={"quadrature_degree": quadrature_degree(order)}
-        )
-        self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), [dx])
+        rule = {"quadrature_degree": quadrature_degree(order)}
+        inside = mesh.inside[plane.topology.original_cell_index]
+        parts = [measure_of(plane, np.flatnonzero(inside == flag), rule) for flag in (False, True)]
+        self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), parts)
         self._form.density.x.array[:] = 1.0
-        self._form.share.x.array[:] = mesh.inside[plane.topology.original_cell_index]
         self._places: Array = np.empty((len(nodes), 2))
         self._places[space.dofmap.list] = plane.geometry.x[plane.geometry.dofmap, :2]
         pairs = unknowns(self._places)
