@@ -2,25 +2,27 @@
 
 1. The polynomials of the modes' eigenvalues and shares that `Proof` uses; with more inputs than six
    they are quadratics, whose error does not matter: they only lead.
-2. First pass: a sample of the box starts Newton's method for every bound (node, output, side) on
-   the polynomials.
+2. Start: a sample of the box starts Newton's method for every bound (node, output, side) on the
+   polynomials.
 3. Exact motions: Newton's method goes on from there with values and gradients of eigen-analyses at
    the points themselves, so that every bound is attained. The curvature is that of the polynomials,
    corrected by what the gradients show. What is best at one node is tried at the nodes around.
-4. Independent passes: for bounds drawn anew, fresh points, none of them from a pass before, start
-   Newton's method on exact motions. What they find beyond the bounds is taken over, and tried at
-   the nodes around. Passes go on until two after each other gain too little.
+4. Passes: for bounds drawn anew, fresh points start Newton's method. What they find beyond the
+   bounds is taken over, and tried at the nodes around.
 5. Levels are treated from the narrowest box to the widest; what one attains the next attains too.
 
-The error of a bound is what Newton's method still promises, and `UNSEEN` times the gain of the last
-two passes: of its output as a whole, and of the bounds near by where those gained more. Where the
-polynomials miss more than `ROUGH` of a peak they lead nowhere, and bounds are only called attained.
+Two searches do all of this and share nothing: neither the seed nor the points that they start from
+nor the degree of their polynomials. Passes go on until both agree. The better bound is stated, and
+its error is what Newton's method still promises, and `UNSEEN` times the largest difference of the
+two searches on its output and level. Where the polynomials miss more than `ROUGH` of a peak they
+lead nowhere, and bounds are only called attained.
 """
 
 from __future__ import annotations
 
+import copy
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -31,7 +33,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.exact_response import ExactResponse
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.modal.newton import first_optima, refine
+from alphacut.frame.modal.newton import SAMPLES, first_optima, refine
 from alphacut.frame.modal.optima import Optima, Response, best_of, fresh_points, trajectories
 from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
@@ -42,10 +44,10 @@ from alphacut.fuzzy.result import Nature
 
 SMALL = 0.05
 """Share of the error allowed that Newton's method may leave, and that the polynomials may have."""
-QUIET = 0.2
-"""Share of the error allowed that the last two passes may gain."""
+AGREEMENT = 0.2
+"""Share of the error allowed by which the two searches may differ."""
 UNSEEN = 4.0
-"""Factor on what they gained: 0.8 of the error allowed; `SMALL` adds 0.15 at most."""
+"""Factor on their difference: 0.8 of the error allowed; `SMALL` adds 0.15 at most."""
 FRESH = 1024
 """Fresh points of a pass."""
 VALUES = 16e6
@@ -73,7 +75,7 @@ class Search:
         tolerance: Error wanted, as a share of each output's peak, or in the unit of the first
             displacement (the first output without one) where the envelope is not relative; 1e-3
             unless given.
-        passes: Most independent passes; 8 unless given, 5 of more than `MANY` inputs.
+        passes: Most passes of either search; 8 unless given, 5 of more than `MANY` inputs.
         seed: Of all that is drawn.
 
     Raises:
@@ -104,12 +106,23 @@ class Search:
         exact = ExactResponse.of(model, flow.scale, bent=not rough)
         # what leads: polynomials where they are as good as is asked for, or the exact motions
         enough = bool((model.error / flow.scale).max() <= SMALL * tolerance)
-        way = exact.model if enough else exact
+        second = fit_modes(
+            flow.flow,
+            flow.boxes,
+            tolerance=SMALL * tolerance,
+            scale=flow.scale,
+            degree=model.degree - 1,
+        )
+        searches = (
+            _IndependentSearch(exact.model if enough else exact, self.seed, 0),
+            _IndependentSearch(_leading(second, flow, enough=enough), self.seed, 1),
+        )
         levels, solved = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
             tick = share(progress, done / levels, (done + 1) / levels)
-            within = solved[-1][0] if solved else None
-            solved.append(self._level(way, *flow.boxes.unit(level), tolerance, within, tick))
+            narrower = solved[-1][0] if solved else None
+            ends = flow.boxes.unit(level)
+            solved.append(self._level(searches, *ends, tolerance, narrower, tick))
         shape, scale = (levels, len(flow.time), len(flow.outputs), 2), flow.scale[:, None]
         values = [x.side * exact.value_at(x.point, x.node, x.output) for x, _ in solved[::-1]]
         bounds = np.maximum.accumulate(np.stack(values)[::-1])[::-1].reshape(shape) * scale
@@ -135,66 +148,140 @@ class Search:
 
     def _level(
         self,
-        way: Response,
+        searches: tuple[_IndependentSearch, _IndependentSearch],
         lower: Array,
         upper: Array,
         tolerance: float,
-        within: Optima | None,
+        narrower: Optima | None,
         tick: Progress,
     ) -> tuple[Optima, Array]:
         """Optima in a box, and what they may miss, shape (N,)."""
-        optima = first_optima(_polynomials(way), lower, upper, SMALL * tolerance)
-        every = np.arange(len(optima.value))
-        grid = every.reshape(len(way.time), -1)  # node by node
         box = lower, upper, SMALL * tolerance
-        if isinstance(way, ExactResponse):
-            optima.value[:] = -np.inf
-            optima.offer(way, optima.point.copy(), every)
-            refine(way, optima, every, *box)
-        if within is not None:
-            optima.offer(way, within.point, every)
-        tick(0.2)
+        for search in searches:
+            search.start(*box)
+        tick(0.4)
+        first, second = searches
         if not (upper > lower).any():
-            return optima, np.zeros(len(every))
-        _follow(way, optima, grid, box, np.ones(len(every), bool))
-        tick(0.5)
-        gains = list[Array]()
+            return first.optima, np.zeros(len(first.optima.value))
         most = self.passes or (8 if len(lower) <= MANY else 5)
         for count in range(most):
-            before = optima.value.copy()
-            rng = np.random.default_rng((self.seed, count, len(every)))
-            self._pass(way, optima, grid, box, DRAWN * 2**count, rng)
-            gains.append((optima.value - before).reshape(len(grid), -1))
-            tick(0.5 + 0.5 * (1 - 0.6 ** (count + 1)))
-            if count and max(gain.max() for gain in gains[-2:]) <= QUIET * tolerance:
+            for search in searches:
+                search.improve(count)
+            best, difference = _compared(first.response, first.optima, second.optima, box)
+            if narrower is not None:
+                best.offer(first.response, narrower.point, np.arange(len(best.value)))
+            tick(0.4 + 0.6 * (1 - 0.6 ** (count + 1)))
+            if difference.max() <= AGREEMENT * tolerance:
                 break
-        return optima, optima.left + _missed(gains, len(way.outputs), QUIET * tolerance).ravel()
+        outputs = len(first.response.outputs)
+        return best, best.left + _missed(difference, outputs, AGREEMENT * tolerance)
 
-    def _pass(
-        self,
-        way: Response,
-        optima: Optima,
-        grid: Rows,
-        box: tuple[Array, Array, float],
-        count: int,
-        rng: np.random.Generator,
-    ) -> None:
-        """Solve `count` bounds anew from fresh points, and follow what is better."""
-        m = len(way.outputs)
-        size = int(np.clip(VALUES / (len(grid) * m), 64, FRESH))
-        pool = fresh_points(rng, *box[:2], size)
-        nodes = np.sort(rng.permutation(len(grid))[: max(1, count // (2 * m))])
-        values = trajectories(_polynomials(way), pool, nodes)
+
+class _IndependentSearch:
+    """One of the two searches, with its optima on the level that is searched.
+
+    Args:
+        response: What Newton's method works on.
+        seed: Seed of the method.
+        number: 0 or 1, which of the searches it is.
+    """
+
+    optima: Optima
+
+    def __init__(self, response: Response, seed: int, number: int) -> None:
+        self.response, self.seed, self.number = response, seed, number
+        self.narrower: Optima | None = None
+
+    def start(self, lower: Array, upper: Array, small: float) -> None:
+        """Find optima in a box from a sample of it, and from those of the box before."""
+        self.box = lower, upper, small
+        unit = None
+        if self.number:
+            rng = np.random.default_rng((self.seed, self.number))
+            ends = np.ones(len(lower))
+            unit = fresh_points(rng, -ends, ends, SAMPLES)
+        self.optima = first_optima(_polynomials(self.response), *self.box, unit)
+        every = np.arange(len(self.optima.value))
+        self.grid = every.reshape(len(self.response.time), -1)  # node by node
+        if isinstance(self.response, ExactResponse):
+            self.optima.value[:] = -np.inf
+            self.optima.offer(self.response, self.optima.point.copy(), every)
+            refine(self.response, self.optima, every, *self.box)
+        if self.narrower is not None:
+            self.optima.offer(self.response, self.narrower.point, every)
+        self.narrower = self.optima
+        if (upper > lower).any():
+            self._follow(np.ones(len(every), bool))
+
+    def improve(self, count: int) -> None:
+        """Solve some bounds anew from fresh points, and follow what is better.
+
+        Args:
+            count: Passes so far; each draws twice as many bounds.
+        """
+        optima, outputs = self.optima, len(self.response.outputs)
+        rng = np.random.default_rng((self.seed, self.number, count, len(optima.value)))
+        size = int(np.clip(VALUES / (len(self.grid) * outputs), 64, FRESH))
+        pool = fresh_points(rng, *self.box[:2], size)
+        drawn = max(1, DRAWN * 2**count // (2 * outputs))
+        nodes = np.sort(rng.permutation(len(self.grid))[:drawn])
+        values = trajectories(_polynomials(self.response), pool, nodes)
         rivals = [best_of(pool, values, nodes)]
         rivals += [best_of(pool, values, nodes, few, rng) for few in FEW]
         improved = np.zeros(len(optima.value), bool)
         for rival in rivals:
-            own = np.arange(len(rival.value))
-            rival.value[:] = -np.inf
-            rival.offer(way, rival.point.copy(), own)
-            refine(way, rival, own, *box)
-            improved[optima.offer(way, rival.point, grid[nodes].ravel())] = True
-        _follow(way, optima, grid, box, improved)
+            _evaluate(self.response, rival, self.box)
+            better = optima.offer(self.response, rival.point, self.grid[nodes].ravel())
+            improved[better] = True
+        self._follow(improved)
+
+    def _follow(self, fresh: Mask) -> None:
+        """Try at every node what is fresh near by, and refine it, until nothing improves."""
+        for _ in range(ROUNDS):
+            better = _exchanged(self.response, self.optima, self.grid, fresh)
+            if not len(better):
+                return
+            refine(self.response, self.optima, better, *self.box)
+            fresh = np.zeros(len(self.optima.value), bool)
+            fresh[better] = True
+
+
+def _evaluate(response: Response, optima: Optima, box: tuple[Array, Array, float]) -> None:
+    """Take the values of a response at the points of optima, and refine them on it."""
+    rows = np.arange(len(optima.value))
+    optima.value[:] = -np.inf
+    optima.offer(response, optima.point.copy(), rows)
+    refine(response, optima, rows, *box)
+
+
+def _compared(
+    response: Response, first: Optima, second: Optima, box: tuple[Array, Array, float]
+) -> tuple[Optima, Array]:
+    """The better of two sets of optima, and the differences of their values, shape (N,).
+
+    Args:
+        response: Whose values count; the first optima are its own.
+        first: Optima of one search.
+        second: Optima of the other one.
+        box: Lower and upper ends, and what Newton's method may leave.
+    """
+    other = copy.deepcopy(second)
+    _evaluate(response, other, box)
+    better = other.value > first.value
+    best = replace(
+        first,
+        point=np.where(better[:, None], other.point, first.point),
+        value=np.maximum(first.value, other.value),
+        left=np.where(better, other.left, first.left),
+    )
+    return best, np.abs(other.value - first.value)
+
+
+def _leading(model: ModalModel, flow: UnitFlow, *, enough: bool) -> Response:
+    """What the second search works on: its polynomials, or exact motions that they lead."""
+    if enough:
+        return model.in_units(flow.scale)
+    return ExactResponse.of(model, flow.scale, bent=model.degree > 1 and not _rough(model, flow))
 
 
 def _rough(model: ModalModel, flow: UnitFlow) -> bool:
@@ -204,19 +291,6 @@ def _rough(model: ModalModel, flow: UnitFlow) -> bool:
 
 def _polynomials(way: Response) -> ModalModel:
     return way.model if isinstance(way, ExactResponse) else way
-
-
-def _follow(
-    way: Response, optima: Optima, grid: Rows, box: tuple[Array, Array, float], fresh: Mask
-) -> None:
-    """Try at every node what is fresh near by, and refine it, until nothing improves."""
-    for _ in range(ROUNDS):
-        better = _exchanged(way, optima, grid, fresh)
-        if not len(better):
-            return
-        refine(way, optima, better, *box)
-        fresh = np.zeros(len(optima.value), bool)
-        fresh[better] = True
 
 
 def _exchanged(way: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
@@ -234,11 +308,13 @@ def _exchanged(way: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
     return np.asarray(np.unique(np.concatenate(better)))
 
 
-def _missed(gains: list[Array], outputs: int, quiet: float) -> Array:
-    """Bounds of what may be missed, from the gains (T, 2 m) of the last passes."""
-    last = np.max(gains[-2:], axis=0)
-    by_output = last.reshape(len(last), outputs, 2).max((0, 2))
-    return np.asarray(UNSEEN * np.maximum(quiet, np.repeat(by_output, 2)) + 0 * last)
+def _missed(difference: Array, outputs: int, agreement: float) -> Array:
+    """Bounds of what may be missed, shape (N,), from differences of two searches, same shape."""
+    by_output = difference.reshape(-1, outputs, 2).max((0, 2))
+    largest = np.broadcast_to(
+        np.repeat(by_output, 2), (difference.size // (2 * outputs), 2 * outputs)
+    )
+    return np.asarray(UNSEEN * np.maximum(agreement, largest)).ravel()
 
 
 def _rounding(model: ModalModel, peak: Array) -> Array:

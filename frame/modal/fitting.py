@@ -45,6 +45,7 @@ def fit_modes(
     budget: int = 280,
     scale: Array | float = 1.0,
     energy: bool = False,
+    degree: int | None = None,
 ) -> ModalModel:
     """Fit polynomials of rising degree until held-out trajectories meet `tolerance`.
 
@@ -55,6 +56,7 @@ def fit_modes(
         budget: Most eigen-analyses.
         scale: Factor on the tolerance for each output, shape (m,).
         energy: Whether modes are left out by their energy alone, as a proof needs it.
+        degree: The only degree to fit, whatever its error; all from 2 on unless given.
 
     Raises:
         ModalError: No oscillating modes, or double ones whose polynomials do not reach the
@@ -67,14 +69,15 @@ def fit_modes(
     chosen = needed_modes(flow, boxes, allowed, energy=energy)
     best: ModalModel | None = None
     known, reached = list[Modes](), list[float]()
-    for degree in range(2, 13 if d <= MANY else 3):
-        points = fit_points(d, degree)
-        if len(held) + len(points) > budget or terms(d, degree) > MOST_TERMS:
+    degrees = range(2, 13 if d <= MANY else 3) if degree is None else (degree,)
+    for total in degrees:
+        points = fit_points(d, total)
+        if len(held) + len(points) > budget or terms(d, total) > MOST_TERMS:
             break
         count = sum(len(some.eigenvalue.value) for some in known)
         if count < len(points):  # the points of lower degrees are among them
             known.append(analyse(flow, boxes, points[count:], chosen))
-        model = _fitted(flow, boxes, points, joined(known), degree, chosen)
+        model = _fitted(flow, boxes, points, joined(known), total, chosen)
         error = np.abs(model.values(held) - truth).max(0)
         reached.append(float((error / scale).max()))
         if best is None or reached[-1] < (best.error / scale).max():
@@ -86,7 +89,7 @@ def fit_modes(
             f"modal: {d} parameters need more than {budget} eigen-analyses; raise the budget, or"
             " use graph-follower"
         )
-    if (best.error / scale).max() > tolerance:
+    if degree is None and (best.error / scale).max() > tolerance:
         require_single(
             evaluate(flow.system, flow.names, boxes.to_physical(held), derivatives=False)[0],
             best.chosen,

@@ -26,7 +26,9 @@ ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
 
-def first_optima(model: ModalModel, lower: Array, upper: Array, small: float) -> Optima:
+def first_optima(
+    model: ModalModel, lower: Array, upper: Array, small: float, unit: Array | None = None
+) -> Optima:
     """Optima of all nodes, outputs and sides in the box [lower, upper], from a sample of it.
 
     Args:
@@ -34,8 +36,10 @@ def first_optima(model: ModalModel, lower: Array, upper: Array, small: float) ->
         lower: Lower ends, shape (d,).
         upper: Upper ends.
         small: What Newton's method may leave, in units of the outputs.
+        unit: The sample in [−1, 1]^d, shape (n, d); the centre and Chebyshev points unless given.
     """
-    unit = np.vstack([np.zeros((1, len(lower))), chebyshev_points(len(lower), SAMPLES)])
+    if unit is None:
+        unit = np.vstack([np.zeros((1, len(lower))), chebyshev_points(len(lower), SAMPLES)])
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit
     optima = best_of(points, trajectories(model, points), np.arange(len(model.time)))
     if (upper > lower).any():

@@ -7,6 +7,7 @@ import pytest
 
 from alphacut import frame
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.methods import search
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
@@ -168,6 +169,35 @@ def test_more_inputs_than_a_proof_takes_are_searched_to_their_error():
     corners = values[-(2 ** len(names)) :]
     assert (corners <= found.upper[0] + found.error[0]).all()
     assert found.error.max() <= 1e-2 * np.abs(found.upper).max()
+
+
+def test_two_searches_share_nothing_and_their_difference_counts_four_times(monkeypatch):
+    """A second search that ends 0.01 elsewhere, in the units of the tolerance."""
+    compare, first_optima, starts = search._compared, search.first_optima, []
+
+    def differing(*args):
+        best, difference = compare(*args)
+        return best, difference + 0.01
+
+    def seen(model, lower, upper, small, unit=None):
+        starts.append((model.degree, unit))
+        return first_optima(model, lower, upper, small, unit)
+
+    def found():
+        method = frame.Search(1e-3, passes=1)
+        return envelope(CHAIN, {"k": Interval(78, 82)}, method=method, **{**MOTION, "alpha": (0,)})
+
+    plain = found()
+    monkeypatch.setattr(search, "_compared", differing)
+    monkeypatch.setattr(search, "first_optima", seen)
+    wider = found()
+    assert plain.facts["search_error"] < 1e-3
+    assert wider.facts["search_error"] == pytest.approx(0.04, rel=0.1)
+    assert (wider.upper == plain.upper).all()
+    (degree, points), (other, others) = starts
+    assert degree != other
+    assert points is None
+    assert len(others) > 100
 
 
 def test_a_pendulum_is_followed_to_its_error():
