@@ -61,6 +61,12 @@ class Content(Section):
         return {key: section for key, section in every.items() if section is not None}
 
     @property
+    def limited_outputs(self) -> tuple[str, ...]:
+        """Outputs whose peaks questions compare with limits, each once."""
+        sections = (section for section in self.questions.values() if section.reads_peaks)
+        return tuple(dict.fromkeys(limit.output for x in sections for limit in x.limits))
+
+    @property
     def picture(self) -> ImageCell | None:
         """The cell if it is an image."""
         return self.cell if isinstance(self.cell, ImageCell) else None

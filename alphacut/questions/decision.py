@@ -8,31 +8,28 @@ import numpy as np
 
 from alphacut.figures import style
 from alphacut.figures.style import GREY, INK, ORANGE, Look, colours
-from alphacut.frame import Auto, envelope
-from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, peaks
+from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, verdict_words
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.question import Motion, Question, Row, in_words
+from alphacut.questions.question import Motion, Question, Row, limit_words, peak_document
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PRECISION = 5e-3
-"""Error of the peaks that is aimed at, as a share of each."""
-
 
 def _document(name: str, one: Passing, limits: dict[str, float], peaks: Peaks) -> Document:
     """Degrees and margins of a limit, and on each level the greatest peak, proved and reached."""
-    most = None if name == ANY else peaks.most(name)
+    peak = {} if name == ANY else peak_document(peaks, name) | {"proved": peaks.most(name).upper}
     return {
-        "peak": {} if most is None else {"proved": most.upper, "reached": most.lower},
+        "peak": peak,
         "limit": limits.get(name, 1.0),
         "unit": "" if name == ANY else Output(name).unit,
         "possibility": one.possibility,
         "necessity": one.necessity,
         "margin": {"lower": one.margin[:, 0], "upper": one.margin[:, 1]},
-        "verdict": one.verdict,
+        "verdict": one.outcome,
+        "from_level": one.lowest,
         "nature": str(one.nature),
     }
 
@@ -67,38 +64,28 @@ class Decision(Question):
     key = "decision"
     title = "Can or must limits be exceeded?"
     caption = "Fuzzy peak of each limited output over its limit"
+    reads_peaks = True
     head = (
         *("limit", "verdict", "nature", "possibility", "necessity", "least margin"),
         *("peak at most", "peak reached", "gap"),
     )
 
     def answer(self, motion: Motion) -> Document:
-        """Degrees and margins of every limit, from the envelope of the limited outputs."""
+        """Degrees and margins of every limit, from the peaks of the limited outputs."""
+        assert motion.peaks is not None
         limits = self.in_si(motion.structure)
-        bounds = envelope(
-            motion.structure.observing("decision.limits", tuple(limits)),
-            motion.inputs,
-            duration=motion.duration,
-            step=motion.step,
-            alpha=motion.alpha,
-            method=Auto(PRECISION, peaks=True),
-            relative=True,
-            progress=motion.progress or False,
-        )
-        of = peaks(bounds)
-        answers = passing(of, limits)
-        each = {name: _document(name, one, limits, of) for name, one in answers.items()}
-        return {"alpha": motion.alpha, "step": motion.step, "limits": each}
+        peaks = motion.peaks
+        answers = passing(peaks, limits)
+        documents = {name: _document(name, one, limits, peaks) for name, one in answers.items()}
+        return {"alpha": motion.alpha, "step": motion.step, "limits": documents}
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
         """A row for each limit."""
         return [
             (
-                in_words(name, one["limit"], one["unit"])
-                .replace(">", "≤")
-                .removesuffix(" exceeded"),
-                one["verdict"],
+                limit_words(name, one["limit"], one["unit"]),
+                verdict_words(one["verdict"], one["from_level"]),
                 one["nature"],
                 degree(one["possibility"]),
                 degree(one["necessity"]),
@@ -131,7 +118,8 @@ class Decision(Question):
                 bar: Look = {"left": left, "height": 0.66 - 0.4 * level, "color": shade, "lw": 0}
                 axes.barh(place, right - left, **bar)
             possible, necessary = degree(one["possibility"]), degree(one["necessity"])
-            text = f"{one['verdict']} ({one['nature']}): possible to {possible}"
+            verdict = verdict_words(one["verdict"], one["from_level"])
+            text = f"{verdict} ({one['nature']}): possible to {possible}"
             text += f", necessary to {necessary}"
             axes.text(0.01, place + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
         axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")

@@ -21,7 +21,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.quantity import between, engineering
-from alphacut.questions.question import Motion, Question, Row, in_words
+from alphacut.questions.question import Motion, Question, Row, event_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,7 +138,7 @@ class Probability(Question):
         """A row for each limit."""
         return [
             (
-                in_words(name, one["limit"], one["unit"]),
+                event_words(name, one["limit"], one["unit"]),
                 cut(one, 0),
                 one["nature"],
                 cut(one, -1),

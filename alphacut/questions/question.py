@@ -15,6 +15,7 @@ from pydantic import Field, PlainValidator
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section, Some
+from alphacut.frame.questions.peaks import Peaks
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
@@ -76,9 +77,22 @@ One = Annotated[Limit, PlainValidator(_limit, json_schema_input_type=str)]
 Limits = Annotated[tuple[One, ...], Some]
 
 
-def in_words(output: str, limit: float, unit: str) -> str:
-    """A limit for people: "|drift1| > 40.00 mm"; the event's name where it has no unit."""
+def limit_words(output: str, limit: float, unit: str) -> str:
+    """A limit for people: "|drift1| ≤ 40.00 mm"; the name of several where it has no unit."""
+    return f"|{output}| ≤ {engineering(limit, unit)}" if unit else output
+
+
+def event_words(output: str, limit: float, unit: str) -> str:
+    """The event that a limit is exceeded: "|drift1| > 40.00 mm", or "any of them exceeded"."""
     return f"|{output}| > {engineering(limit, unit)}" if unit else f"{output} exceeded"
+
+
+def peak_document(peaks: Peaks, output: str) -> Document:
+    """Peak of an output on every level, in SI, as tables show it."""
+    column = peaks.outputs.index(output)
+    ends = {"lower": peaks.lower, "upper": peaks.upper, "error": peaks.error}
+    ends |= {"reached": peaks.reached}
+    return {end: values[:, column] for end, values in ends.items()}
 
 
 @dataclass(frozen=True)
@@ -91,6 +105,7 @@ class Motion:
         alpha: Levels.
         duration: Length, in s.
         step: Distance of nodes, in s.
+        peaks: Peaks of the outputs; None where no question reads them.
         progress: Takes the share done.
     """
 
@@ -99,6 +114,7 @@ class Motion:
     alpha: tuple[float, ...]
     duration: float
     step: float
+    peaks: Peaks | None = None
     progress: Progress | None = None
 
     @property
@@ -114,13 +130,15 @@ class Question(Section, ABC):
     """A question about limits of outputs, as a section of the case.
 
     Its attributes are the name of the section, of its results and its figure; the heading in the
-    report; the caption of the figure; and the titles of the columns of `rows`.
+    report; the caption of the figure; the titles of the columns of `rows`; and whether the answer
+    is read from the peaks of the limited outputs.
     """
 
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
     head: ClassVar[Row]
+    reads_peaks: ClassVar[bool] = False
     limits: Limits = Field(description="limits of outputs, 'drift1 <= 0.5 %', 'a3 <= 2 m/s^2'")
 
     def in_si(self, structure: Structure) -> dict[str, float]:

@@ -16,8 +16,8 @@ from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.decision import PRECISION
-from alphacut.questions.question import Motion, Question, Row
+from alphacut.questions.question import Motion, Question, Row, peak_document
+from alphacut.stages.envelope import PEAK_ERROR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,6 +39,7 @@ class Tolerances(Question):
     key = "tolerances"
     title = "How far may tolerances go?"
     caption = "Supports of the inputs in the case, and at the scale that exceeds no limit"
+    reads_peaks = True
     head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
 
     most: Annotated[float, Quantity(above=0, most=100)] = Field(
@@ -47,6 +48,7 @@ class Tolerances(Question):
 
     def answer(self, motion: Motion) -> Document:
         """Scales at which no limit and one is exceeded, and the supports at the first."""
+        assert motion.peaks is not None
         limits = self.in_si(motion.structure)
         scale = tolerances(
             motion.structure.observing("tolerances.limits", tuple(limits)),
@@ -55,7 +57,8 @@ class Tolerances(Question):
             duration=motion.duration,
             step=motion.step,
             most=self.most,
-            error=PRECISION,
+            error=PEAK_ERROR,
+            at_one=motion.peaks if motion.alpha[0] == 0 else None,
             progress=motion.progress,
         )
         modal = {name: number.modal for name, number in motion.inputs.items()}
@@ -65,6 +68,7 @@ class Tolerances(Question):
         }
         return {
             "limits": limits,
+            "peaks": {name: peak_document(motion.peaks, name) for name in limits},
             "kept": scale.kept,
             "clear": scale.clear,
             "passed": scale.passed if math.isfinite(scale.passed) else None,

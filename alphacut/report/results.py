@@ -26,17 +26,11 @@ EXCEEDED = {
 GRAVITY = float(STANDARD_GRAVITY)
 
 
-def whole(ends: Document, level: int, error: float, nature: Nature) -> tuple[float, float, float]:
-    """Ends of a cut, and the error that they leave out; guaranteed ends contain it."""
-    low, high = float(ends["lower"][level]), float(ends["upper"][level])
-    if nature is not Nature.GUARANTEED:
-        return low, high, error
-    return max(low - error, min(low, 0.0)), high + error, 0.0
-
-
 def cut(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
-    """One cut of a quantity with five digits."""
-    return between(*whole(ends, level, error, nature)[:2], nature, 5)
+    """One cut of a quantity with five digits; guaranteed ends contain the error."""
+    low, high = float(ends["lower"][level]), float(ends["upper"][level])
+    beyond = error if nature is Nature.GUARANTEED else 0.0
+    return between(max(low - beyond, min(low, 0.0)), high + beyond, nature, 5)
 
 
 def error_text(error: float, nature: Nature) -> str:
@@ -95,10 +89,10 @@ def motion(summary: Document) -> Table:
         for output, peak in study["peak"].items():
             each = scales(output, peak, summary.get("structure", {}))
             for label, factor in each if output in (study.get("drawn") or [output]) else ():
-                nature, error = Nature(study["nature"]), max(peak.get("error", [0.0]))
+                nature, error = Nature(peak["nature"]), max(peak["error"])
                 cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
                 for k in levels[len(cuts) :]:
-                    low, high, _ = whole(peak, k, error, nature)
+                    low, high = float(peak["lower"][k]), float(peak["upper"][k])
                     cuts.append(between(factor * low, factor * high, nature, 4 - (k > 0)))
                 limit, verdict = limits.get(output, (None, ""))
                 words = "" if limit is None else f"{limit * factor:.4g}", EXCEEDED.get(verdict, "")
@@ -135,17 +129,20 @@ def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
     for key, inner in (("tolerances", "limits"), ("probability", "events"), ("decision", "limits")):
         for output, one in summary.get(key, {}).get(inner, {}).items():
             of = one if isinstance(one, Mapping) else {"limit": one}
-            limits[output] = of["limit"], of.get("verdict", "").partition(" from")[0]
+            limits[output] = of["limit"], of.get("verdict", "")
     return limits
 
 
 def natures(summary: Document) -> Iterator[str]:
     """Lines on the nature of the peaks, and on the exact motions that tested them."""
-    each = {name: Nature(one["nature"]) for name, one in summary.get("envelopes", {}).items()}
-    words = [f"all {nature}" for nature in dict.fromkeys(each.values())]
-    if len(words) > 1:
-        words = [f"{nature} ({name})" for name, nature in each.items()]
-    if each:
+    groups: dict[str, dict[str, None]] = {}
+    for study in summary.get("envelopes", {}).values():
+        for output, peak in study["peak"].items():
+            groups.setdefault(peak["nature"], {})[output] = None
+    words = [f"{nature} ({', '.join(outputs)})" for nature, outputs in groups.items()]
+    if len(words) == 1:
+        words = [f"all {nature}" for nature in groups]
+    if words:
         yield "Peaks are largest magnitudes over time, " + ", ".join(words)
     if tested := sum(one.get("motions_tested", 0) for one in summary.get("envelopes", {}).values()):
         yield f"{tested} exact motions by another algorithm agree with what is guaranteed."

@@ -24,7 +24,6 @@ from alphacut.report.results import (
     material,
     motion,
     natures,
-    whole,
 )
 
 if TYPE_CHECKING:
@@ -138,15 +137,16 @@ def peaks(studies: Document) -> Table:
     """Peaks of all studies, an output and a level each, in SI."""
     rows: list[Row] = []
     for name, study in studies.items():
-        nature = Nature(study["nature"])
         for output, peak in study["peak"].items():
+            nature = Nature(peak["nature"])
             for level, alpha in enumerate(study["alpha"]):
-                error = peak["error"][level] if "error" in peak else 0.0
-                low, high, rest = whole(peak, level, error, nature)
-                both = ends(low, high, nature, DIGITS)
+                values = ends(peak["lower"][level], peak["upper"][level], nature, DIGITS)
+                reached = rounded(peak["reached"][level], "upper", Nature.ATTAINED, DIGITS)
+                error = f"{peak['error'][level]:.2g}"
                 first = (name, output, Output(output).unit, f"{alpha:g}")
-                rows.append((*first, *both, f"{rest:.2g}", str(nature)))
-    return ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature"), rows
+                rows.append((*first, *values, error, str(nature), _number(reached)))
+    head = ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature")
+    return (*head, "peak reached"), rows
 
 
 def shares(part: Document) -> Table:

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from alphacut.case.content import Content
 from alphacut.case.structure import Structure
+from alphacut.frame.questions.peaks import Peaks
 from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.columns import columns_text
 from alphacut.questions.question import Motion, Question
 from alphacut.stages import cell, envelope, identify, image, microstructure, modulus, shares
-from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.envelope import EnvelopeTask, peaks_of
 from alphacut.stages.modulus import Campaign
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, StageResult, StageStore, Work
@@ -109,7 +110,9 @@ class Chain:
         assert self.content.envelope is not None
         results = self.results
         results.structure = structure
-        results.tasks = envelope.tasks(self.content.envelope, self.content.study if studies else ())
+        section, content = self.content.envelope, self.content
+        limited = content.limited_outputs
+        results.tasks = envelope.tasks(section, content.study if studies else (), limited)
         longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest]
         try:
@@ -131,16 +134,29 @@ class Chain:
             measured, alpha = content.identify, task.section.alpha
             results.learned, structure = identify.learned(measured, structure, alpha)
         self.motion(structure)
+        peaks = self._peaks(replace(task, limited=content.limited_outputs), structure)
+        times = (task.section.alpha, task.duration, task.section.step)
+        motion = Motion(structure, task.fuzzy, *times, peaks)
         for key, section in content.questions.items():
-            inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section]
-            compute = partial(answered, section, structure, task)
+            inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section, peaks]
+            compute = partial(answer_of, section, motion)
             stage = Stage(key, inputs, ("fuzzy", "frame", "alphacut"), compute)
             results.answers[key] = self.store.take(stage).document
 
+    def _peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
+        """Peaks of the motion of [envelope]: of the study that has it, else of limited outputs."""
+        alpha = task.section.alpha
+        for study in self.results.tasks:
+            if study.is_motion_of(task.section):
+                return peaks_of(self.results.envelopes[study.name].document["peak"], alpha)
+        if not task.limited:
+            return None
+        inputs = [structure.model, structure.numbers, task]
+        compute = partial(envelope.compute_close_peaks, task, structure)
+        result = self.store.take(Stage("peaks", inputs, ("fuzzy", "frame"), compute))
+        return peaks_of(result.document["peak"], alpha)
 
-def answered(
-    section: Question, structure: Structure, task: EnvelopeTask, work: Work
-) -> StageResult:
-    """The answer to a question about the motion of [envelope]."""
-    times = (task.section.alpha, task.duration, task.section.step)
-    return StageResult(section.answer(Motion(structure, task.fuzzy, *times, work.tick)))
+
+def answer_of(section: Question, motion: Motion, work: Work) -> StageResult:
+    """The answer to a question about a motion."""
+    return StageResult(section.answer(replace(motion, progress=work.tick)))

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
+
+import numpy as np
 
 from alphacut import frame
 from alphacut.case.motion import Envelope, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import Peaks, peaks
+from alphacut.frame.questions.peaks import Peaks, peaks, tightest
 from alphacut.frame.structures.quantities import Output
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, require
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
 from alphacut.stages.store import Stage, StageResult, Work
 
 USUAL = Tolerance(1e-3, "")
 """Tolerance where none is named: a share of each peak."""
+PEAK_ERROR = 5e-3
+"""Error of the peaks of limited outputs that is aimed at, as a share of each."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 
 
@@ -30,6 +36,7 @@ class EnvelopeTask:
         duration: Length of the simulation, in s.
         section: Levels, method, step.
         figures: Outputs that are drawn, each with its number in the paper; empty for all.
+        limited: Outputs whose peak a question compares with a limit.
     """
 
     name: str
@@ -37,6 +44,7 @@ class EnvelopeTask:
     duration: float
     section: Envelope
     figures: Mapping[str, str] = field(default_factory=dict)
+    limited: tuple[str, ...] = ()
 
     def tolerance(self, structure: Structure) -> Tolerance:
         """Error that is allowed, in the unit of some output or as a share.
@@ -49,6 +57,11 @@ class EnvelopeTask:
         value, allowed = f"{own.value:g} {own.unit}", f"a share, or {', '.join(sorted(units))}"
         require(own.unit in {"", *units}, "envelope.tolerance", value, allowed)
         return own
+
+    def is_motion_of(self, section: Envelope) -> bool:
+        """True if it has the inputs and the duration of [envelope]."""
+        same_inputs = set(self.fuzzy) == set(section.fuzzy)
+        return same_inputs and self.duration == section.duration
 
     def options(self, structure: Structure) -> dict[str, object]:
         """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
@@ -76,7 +89,40 @@ class EnvelopeTask:
             progress=work.tick or False,
             **self.options(structure),
         )
-        return StageResult({"peak": by_output(peaks(result))}, result.to_dataset())
+        of_envelope = peaks(result)
+        if not has_close(of_envelope, self.limited):
+            of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
+        return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
+
+    def close_peaks(self, structure: Structure, work: Work) -> Peaks:
+        """Peaks of the limited outputs by the method that bounds peaks most closely."""
+        return peaks(
+            frame.envelope(
+                structure.observing("limits", self.limited),
+                structure.inputs(self.fuzzy),
+                duration=self.duration,
+                step=self.section.step,
+                alpha=self.section.alpha,
+                method=frame.Auto(PEAK_ERROR, peaks=True),
+                relative=True,
+                progress=work.tick or False,
+            )
+        )
+
+
+def has_close(peaks: Peaks, outputs: Sequence[str]) -> bool:
+    """True if each output has a guaranteed peak that is known to within `PEAK_ERROR`."""
+    if not set(outputs) <= set(peaks.outputs):
+        return False
+    columns = [peaks.outputs.index(output) for output in outputs]
+    proved = all(peaks.natures[column] is Nature.GUARANTEED for column in columns)
+    upper, reached = peaks.upper[:, columns], peaks.reached[:, columns]
+    return proved and bool((upper - reached <= PEAK_ERROR * upper).all())
+
+
+def compute_close_peaks(task: EnvelopeTask, structure: Structure, work: Work) -> StageResult:
+    """Peaks of the limited outputs in a motion that no study is of."""
+    return StageResult({"peak": by_output(task.close_peaks(structure, work))})
 
 
 def by_output(peaks: Peaks) -> Document:
@@ -87,23 +133,57 @@ def by_output(peaks: Peaks) -> Document:
             "upper": peaks.upper[:, column],
             "error": peaks.error[:, column],
             "reached": peaks.reached[:, column],
+            "least_proved": peaks.least_proved[:, column],
+            "least_reached": peaks.least_reached[:, column],
             "nature": str(peaks.natures[column]),
         }
         for column, name in enumerate(peaks.outputs)
     }
 
 
-def tasks(section: Envelope, studies: Sequence[Study]) -> tuple[EnvelopeTask, ...]:
-    """The envelopes of a case: its studies, or the one of [envelope]."""
-    several = tuple(
-        EnvelopeTask(one.name, one.fuzzy, one.duration, section, one.figures) for one in studies
+def peaks_of(document: Document, alpha: Sequence[float]) -> Peaks:
+    """Peaks from the document of `by_output`, where what is not finite is None."""
+
+    def ends(name: str) -> Array:
+        rows = [peak[name] for peak in document.values()]
+        return np.array([[np.inf if x is None else x for x in row] for row in rows]).T
+
+    return Peaks(
+        alpha=np.array(alpha),
+        outputs=tuple(document),
+        lower=ends("lower"),
+        upper=ends("upper"),
+        error=ends("error"),
+        reached=ends("reached"),
+        least_proved=ends("least_proved"),
+        least_reached=ends("least_reached"),
+        natures=tuple(Nature(peak["nature"]) for peak in document.values()),
     )
-    return several or (EnvelopeTask("all", section.fuzzy, section.duration, section),)
+
+
+def tasks(
+    section: Envelope, studies: Sequence[Study], limited: tuple[str, ...] = ()
+) -> tuple[EnvelopeTask, ...]:
+    """The envelopes of a case: its studies, or the one of [envelope].
+
+    Args:
+        section: The section [envelope].
+        studies: Studies of the case, if any.
+        limited: Outputs of the motion of [envelope] whose peaks questions compare with limits.
+    """
+    every = tuple(
+        EnvelopeTask(study.name, study.fuzzy, study.duration, section, study.figures)
+        for study in studies
+    ) or (EnvelopeTask("all", section.fuzzy, section.duration, section),)
+    return tuple(
+        replace(task, limited=limited) if task.is_motion_of(section) else task for task in every
+    )
 
 
 def stage(structure: Structure, task: EnvelopeTask) -> Stage:
     """The stage of one study."""
     inputs = [structure.model, structure.numbers, task.fuzzy, task.duration, task.section]
+    inputs += [task.limited]
     compute = partial(task.compute, structure)
     return Stage(f"envelope_{task.name}", inputs, ("fuzzy", "frame"), compute)
 

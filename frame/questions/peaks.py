@@ -13,7 +13,7 @@ excludes the motion on its level and above. One that is attained above it proves
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,7 +36,7 @@ class Peaks:
         lower: Magnitude at the nodes that each motion reaches, as the bounds have it, (A, m).
         upper: Magnitude at the nodes that none passes, as the bounds have it, shape (A, m).
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope
-            and of the steps between nodes, shape (A, m).
+            and of the steps between nodes, shape (A, m); 0 of guaranteed bounds, which contain it.
         reached: Magnitude that a motion in the cut is known to reach, shape (A, m).
         least_proved: Peak that each motion in the cut is proved to have at least, shape (A, m).
         least_reached: Peak that a motion in the cut is known to keep to; infinite where none is.
@@ -90,15 +90,19 @@ def peaks(envelope: Envelope) -> Peaks:
     upper, lower = size.max(1), away.max(1)
     above = within_steps(size + error, envelope.between).max(1) - upper
     below = lower - np.maximum(away - error, 0.0).max(1)
+    least = envelope.least_peaks
+    least_proved = np.zeros_like(upper) if least is None else least.lower
+    lower = np.where(proved, np.maximum(lower, least_proved), lower)
+    upper = np.where(proved, upper + above, upper)
     reached = np.nan_to_num(np.maximum(inner.upper, -inner.lower).max(1), nan=0.0)
     return Peaks(
         np.asarray(envelope.alpha),
         tuple(map(str, envelope.outputs)),
         lower,
         upper,
-        np.maximum(above, below),
+        np.where(proved, 0.0, np.maximum(above, below)),
         np.maximum(reached, 0.0),
-        np.zeros_like(upper) if envelope.least_peaks is None else envelope.least_peaks.lower,
+        least_proved,
         _least_reached(envelope, upper),
         natures,
     )
@@ -110,6 +114,71 @@ def _least_reached(envelope: Envelope, like: Array) -> Array:
         return np.full_like(like, np.inf)
     between = 0.0 if envelope.between is None else envelope.between.max(0)
     return envelope.least_peaks.upper + between
+
+
+def tightest(first: Peaks, second: Peaks) -> Peaks:
+    """Peaks of the same motions on the same levels, from two envelopes of them.
+
+    Of each output they have the tighter of two proved bounds, or else the bounds of the stronger
+    nature and of the smaller error, and the larger of the magnitudes that are reached.
+
+    Args:
+        first: Peaks of all or some outputs.
+        second: Peaks of all or some outputs.
+    """
+    outputs = tuple(dict.fromkeys((*first.outputs, *second.outputs)))
+    columns = [_tightest_column(first, second, output) for output in outputs]
+    return Peaks(
+        alpha=first.alpha,
+        outputs=outputs,
+        lower=np.hstack([column.lower for column in columns]),
+        upper=np.hstack([column.upper for column in columns]),
+        error=np.hstack([column.error for column in columns]),
+        reached=np.hstack([column.reached for column in columns]),
+        least_proved=np.hstack([column.least_proved for column in columns]),
+        least_reached=np.hstack([column.least_reached for column in columns]),
+        natures=tuple(column.natures[0] for column in columns),
+    )
+
+
+def _column(peaks: Peaks, output: str) -> Peaks:
+    """Peaks of an output alone, arrays of shape (A, 1)."""
+    k = peaks.outputs.index(output)
+    return Peaks(
+        alpha=peaks.alpha,
+        outputs=(output,),
+        lower=peaks.lower[:, [k]],
+        upper=peaks.upper[:, [k]],
+        error=peaks.error[:, [k]],
+        reached=peaks.reached[:, [k]],
+        least_proved=peaks.least_proved[:, [k]],
+        least_reached=peaks.least_reached[:, [k]],
+        natures=(peaks.natures[k],),
+    )
+
+
+def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:
+    """Peaks of an output by the better of two envelopes, or by both."""
+    columns = [_column(x, output) for x in (first, second) if output in x.outputs]
+    if len(columns) == 1:
+        return columns[0]
+    one, two = columns
+    if one.natures == two.natures == (Nature.GUARANTEED,):
+        lower, upper = np.maximum(one.lower, two.lower), np.minimum(one.upper, two.upper)
+        better = replace(one, lower=lower, upper=upper)
+    elif one.natures == two.natures == (Nature.ATTAINED,):
+        lower, upper = np.minimum(one.lower, two.lower), np.maximum(one.upper, two.upper)
+        better = replace(one, lower=lower, upper=upper, error=np.maximum(one.error, two.error))
+    elif one.natures == two.natures:
+        better = min(one, two, key=lambda column: column.error.max())
+    else:
+        better = max(one, two, key=lambda column: list(Nature).index(column.natures[0]))
+    return replace(
+        better,
+        reached=np.maximum(one.reached, two.reached),
+        least_proved=np.maximum(one.least_proved, two.least_proved),
+        least_reached=np.minimum(one.least_reached, two.least_reached),
+    )
 
 
 def within_steps(size: Array, between: Array | None) -> Array:
@@ -159,14 +228,24 @@ class Passing:
     nature: Nature
 
     @property
-    def verdict(self) -> str:
-        """(Not) exceeded, can be exceeded, or undecided; with the level from which on if not 0."""
-        level = f" from α = {self.lowest:g} up" if self.lowest else ""
+    def outcome(self) -> str:
+        """(Not) exceeded, on and above the lowest level; can be exceeded; or undecided."""
         if self.possibility[1] <= self.lowest:
-            return f"not exceeded{level}"
+            return "not exceeded"
         if self.necessity[0] >= 1 - self.lowest:
-            return f"exceeded{level}"
+            return "exceeded"
         return "can be exceeded" if self.possibility[0] > 0 else "undecided"
+
+    @property
+    def verdict(self) -> str:
+        """The outcome in words, with the level from which on it holds if that is not 0."""
+        return verdict_words(self.outcome, self.lowest)
+
+
+def verdict_words(outcome: str, lowest: float) -> str:
+    """An outcome for people, with the level from which on it holds if that is not 0."""
+    holds_from = bool(lowest) and outcome in ("exceeded", "not exceeded")
+    return f"{outcome} from α = {lowest:g} up" if holds_from else outcome
 
 
 def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:

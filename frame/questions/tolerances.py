@@ -71,6 +71,7 @@ def tolerances(
     most: float = 2.0,
     precision: float = 0.01,
     error: float = 1e-3,
+    at_one: Peaks | None = None,
     progress: Progress | None = None,
 ) -> Tolerances:
     """Largest scale of the supports at which no magnitude exceeds its limit.
@@ -84,6 +85,8 @@ def tolerances(
         most: Largest scale that is tried.
         precision: Distance of both scales, relative to `most`, at which the search ends.
         error: Error of the peaks that is aimed at, as a share of each.
+        at_one: Peaks on the supports at scale 1, on their first level, where these are known;
+            that scale is then looked at whatever the others say.
         progress: Takes the share done.
 
     Raises:
@@ -106,15 +109,21 @@ def tolerances(
     tried: dict[float, _Step] = {}
 
     def step_at(scale: float) -> _Step:
+        if scale in tried:
+            return tried[scale]
         numbers = scaled(inputs, scale)
         tried[scale] = _judged(peaks(bounds(numbers)), limits)
         if progress:
             progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
-    low, near = (most if step_at(most).kept else 0.0), precision * most
-    if low == 0.0 and step_at(0.0).kept:
-        low = _halved(lambda scale: step_at(scale).kept, low, most, near)
+    near = precision * most
+    if at_one is not None and most >= 1:
+        tried[1.0] = _judged(at_one, limits)
+    low = next((scale for scale in (most, *tried, 0.0) if step_at(scale).kept), 0.0)
+    if low < most and tried[low].kept:
+        high = min(scale for scale in tried if scale > low)
+        low = _halved(lambda scale: step_at(scale).kept, low, high, near)
     passed = min((scale for scale, one in tried.items() if one.passed), default=np.inf)
     clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and passed < np.inf:

@@ -16,7 +16,8 @@ def peaks(lower, upper, reached):
     """Peaks of one output q on one level, by what is proved and reached."""
     rows = (np.array([[x]]) for x in (lower, upper))
     nothing, natures = np.zeros((1, 1)), (Nature.GUARANTEED,)
-    return Peaks(np.zeros(1), ("q",), *rows, nothing, np.array([[reached]]), natures)
+    least = nothing, np.full((1, 1), np.inf)
+    return Peaks(np.zeros(1), ("q",), *rows, nothing, np.array([[reached]]), *least, natures)
 
 
 def suite(count=12, seed=4):
