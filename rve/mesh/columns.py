@@ -48,13 +48,16 @@ def extrude(
     return grid_of(prisms, radius, outline)
 
 
-def grid_of(prisms: Prisms, radius: float, outline: Outline = circle) -> PrismGrid:
+def grid_of(
+    prisms: Prisms, radius: float, outline: Outline = circle, *, is_fixed: bool = False
+) -> PrismGrid:
     """The prisms numbered level by level, with the planar mesh below them.
 
     Args:
         prisms: Of any numbering; their planar positions are those of the planar mesh.
         radius: Of the particle in the mesh, 0 if it has none.
         outline: Of the particle.
+        is_fixed: Whether nodes stay where the prisms have them, whatever the map.
 
     Raises:
         MeshError: They do not lie in columns, or a column does not pass all levels.
@@ -80,7 +83,11 @@ def grid_of(prisms: Prisms, radius: float, outline: Outline = circle) -> PrismGr
     inside = phase[:triangles] == (prisms.names.index(INCLUSION) if radius else -1)
     plane = _plane(positions, cells[:triangles], inside, radius, outline)
     shares = (heights - heights[0]) / (heights[-1] - heights[0])
-    return PrismGrid(plane, cells, shares, phase, prisms.names, radius > 0)
+    fixed = None
+    if is_fixed:
+        fixed = np.empty_like(prisms.points)
+        fixed[number] = prisms.points
+    return PrismGrid(plane, cells, shares, phase, prisms.names, radius > 0 or is_fixed, fixed)
 
 
 def _levels(prisms: Prisms) -> tuple[Array, Rows]:

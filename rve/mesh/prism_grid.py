@@ -52,8 +52,9 @@ class PrismGrid:
         heights: Levels of θ as shares of its support, from 0 to 1, shape (layers + 1,).
         phase: Phase of each wedge, a place in `names`, shape (wedges,).
         names: Names of the phases.
-        conforming: Whether the nodes follow the cone; if not they stay where the planar mesh has
-            them.
+        conforming: Whether the phases are those of the wedges and the nodes follow the cone; if not
+            they stay where the planar mesh has them.
+        fixed: Positions of all nodes where a file gives them, whatever the map, shape (nodes, 3).
     """
 
     plane: Triangulation
@@ -62,6 +63,7 @@ class PrismGrid:
     phase: Rows
     names: tuple[str, ...]
     conforming: bool = True
+    fixed: Array | None = None
 
     @property
     def layers(self) -> int:
@@ -84,6 +86,8 @@ class PrismGrid:
 
     def positions(self, radius: RadiusMap) -> Array:
         """(x1, x2, θ) of all nodes, shape (nodes, 3)."""
+        if self.fixed is not None:
+            return self.fixed
         theta = self.levels(radius.distribution)
         middle = (theta[1:] + theta[:-1]) / 2
         planes = self._at(radius, theta), self._at(radius, middle)[:, : self.plane.vertices]

@@ -12,7 +12,8 @@ from alphacut.rve.mesh.jacobian import LEAST_RATIO
 from alphacut.rve.mesh.outline import is_round
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES, slab_rule, slice_weights, wedge
-from alphacut.stochastic import RadiusMap, layered_rule
+from alphacut.stochastic import RadiusMap
+from alphacut.stochastic.theta.quadrature import level_rule
 
 
 class FoldedMeshError(FailedError):
@@ -147,7 +148,7 @@ class PrismForm:
 
     def slices(self) -> tuple[Array, Array]:
         """θ of the slices at Gauss points of the layers, and their weights, shape (3 layers,)."""
-        rule = layered_rule(self._law, layers=self.grid.layers, points=SLICES)
+        rule = level_rule(self._law, self._levels, points=SLICES)
         return rule.nodes, rule.weights
 
     def of_slices(self, values: Array) -> Array:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from time import perf_counter
 from typing import ClassVar
 
@@ -28,13 +29,16 @@ from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.rve.prism.error_estimate import judged
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
+from alphacut.rve.prism.own_mesh import own_mesh_problem, require_own_mesh
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import Homogenised, StressCurve
 from alphacut.rve.settings import require_compressible, require_mesh_size, require_parts
 from alphacut.rve.solver.krylov import Solutions, solve
 from alphacut.rve.solver.options import SolverOptions
-from alphacut.stochastic import RadiusMap
+from alphacut.stochastic import RadiusMap, ThetaLaw
 
+ROUGH_MESH = 0.1
+"""Relative violation of a bound that a mesh of one's own may have, whose error nobody knows."""
 INTERFACES = ("conforming", "sign")
 Seconds = dict[str, float]
 
@@ -56,6 +60,7 @@ class PrismModel:
         moduli: Least and greatest modulus of the particle, in Pa, between which samples of a map
             are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
+        mesh: File of Gmsh with a mesh of one's own, which is solved as it is; see `solve`.
 
     Raises:
         RefusedError: An option out of range or unknown.
@@ -70,6 +75,7 @@ class PrismModel:
     estimate: bool = True
     moduli: tuple[float, float] | None = None
     outline: Outline = circle
+    mesh: Path | str = ""
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
@@ -80,16 +86,28 @@ class PrismModel:
             raise RefusedError("the interface", repr(self.interface), ", ".join(INTERFACES))
 
     def solve(
-        self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+        self,
+        radius_map: RadiusMap | ThetaLaw,
+        matrix: AnyPhase | Mapping[str, AnyPhase],
+        inclusions: Sequence[AnyPhase] = (),
     ) -> list[Homogenised]:
         """One result for each of `inclusions`, in their order, on one mesh.
+
+        On a mesh of one's own, `solve(law, {name: phase})` gives one result, of the law of θ and
+        the materials of its physical groups. It declares no error: a coarser mesh of one's own
+        tells it.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
             CertificateError: A property that every right result has is violated.
             FoldedMeshError: The map bends more than the layers can follow.
-            RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit.
+            MeshError: A mesh of one's own is no cell of prisms.
+            RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit, or law and
+                phases are not those of the mesh.
         """
+        if self.mesh:
+            return [self._solve_own_mesh(radius_map, matrix)]
+        assert not isinstance(matrix, Mapping)
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         seconds: Seconds = {}
@@ -115,6 +133,30 @@ class PrismModel:
             results.append(result)
             seconds = {}
         return results
+
+    def _solve_own_mesh(self, law: object, phases: object) -> Homogenised:
+        """The result on a mesh of one's own."""
+        seconds: Seconds = {}
+        with timed(seconds, "mesh"):
+            problem = own_mesh_problem(self.mesh, self.parallel)
+            grid = problem.form.grid
+            named = require_own_mesh(grid, law, phases)
+            problem.move(named.law)
+        loads, stiffness = THREE_LOADS, [phase.stiffness for phase in named.phases]
+        strains, solved = self._solve_system(problem, stiffness, loads, seconds)
+        stress = strains.stress(stiffness)
+        whole = stress @ np.linalg.inv(loads).T
+        curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
+        checks = _checks(strains, stiffness, loads, named.phases) | {"residual": solved.residual}
+        return Homogenised(
+            curve,
+            self.name,
+            str(self.options),
+            unknowns=problem.numbering.size,
+            iterations=solved.iterations,
+            seconds={**seconds, "total": sum(seconds.values())},
+            checks=require(checks, discretisation=ROUGH_MESH),
+        )
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
         """The mesh and the form, moved to a map; kept for the next map.
@@ -174,11 +216,21 @@ class PrismModel:
         self, problem: PrismProblem, cell: Cell, seconds: Seconds
     ) -> tuple[SliceStrains, Solutions]:
         """Means over the slices of a sample, and the solutions that they are of."""
-        strains = self.loads(cell)
+        return self._solve_system(problem, cell.stiffness, self.loads(cell), seconds)
+
+    def _solve_system(
+        self,
+        problem: PrismProblem,
+        stiffness: Sequence[Array],
+        strains: Array,
+        seconds: Seconds,
+    ) -> tuple[SliceStrains, Solutions]:
+        """Means over the slices for the phases' stiffness under macroscopic strains."""
         with timed(seconds, "assemble"):
-            problem.assemble(cell.stiffness)
+            problem.assemble(stiffness)
             loads = problem.loads(strains)
-        if np.array_equal(*cell.stiffness):  # the affine field is the solution
+        if all(np.array_equal(one, stiffness[0]) for one in stiffness):
+            # the affine field is the solution
             solved = Solutions([load.duplicate() for load in loads], (0,) * len(loads), 0.0)
         else:
             with timed(seconds, "setup"):
@@ -199,18 +251,28 @@ class PrismModel:
         if self.estimate:
             result = judged(result)
         allowed = 2 * result.largest_error if result.errors else self._roughly
-        energy, work = strains.energy(cell.stiffness), loads @ mean(strains.weights, stress)
-        checks = {
-            "residual": residual,
-            "hill_mandel": float(abs(work.T - energy).max() / abs(energy).max()),
-            **stress_checks(stress, loads, strains.fractions, strains.weights, cell.phases),
-        }
+        checks = _checks(strains, cell.stiffness, loads, cell.phases) | {"residual": residual}
         return replace(result, checks=require(checks, discretisation=ROUND_OFF + allowed))
 
     @property
     def _roughly(self) -> float:
         """Most that a mesh adds to the stiffness, where no error is declared."""
         return 0.1 * self.mesh_size ** (3 if self.interface == "conforming" else 1)
+
+
+def _checks(
+    strains: SliceStrains,
+    stiffness: Sequence[Array],
+    loads: Array,
+    phases: Sequence[AnyPhase],
+) -> dict[str, float]:
+    """Violations of Hill–Mandel, symmetry and bounds."""
+    stress, energy = strains.stress(stiffness), strains.energy(stiffness)
+    work = loads @ mean(strains.weights, stress)
+    return {
+        "hill_mandel": float(abs(work.T - energy).max() / abs(energy).max()),
+        **stress_checks(stress, loads, strains.fractions, strains.weights, phases),
+    }
 
 
 @contextmanager

@@ -46,8 +46,13 @@ def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRu
     layers; where the density is smooth, the error of the mean of a smooth function falls with the
     power 2·points of the layer height.
     """
-    edges = np.asarray(np.linspace(distribution.lower, distribution.upper, layers + 1), float)
-    return _weighted(distribution, edges, np.polynomial.legendre.leggauss(points))
+    levels = np.asarray(np.linspace(distribution.lower, distribution.upper, layers + 1), float)
+    return level_rule(distribution, levels, points=points)
+
+
+def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRule:
+    """As `layered_rule`, in slabs between levels of θ, equal or not, shape (layers + 1,)."""
+    return _weighted(distribution, levels, np.polynomial.legendre.leggauss(points))
 
 
 def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:

@@ -1,0 +1,137 @@
+"""A mesh of one's own: prisms of the product space in a file of Gmsh, as they are.
+
+The file is the geometry at its own θ: levels may be uneven, columns bent and phases any number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.mesh import gmsh_prisms, square
+from alphacut.rve.mesh.columns import grid_of
+from alphacut.rve.mesh.gmsh_prisms import Prisms
+from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError, partners
+from alphacut.rve.mesh.prism_grid import PrismGrid
+
+UPSIDE_DOWN = [3, 4, 5, 0, 1, 2, 12, 13, 8, 14, 10, 11, 6, 7, 9]
+MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
+"""Orders of a prism's nodes that put its upper triangle first, and that exchange two vertices."""
+
+
+def read_grid(path: Path | str) -> PrismGrid:
+    """The prisms of a file of Gmsh, numbered level by level; nodes stay where the file has them.
+
+    Raises:
+        RefusedError: The file is none of Gmsh.
+        MeshError: It holds no extruded prisms with named phases over the cell [−1, 1]², or nodes of
+            a side have no partners on one of the levels.
+    """
+    with square.model() as gmsh:
+        try:
+            gmsh.open(str(path))
+        except Exception as error:  # Gmsh raises nothing else
+            allowed = "files of Gmsh with 15-node prisms"
+            raise RefusedError("mesh.file", path, allowed, str(error)) from None
+        prisms = upright(gmsh_prisms.read(gmsh))
+    grid = grid_of(prisms, 0.0, is_fixed=True)
+    _require_cell(grid)
+    return grid
+
+
+def upright(prisms: Prisms) -> Prisms:
+    """The same prisms with θ rising from their first triangle, which is counterclockwise."""
+    cells, points = prisms.cells.copy(), prisms.points
+    falling = points[cells[:, 3], 2] < points[cells[:, 0], 2]
+    cells[falling] = cells[falling][:, UPSIDE_DOWN]
+    first, second, third = (points[cells[:, k], :2] for k in range(3))
+    a, b = second - first, third - first
+    clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
+    cells[clockwise] = cells[clockwise][:, MIRRORED]
+    return replace(prisms, cells=cells)
+
+
+def _require_cell(grid: PrismGrid) -> None:
+    """Refuse meshes of another square, and sides that do not match on a level."""
+    assert grid.fixed is not None
+    count, levels = len(grid.plane.points), grid.layers + 1
+    lowest: list[tuple[Rows, Rows]] = []
+    for level in range(levels):
+        points = grid.fixed[level * count : (level + 1) * count]
+        theta = points[0, 2]
+        ends = np.array([points[:, :2].min(axis=0), points[:, :2].max(axis=0)])
+        if abs(ends - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
+            shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in ends.T)
+            raise MeshError(f"the level θ = {theta:.4g} spans {shown}, not −1 … 1 × −1 … 1")
+        on_side = abs(abs(points[:, :2]) - 1) <= SAME_PLACE
+        try:
+            pairs = [partners(points[:, :2], on_side[:, axis], axis) for axis in (0, 1)]
+        except MeshError as error:
+            raise MeshError(f"{error.what}, on the level θ = {theta:.4g}", error.cure) from None
+        if lowest and not _same(pairs, lowest):
+            raise MeshError(f"a column changes its partner at the level θ = {theta:.4g}")
+        lowest = lowest or pairs
+
+
+def _same(pairs: list[tuple[Rows, Rows]], others: list[tuple[Rows, Rows]]) -> bool:
+    """True if nodes have the same partners, in whatever order."""
+    return all(
+        dict(zip(*map(np.ndarray.tolist, one), strict=True))
+        == dict(zip(*map(np.ndarray.tolist, two), strict=True))
+        for one, two in zip(pairs, others, strict=True)
+    )
+
+
+def write(
+    path: Path | str,
+    points: Array,
+    cells: Rows,
+    phase: Rows,
+    names: Sequence[str],
+    fields: Mapping[str, Array] | None = None,
+) -> None:
+    """Write prisms as a file of Gmsh, each phase a physical group, bit for bit.
+
+    Args:
+        path: A name that ends in .msh.
+        points: (x1, x2, θ), shape (n, 3).
+        cells: Nodes in Basix's order, shape (m, 15).
+        phase: Place of each prism's phase in `names`, shape (m,).
+        names: Names of the phases.
+        fields: Values at the nodes of the prisms by name, shape (m, 15, components).
+    """
+    with square.model() as gmsh:
+        gmsh.option.setNumber("Mesh.Binary", 1)
+        gmsh.model.add("cell")
+        model = gmsh.model.getCurrent()
+        tags = np.arange(1, len(points) + 1)
+        volumes = [gmsh.model.addDiscreteEntity(3) for _ in names]
+        gmsh.model.mesh.addNodes(3, volumes[0], tags, points.ravel())
+        for k, (volume, name) in enumerate(zip(volumes, names, strict=True)):
+            own = np.flatnonzero(phase == k)
+            gmsh.model.mesh.addElementsByType(
+                volume, gmsh_prisms.PRISM_15, own + 1, (cells[own] + 1).ravel()
+            )
+            gmsh.model.addPhysicalGroup(3, [volume], name=name)
+        gmsh.write(str(path))
+        for name, values in (fields or {}).items():
+            _append(gmsh, str(path), (model, name), values)
+
+
+def _append(gmsh: Any, path: str, names: tuple[str, str], values: Array) -> None:
+    """Append a field at the nodes of the elements to a file that has its mesh."""
+    model, name = names
+    view = gmsh.view.add(name)
+    elements = np.arange(1, len(values) + 1)
+    components = values.shape[-1]
+    gmsh.view.addHomogeneousModelData(
+        view, 0, model, "ElementNodeData", elements, values.ravel(), numComponents=components
+    )
+    gmsh.option.setNumber("PostProcessing.SaveMesh", 0)
+    gmsh.view.write(view, path, append=True)

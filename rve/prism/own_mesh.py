@@ -1,0 +1,98 @@
+"""A mesh of one's own with its law of θ and its materials, refused where they do not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
+from alphacut.rve.fenicsx import MPI
+from alphacut.rve.mesh.file import read_grid
+from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.prism.problem import PrismProblem
+from alphacut.rve.settings import require_compressible
+from alphacut.stochastic import ThetaLaw
+
+SAME_LEVEL = 1e-6
+"""Distance of an end of the law from the mesh's that is none, over the support."""
+
+
+@dataclass(frozen=True)
+class FixedCell:
+    """The law of θ where no radius follows from it."""
+
+    distribution: ThetaLaw
+
+    def __call__(self, theta: Array) -> Array:
+        """No radius."""
+        return np.full(np.shape(theta), np.nan)
+
+
+@dataclass(frozen=True)
+class NamedPhases:
+    """Law and materials of a mesh.
+
+    Args:
+        law: Law of θ.
+        phases: Materials in the order of the mesh.
+    """
+
+    law: FixedCell
+    phases: tuple[AnyPhase, ...]
+
+
+def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
+    """Refuse a law of another support, and materials that are not those of the physical groups.
+
+    Raises:
+        RefusedError: One does not fit.
+    """
+    names = ", ".join(grid.names)
+    if not isinstance(phases, Mapping):
+        value = type(phases).__name__
+        raise RefusedError("phases of the mesh", value, f"{{name: phase}} for the groups {names}")
+    for name in (*phases, *grid.names):
+        if name not in phases or name not in grid.names:
+            value = repr(name) if name in phases else f"without {name!r}"
+            raise RefusedError("phase", value, f"one for each physical group: {names}")
+        if not isinstance(phases[name], Phase | VoigtPhase):
+            raise RefusedError(f"phase {name!r}", repr(phases[name]), "a Phase or a VoigtPhase")
+    require_compressible(*phases.values())
+    assert grid.fixed is not None
+    theta = grid.fixed[:, 2]
+    ends, own = np.array([theta.min(), theta.max()]), (getattr(law, x, np.nan) for x in _ENDS)
+    support = np.array(list(own))
+    if not abs(support - ends).max() <= SAME_LEVEL * np.ptp(ends) or not hasattr(law, "pdf"):
+        value = f"on {support[0]:g} … {support[1]:g}"
+        allowed = f"laws on {ends[0]:g} … {ends[1]:g}, the lowest and the highest level of the mesh"
+        raise RefusedError("law of θ", value, allowed)
+    return NamedPhases(FixedCell(cast("ThetaLaw", law)), tuple(phases[name] for name in grid.names))
+
+
+_ENDS = "lower", "upper"
+
+
+def own_mesh_problem(path: Path | str, parallel: bool) -> PrismProblem:
+    """The problem on a mesh of one's own, kept for the next materials.
+
+    Raises:
+        RefusedError: There is no such file, or it is none of Gmsh.
+        MeshError: It is no cell of prisms.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise RefusedError("mesh.file", path, "a file of Gmsh")
+    return _problem(str(path), path.stat().st_mtime_ns, parallel)
+
+
+@lru_cache(maxsize=2)
+def _problem(path: str, _changed: int, parallel: bool) -> PrismProblem:
+    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
+    return PrismProblem(read_grid(path), comm)

@@ -1,0 +1,159 @@
+"""Meshes of one's own: files are solved as they are, or refused with what does not fit."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import Phase, PrismModel
+from alphacut.rve.mesh.columns import extrude
+from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, read_grid, upright, write
+from alphacut.rve.mesh.gmsh_prisms import Prisms
+from alphacut.rve.mesh.periodicity import MeshError
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+MESHES = Path(__file__).parents[3] / "meshes"
+LAW, PAPER = TruncatedNormal(-3, 3), HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+SOFT, HARD = Phase(20e9), Phase(80e9)
+
+
+def solve(name, **phases):
+    return PrismModel(mesh=MESHES / name).solve(LAW, phases)[0]
+
+
+def test_a_written_cell_is_solved_bit_for_bit(tmp_path):
+    model = PrismModel(0.5, 4, stiffness=True)
+    right = model.solve(PAPER, SOFT, [HARD])[0]
+    grid = model.problem(PAPER).form.grid
+    write(tmp_path / "a.msh", grid.positions(PAPER), grid.cells, grid.phase, grid.names)
+    phases = {"inclusion": HARD, "matrix": SOFT}
+    result = PrismModel(mesh=str(tmp_path / "a.msh")).solve(PAPER.distribution, phases)[0]
+    assert result.modulus == pytest.approx(right.modulus, rel=1e-12)
+    assert not result.errors
+    assert np.isnan(result.estimated_error)
+    assert solve("paper-coarse.msh", **phases).modulus == pytest.approx(right.modulus, rel=1e-9)
+
+
+def test_two_particles_have_the_stiffness_of_other_methods():
+    """C11 by linear triangles 33.603, by an FFT of 512² points 33.619 GPa; E by proved bounds."""
+    result = solve("two-particles.msh", matrix=SOFT, particles=HARD)
+    stiffness = np.asarray(result.stiffness) / 1e9
+    assert 33.60 < stiffness[0, 0] < 33.62
+    assert 25.7420 < result.modulus / 1e9 < 25.7433 * 1.001
+    assert stiffness == pytest.approx(stiffness.T, rel=1e-9)
+
+
+def test_three_phases_of_which_two_are_alike_are_two():
+    inner = solve("ring.msh", matrix=SOFT, ring=SOFT, particle=HARD)
+    outer = solve("ring.msh", matrix=SOFT, ring=HARD, particle=HARD)
+    exact = PrismModel(0.25, 1, stiffness=True)
+    for result, radius in ((inner, 0.5), (outer, 0.6)):
+        right = exact.solve(HermiteMap(radius, 0, radius, 0), SOFT, [HARD])[0]
+        assert result.modulus == pytest.approx(right.modulus, rel=2e-3)
+
+
+def test_levels_may_be_uneven(tmp_path):
+    """A cell that is straight along θ has one modulus whatever its levels."""
+    prisms = extrude(size=0.5, radius=0.4, layers=3)
+    results = []
+    for power in (1.0, 2.0):
+        points = prisms.positions(HermiteMap(0.4, 0, 0.4, 0)).copy()
+        points[:, 2] = 6 * ((points[:, 2] + 3) / 6) ** power - 3
+        half = prisms.cells[:, [8, 10, 11]]
+        points[half, 2] = (points[prisms.cells[:, :3], 2] + points[prisms.cells[:, 3:6], 2]) / 2
+        write(tmp_path / f"{power}.msh", points, prisms.cells, prisms.phase, prisms.names)
+        model = PrismModel(mesh=tmp_path / f"{power}.msh")
+        results.append(model.solve(LAW, {"matrix": SOFT, "inclusion": HARD})[0])
+    assert results[1].modulus == pytest.approx(results[0].modulus, rel=1e-9)
+    assert not np.allclose(results[0].curve.theta, results[1].curve.theta)
+
+
+@pytest.mark.parametrize(
+    ("law", "phases", "message"),
+    [
+        (LAW, {"matrix": SOFT}, "phase is without 'ring'; .* matrix, ring, particle"),
+        (LAW, dict.fromkeys(("matrix", "ring", "particle", "glue"), SOFT), "phase is 'glue'"),
+        (LAW, SOFT, "phases of the mesh is Phase"),
+        (LAW, {"matrix": SOFT, "ring": 3, "particle": HARD}, "phase 'ring' is 3"),
+        (
+            TruncatedNormal(-2, 3),
+            dict.fromkeys(("matrix", "ring", "particle"), SOFT),
+            "law of θ is on -2 … 3; allowed: laws on -3 … 3",
+        ),
+    ],
+)
+def test_law_and_phases_that_do_not_fit_are_refused(law, phases, message):
+    with pytest.raises(RefusedError, match=message):
+        PrismModel(mesh=MESHES / "ring.msh").solve(law, phases)
+
+
+def test_sides_that_do_not_match_are_refused_with_side_and_level():
+    with pytest.raises(MeshError, match=r"sides x1 = ±1 at x2 = .*, on the level θ = -3"):
+        solve("unlike-sides.msh", matrix=SOFT, particle=HARD)
+
+
+def moved(grid, change):
+    points = grid.positions(HermiteMap(0.4, 0, 0.4, 0)).copy()
+    return change(points)
+
+
+def lifted(points):
+    points[0, 2] += 0.1
+    return points
+
+
+def stretched(points):
+    return points * [1.1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [(lifted, "does not stand on one level"), (stretched, "the level θ = -3 spans -1.1 … 1.1")],
+)
+def test_prisms_that_are_no_cell_are_refused(tmp_path, change, message):
+    grid = extrude(size=0.6, radius=0.4, layers=2)
+    points = moved(grid, change)
+    write(tmp_path / "bad.msh", points, grid.cells, grid.phase, grid.names)
+    with pytest.raises(MeshError, match=message):
+        read_grid(tmp_path / "bad.msh")
+
+
+def test_a_file_that_is_none_is_refused(tmp_path):
+    (tmp_path / "no.msh").write_text("nothing")
+    for path in (tmp_path / "no.msh", tmp_path / "absent.msh"):
+        with pytest.raises((RefusedError, MeshError)):
+            PrismModel(mesh=path).solve(LAW, {"matrix": SOFT})
+
+
+def test_prisms_of_any_orientation_are_set_upright():
+    grid = extrude(size=0.6, radius=0.4, layers=2)
+    points = grid.positions(HermiteMap(0.4, 0, 0.4, 0))
+    right = Prisms(points, grid.cells, grid.phase, grid.names)
+    for order in (UPSIDE_DOWN, MIRRORED, [UPSIDE_DOWN[k] for k in MIRRORED]):
+        wrong = replace(right, cells=grid.cells[:, order])
+        assert {tuple(row) for row in upright(wrong).cells} & {tuple(row) for row in grid.cells}
+        volume = np.linalg.det(
+            points[upright(wrong).cells[:, [1, 2, 3]]] - points[upright(wrong).cells[:, [0]]]
+        )
+        assert (volume > 0).all()
+
+
+@pytest.mark.parametrize("script", ["two_particles", "ring", "unlike_sides", "paper_coarse"])
+def test_each_file_is_made_again_by_its_script(tmp_path, script):
+    name = f"{script.replace('_', '-')}.msh"
+    for file in MESHES.glob("*.py"):
+        (tmp_path / file.name).write_text(file.read_text(encoding="utf-8"), encoding="utf-8")
+    subprocess.run([sys.executable, tmp_path / f"{script}.py"], check=True, cwd=tmp_path)
+    if script == "unlike_sides":
+        with pytest.raises(MeshError):
+            read_grid(tmp_path / name)
+        return
+    made, stored = read_grid(tmp_path / name), read_grid(MESHES / name)
+    assert made.names == stored.names
+    assert np.asarray(made.fixed) == pytest.approx(np.asarray(stored.fixed), abs=1e-9)
