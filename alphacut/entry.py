@@ -10,7 +10,14 @@ import warnings
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 
-from alphacut.commands.options import Command, Parser, require_petsc, split_petsc
+from alphacut.commands.options import (
+    PETSC_LOG,
+    Command,
+    Parser,
+    read,
+    require_petsc,
+    split_petsc,
+)
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
@@ -125,7 +132,16 @@ def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> in
     check_destinations(made[options.command], options)
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
         warnings.showwarning = _warn
-        return command_of(options.command, names[options.command]).run(options, out)
+        command = command_of(options.command, names[options.command])
+        if PETSC_LOG not in petsc:
+            return command.run(options, out)
+        if "case" in options:
+            read(options)
+        del petsc[PETSC_LOG]
+        from alphacut.rve.fenicsx import log_on_standard_error
+
+        with log_on_standard_error():
+            return command.run(options, out)
 
 
 def _warn(message: Warning | str, *_: object, **__: object) -> None:

@@ -15,6 +15,7 @@ import cffi
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.interruption import uninterrupted
 
 with uninterrupted():
@@ -32,6 +33,19 @@ with uninterrupted():
 
 __all__ = ["MPI", "PETSc", "basix", "fem", "petsc", "ufl"]  # imported from here by others
 
+
+def require_real(scalar: type) -> None:
+    """Refuse a PETSc of complex numbers, whose matrices are not those of elasticity here.
+
+    Raises:
+        RefusedError: It is one.
+    """
+    if np.issubdtype(scalar, np.complexfloating):
+        cure = "install DOLFINx with real numbers, such as python3-dolfinx-real"
+        raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)
+
+
+require_real(PETSc.ScalarType)
 # twice as fast as the default -O2, equal to round-off; other processes may compile the same
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}
 
@@ -78,8 +92,21 @@ def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfi
     return dolfinx.mesh.create_mesh(comm, cells=cells, x=places, e=element, **own)
 
 
+@contextmanager
+def log_on_standard_error() -> Iterator[None]:
+    """Let PETSc log the block, and print the log to standard error: what ``-log_view`` asks for."""
+    PETSc.Log.begin()
+    yield
+    viewer = PETSc.Viewer().createASCII("stderr", comm=PETSc.COMM_WORLD)
+    PETSc.Log.view(viewer)
+    viewer.destroy()
+
+
 def option_is_used(name: str) -> bool:
-    """True if PETSc has asked for the option; petsc4py does not wrap this question."""
+    """True if PETSc has asked for the option.
+
+    By C, since petsc4py 3.22 has no call for options that are set and not used.
+    """
     interface = cffi.FFI()
     interface.cdef("int PetscOptionsUsed(void *options, const char *name, char *used);")
     used = interface.new("char[8]")  # as large as any PetscBool

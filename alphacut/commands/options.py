@@ -18,6 +18,8 @@ from alphacut.io.problem import BadInput, Problem, suggestion
 from alphacut.stages.store import StageStore
 
 PETSC_PREFIX = "-rve_"
+PETSC_LOG = "-log_view"
+"""The one option of PETSc without the prefix: a log of the process."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,15 @@ class Parser(argparse.ArgumentParser):
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Options of PETSc (``-rve_ksp_rtol 1e-10``) apart from those of the program."""
+    """Options of PETSc (``-rve_ksp_rtol 1e-10``, ``-log_view``) and those of the program."""
     ours: list[str] = []
     petsc: dict[str, str] = {}
     rest = list(arguments)
     while rest:
         word = rest.pop(0)
+        if word == PETSC_LOG:
+            petsc[word] = ""
+            continue
         if not word.startswith(PETSC_PREFIX):
             ours.append(word)
             continue
@@ -72,7 +77,8 @@ def require_petsc(petsc: Mapping[str, str], used: bool) -> None:
     Raises:
         RefusedError: There are such options.
     """
-    option = PETSC_PREFIX + next(iter(petsc), "")
+    name = next(iter(petsc), "")
+    option = name if name == PETSC_LOG else PETSC_PREFIX + name
     require(used or not petsc, option, "PETSc's", "options of a cell with method prism")
 
 

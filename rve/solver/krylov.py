@@ -112,7 +112,8 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     """
     database = PETSc.Options(PREFIX)
     own = {name: database.getString(name) for name in options.all if database.hasName(name)}
-    for name, value in (options.all | own | dict(options.overrides)).items():
+    overrides = {name: options.all[name] for name in options.overrides}
+    for name, value in (options.all | own | overrides).items():
         database[name] = value
     try:
         yield

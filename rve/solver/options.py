@@ -7,6 +7,7 @@ stands. Options under the prefix ``-rve_`` override it, such as ``-rve_pc_type g
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -19,7 +20,16 @@ DEFAULTS = {
     "pc_type": "python",
 }
 MOST_ITERATIONS = 500
-"""By the preconditioner, which takes tens at most; others may take ten times as many."""
+"""Iterations by the preconditioner, which takes tens at most; others may take ten times as many."""
+
+PRINTS = re.compile(r"(_view|_monitor\w*|_converged_(reason|rate))$")
+"""Options that make PETSc print."""
+
+
+def _to_standard_error(name: str, value: str) -> str:
+    """Where PETSc prints: a view, monitor or reason without a value goes to standard error."""
+    prints = PRINTS.search(name) and not value
+    return "ascii:stderr" if prints else value
 
 
 @dataclass(frozen=True)
@@ -36,6 +46,7 @@ class SolverOptions:
     def all(self) -> dict[str, str]:
         """Everything that is put to PETSc."""
         chosen = {**DEFAULTS, **self.overrides}
+        chosen = {name: _to_standard_error(name, value) for name, value in chosen.items()}
         most = MOST_ITERATIONS * (1 if chosen["pc_type"] == "python" else 10)
         return {"ksp_max_it": str(most), **chosen}
 

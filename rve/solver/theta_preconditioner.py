@@ -106,6 +106,10 @@ class PlaneSolver:
         self._ksp.solve(self._load, self._solution)
         return np.array(self._solution.array_r)
 
+    def view(self, viewer: PETSc.Viewer) -> None:
+        """Show the solver."""
+        self._ksp.view(viewer)
+
 
 class ThetaPreconditioner:
     """P⁻¹ of a reduced stiffness; a context of PETSc's ``pc_type python``.
@@ -160,6 +164,14 @@ class ThetaPreconditioner:
         bubbles += (hats[:-1, :corners] + hats[1:, :corners]) / 2
         rows = numbering.rows
         result.array[:] = numbering.joined(hats, bubbles)[rows.start : rows.stop]
+
+    def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
+        """Show the solver of a level, called by PETSc for ``-rve_ksp_view``."""
+        count = f"{len(self.levels)} levels and {len(self.middles)} half-way on this rank"
+        viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
+        own = viewer.getSubViewer(PETSc.COMM_SELF)
+        self.levels[0].view(own)
+        viewer.restoreSubViewer(own)
 
     def _of_all_ranks(self, vector: PETSc.Vec) -> Array:
         self.scatter.scatter(vector, self.whole)

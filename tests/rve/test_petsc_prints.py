@@ -1,0 +1,58 @@
+"""PETSc's own options reach it from the command line and print to standard error alone."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.fenicsx import require_real
+
+ROOT = Path(__file__).parents[2]
+SOLVE = [
+    "-m",
+    "rve",
+    "solve",
+    "cases/paper.toml",
+    "--set",
+    "mesh.size=0.5",
+    "--set",
+    "mesh.layers=4",
+]
+
+
+def solve(*options):
+    command = [sys.executable, *SOLVE, *options]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+
+
+def test_log_view_and_monitor_print_to_standard_error():
+    prints = ("-rve_ksp_view", "-rve_ksp_monitor", "-rve_ksp_converged_reason", "-log_view")
+    done = solve("--method", "prism", "--json", "-", *prints)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["E_GPa"] == pytest.approx(24.8073, rel=1e-4)
+    assert "KSP Object: (rve_)" in done.stderr
+    assert "KSP Object: (rve_level_)" in done.stderr
+    assert "preconditioner along θ, 5 levels and 4 half-way" in done.stderr
+    assert "0 KSP Residual norm" in done.stderr
+    assert "Linear rve_ solve converged" in done.stderr
+    assert "PETSc Performance Summary" in done.stderr
+    assert "MatSolve" in done.stderr
+
+
+def test_log_view_without_prisms_is_refused():
+    done = solve("--method", "series", "-log_view")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "-log_view is PETSc's; allowed: options of a cell with method prism" in done.stderr
+
+
+def test_a_petsc_of_complex_numbers_is_refused():
+    require_real(np.float64)
+    with pytest.raises(RefusedError, match="PETSc is built for complex numbers"):
+        require_real(np.complex128)
