@@ -13,6 +13,7 @@ from alphacut.rve.slices.model import SlicesModel
 
 if TYPE_CHECKING:
     from alphacut.rve.prism.model import PrismModel
+    from alphacut.rve.prism.product_space import ProductSpace
 
 __all__ = [
     "LOADS",
@@ -22,6 +23,7 @@ __all__ = [
     "Homogenised",
     "Phase",
     "PrismModel",
+    "ProductSpace",
     "SeriesModel",
     "SlicesModel",
     "StressCurve",
@@ -31,9 +33,13 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The model that needs DOLFINx, imported when it is named."""
-    if name != "PrismModel":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from alphacut.rve.prism.model import PrismModel
+    """The class that needs DOLFINx, imported when it is named."""
+    if name == "PrismModel":
+        from alphacut.rve.prism.model import PrismModel
 
-    return PrismModel
+        return PrismModel
+    if name == "ProductSpace":
+        from alphacut.rve.prism.product_space import ProductSpace
+
+        return ProductSpace
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -65,6 +65,15 @@ def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhase
         if not isinstance(phases[name], Phase | VoigtPhase):
             raise RefusedError(f"phase {name!r}", repr(phases[name]), "a Phase or a VoigtPhase")
     require_compressible(*phases.values())
+    return NamedPhases(require_law(grid, law), tuple(phases[name] for name in grid.names))
+
+
+def require_law(grid: PrismGrid, law: object) -> FixedCell:
+    """Refuse a law of another support than the levels of the mesh.
+
+    Raises:
+        RefusedError: It is one, or no law.
+    """
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
     ends, own = np.array([theta.min(), theta.max()]), (getattr(law, x, np.nan) for x in _ENDS)
@@ -73,7 +82,7 @@ def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhase
         value = f"on {support[0]:g} … {support[1]:g}"
         allowed = f"laws on {ends[0]:g} … {ends[1]:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)
-    return NamedPhases(FixedCell(cast("ThetaLaw", law)), tuple(phases[name] for name in grid.names))
+    return FixedCell(cast("ThetaLaw", law))
 
 
 _ENDS = "lower", "upper"

@@ -68,6 +68,7 @@ class PrismProblem:
         numbering: Reduced unknowns.
         map: The radius map.
         matrix: The reduced stiffness.
+        local_map: Nodes of this rank to pairs of reduced unknowns.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
@@ -75,8 +76,8 @@ class PrismProblem:
         self.form = PrismForm(grid, comm)
         self.numbering = LevelNumbering(grid, comm)
         pairs, rows = self.numbering.pairs, self.numbering.rows
-        self._local = map_of(pairs[self.form.node], comm)
-        self.matrix = zero_matrix(pairs[grid.cells], self._local, rows, self.numbering.size)
+        self.local_map = map_of(pairs[self.form.node], comm)
+        self.matrix = zero_matrix(pairs[grid.cells], self.local_map, rows, self.numbering.size)
         self._scatter, self._whole = PETSc.Scatter.toAll(self.matrix.createVecRight())
 
     def move(self, radius_map: RadiusMap) -> None:
@@ -105,7 +106,7 @@ class PrismProblem:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         own, size = len(self.numbering.rows), self.numbering.size
         forces = [self.form.elastic.load(one, parts) for one in strains]
-        return [reduced(one, self._local, own, size) for one in forces]
+        return [reduced(one, self.local_map, own, size) for one in forces]
 
     def solver(self, options: SolverOptions) -> PETSc.KSP:
         """The solver of the stiffness as assembled."""

@@ -1,0 +1,169 @@
+"""The product space for laws of the user: space, measure, reduced assembly, preconditioned solve.
+
+A law is a UFL form in displacements u of two components on cell × θ. Each integrand carries the
+factor `density`, f_Θ of eq. 1, and the strain is that of `strain`, without a derivative along θ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import form as elasticity
+from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
+from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.own_mesh import own_mesh_problem, require_law
+from alphacut.rve.prism.problem import PrismProblem
+from alphacut.rve.solver.krylov import Solutions, krylov_solver, solve
+from alphacut.rve.solver.numbering import reduced
+from alphacut.rve.solver.options import SolverOptions
+from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
+from alphacut.stochastic import RadiusMap, ThetaLaw
+
+ASYMMETRY = 1e-8
+"""Largest |(A − Aᵀ) x| over |A x| of a symmetric operator; round-off leaves some 1e-15."""
+
+
+class ProductSpace:
+    """Periodic fluctuations on cell × θ, zero on the line of one corner over θ.
+
+    The mesh belongs to this object alone: it does not follow later maps of the model.
+
+    Args:
+        model: Mesh size, layers and outline, or the file of a mesh; communicator; PETSc options.
+        law: Radius of the particle over θ, or the law of θ where the mesh is that of a file.
+
+    Attributes:
+        space: Displacements of two components in serendipity wedges.
+        dx: Measure of each phase by its name, "matrix" and "inclusion" or the physical groups of
+            the file, with the quadrature of the wedges.
+        density: f_Θ at the quadrature points.
+
+    Raises:
+        RefusedError: The mesh of the model ignores the interface, so that no measure has phases,
+            or the law is not that of the file.
+        FoldedMeshError: The map bends more than the layers can follow.
+
+    Example:
+        >>> space = ProductSpace(PrismModel(0.5, 2), HermiteMap(0.2, 0.1, 0.6, 0.1))
+        >>> particle = space.mean(space.density * space.dx["inclusion"])
+        >>> 0.1 < particle < 0.15  # share of area, mean of π r² / 4
+        True
+    """
+
+    def __init__(self, model: PrismModel, law: RadiusMap | ThetaLaw) -> None:
+        if model.interface != "conforming":
+            raise RefusedError("the interface", repr(model.interface), "'conforming'")
+        self._petsc = model.petsc
+        self._problem = _separate_problem(model, law)
+        self.space: fem.FunctionSpace = self._problem.form.space
+        self.dx: dict[str, ufl.Measure] = self._problem.form.dx
+        self.density: fem.Function = self._problem.form.elastic.density
+        self._forms: dict[ufl.Form, fem.Form] = {}
+
+    @staticmethod
+    def strain(u: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+        """In-plane strain (ε11, ε22, 2 ε12) of displacements (eq. 5)."""
+        return elasticity.strain(u)
+
+    def assemble_matrix(self, form: ufl.Form) -> PETSc.Mat:
+        """Reduced matrix Pᵀ A P of a bilinear form in `space`."""
+        matrix = self._problem.matrix.duplicate()
+        for option in (PETSc.Mat.Option.SPD, PETSc.Mat.Option.SYMMETRIC):  # not known of this form
+            matrix.setOption(option, False)
+        petsc.assemble_matrix(matrix, self._compiled(form))
+        matrix.assemble()
+        return matrix
+
+    def assemble_vector(self, form: ufl.Form) -> PETSc.Vec:
+        """Reduced vector Pᵀ b of a linear form in `space`."""
+        numbering = self._problem.numbering
+        values = fem.assemble_vector(self._compiled(form)).array
+        return reduced(values, self._problem.local_map, len(numbering.rows), numbering.size)
+
+    def mean(self, form: ufl.Form) -> float:
+        """Mean over cell and θ of a scalar form: its integral over that of f_Θ."""
+        # the quadrature integrates f_Θ over θ to 1 but for some 1e-7
+        total = sum(self._integral(self.density * dx) for dx in self.dx.values())
+        return self._integral(form) / total
+
+    def _integral(self, form: ufl.Form) -> float:
+        return float(self._problem.comm.allreduce(fem.assemble_scalar(self._compiled(form))))
+
+    def assign(self, function: fem.Function, vector: PETSc.Vec) -> None:
+        """Set a function of `space` to the displacements of reduced unknowns."""
+        function.x.array[:] = self._problem.field(vector).ravel()
+
+    def preconditioner(self, matrix: PETSc.Mat) -> ThetaPreconditioner:
+        """θ-preconditioner of a reduced matrix, for `PC.setPythonContext`.
+
+        Args:
+            matrix: Symmetric positive definite, with f_Θ as a factor of its form.
+        """
+        problem = self._problem
+        return ThetaPreconditioner(matrix, problem.numbering, problem.map.distribution)
+
+    def solve(
+        self,
+        matrix: PETSc.Mat,
+        loads: Sequence[PETSc.Vec],
+        petsc_options: Mapping[str, str] | None = None,
+    ) -> Solutions:
+        """Solutions of A x = b by conjugate gradients with the θ-preconditioner.
+
+        Args:
+            matrix: From `assemble_matrix`, symmetric positive definite.
+            loads: Right-hand sides b.
+            petsc_options: Options without their prefix `rve_`; the model's if left out.
+
+        Raises:
+            RefusedError: The matrix is not symmetric, or PETSc does not use an option.
+            ConvergenceError: The tolerance was not reached.
+        """
+        require_symmetric(matrix)
+        options = SolverOptions(self._petsc if petsc_options is None else petsc_options)
+        law = self._problem.map.distribution
+        return solve(krylov_solver(matrix, self._problem.numbering, law, options), loads)
+
+    def _compiled(self, form: ufl.Form) -> fem.Form:
+        """The compiled form; its coefficients keep the values that they have when assembled."""
+        if form not in self._forms:
+            self._forms[form] = compiled(form)
+        return self._forms[form]
+
+
+def _separate_problem(model: PrismModel, law: RadiusMap | ThetaLaw) -> PrismProblem:
+    """A problem that the model does not move to its next map, as it does those that it keeps."""
+    if model.mesh:
+        kept = own_mesh_problem(model.mesh, model.parallel)
+        radius: RadiusMap = require_law(kept.form.grid, law)
+    else:
+        kept = model.problem(law)
+        radius = kept.map
+    problem = PrismProblem(kept.form.grid, kept.comm)
+    problem.move(radius)
+    return problem
+
+
+def require_symmetric(matrix: PETSc.Mat) -> None:
+    """Refuse a matrix for which conjugate gradients would give a wrong answer in silence.
+
+    Raises:
+        RefusedError: A x and Aᵀ x differ for a vector x of random signs and sizes.
+    """
+    x, product = matrix.createVecs()
+    transposed = x.duplicate()
+    x.array[:] = np.random.default_rng(x.owner_range[0]).standard_normal(x.local_size)
+    matrix.mult(x, product)
+    matrix.multTranspose(x, transposed)
+    size = product.norm()
+    transposed.axpy(-1, product)
+    gap = transposed.norm() / (size or 1.0)
+    if not gap <= ASYMMETRY:
+        allowed = "symmetric operators"
+        cure = (
+            "use a Krylov method of PETSc for others, with `preconditioner` of the symmetric part"
+        )
+        raise RefusedError("asymmetry of the matrix", f"{gap:.1e}", allowed, cure)

@@ -1,0 +1,124 @@
+"""Doors for laws of the user: what they assemble, what they refuse, and that they stay as they are."""
+
+import doctest
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import LOADS, Phase, PrismModel, ProductSpace
+from alphacut.rve.fenicsx import PETSc, fem, ufl
+from alphacut.rve.prism import product_space
+from alphacut.rve.solver.krylov import solve
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+MESHES = Path(__file__).parents[3] / "meshes"
+
+CONE, CRISP = HermiteMap(0.2, 0.1, 0.7, 0.2), HermiteMap(0.5, 0, 0.5, 0)
+MODEL = PrismModel(0.7, 4, estimate=False)
+PHASES = Phase(20e9), Phase(80e9)
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return ProductSpace(MODEL, CONE)
+
+
+@pytest.fixture(scope="module")
+def elastic(cell):
+    u, v = ufl.TrialFunction(cell.space), ufl.TestFunction(cell.space)
+    constants = [fem.Constant(cell.space.mesh, phase.stiffness) for phase in PHASES]
+    return sum(
+        cell.density * ufl.dot(c * cell.strain(u), cell.strain(v)) * dx
+        for dx, c in zip((cell.dx["matrix"], cell.dx["inclusion"]), constants, strict=True)
+    )
+
+
+def test_a_form_of_the_user_gives_the_matrix_and_the_solutions_of_the_model(cell, elastic):
+    problem = MODEL.problem(CONE)
+    by_name = dict(zip(("matrix", "inclusion"), PHASES, strict=True))
+    expected = problem.assemble([by_name[name].stiffness for name in problem.form.grid.names])
+    matrix = cell.assemble_matrix(elastic)
+    gap = matrix.copy()
+    gap.axpy(-1, expected)
+    assert gap.norm() < 1e-12 * expected.norm()
+    loads = problem.loads(LOADS)
+    vectors = cell.solve(matrix, loads).vectors
+    for x, y in zip(vectors, solve(problem.solver(MODEL.options), loads).vectors, strict=True):
+        assert x.array == pytest.approx(y.array, rel=1e-7, abs=1e-9)
+
+
+def test_functions_take_reduced_unknowns_and_means_are_over_area_and_law(cell, elastic):
+    load, solution = cell.assemble_matrix(elastic).createVecs()
+    rng = np.random.default_rng()
+    solution.array[:] = rng.standard_normal(len(solution.array))
+    u = fem.Function(cell.space)
+    cell.assign(u, solution)
+    energy = ufl.replace(elastic, dict(zip(elastic.arguments(), (u, u), strict=True)))
+    cell.assemble_matrix(elastic).mult(solution, load)
+    assert cell.mean(energy) == pytest.approx(load.dot(solution) / 4, rel=1e-4)
+    theta = ufl.SpatialCoordinate(cell.space.mesh)[2]
+    exact = CONE.distribution.pdf
+    points, weights = np.polynomial.legendre.leggauss(80)
+    variance = 3 * weights @ ((3 * points) ** 2 * exact(3 * points))
+    assert sum(cell.mean(theta**2 * cell.density * dx) for dx in cell.dx.values()) == pytest.approx(
+        variance, rel=1e-3
+    )
+    fraction = cell.mean(cell.density * cell.dx["inclusion"])
+    radius = 3 * weights @ (np.pi * CONE(3 * points) ** 2 / 4 * exact(3 * points))
+    assert fraction == pytest.approx(radius, rel=1e-3)
+
+
+def test_an_operator_without_symmetry_is_refused_and_not_solved_wrongly(cell, elastic):
+    matrix = cell.assemble_matrix(elastic)
+    columns, values = matrix.getRow(0)
+    matrix.setValue(0, columns[1], values[1] + 1e-3 * values[0])
+    matrix.assemble()
+    with pytest.raises(RefusedError, match="asymmetry of the matrix"):
+        cell.solve(matrix, [matrix.createVecLeft()])
+
+
+def test_the_preconditioner_serves_a_solver_of_the_user(cell, elastic):
+    matrix = cell.assemble_matrix(elastic)
+    load, solution = matrix.createVecs()
+    load.array[:] = np.random.default_rng().standard_normal(len(load.array))
+    ksp = PETSc.KSP().create(matrix.comm)
+    ksp.setOperators(matrix)
+    ksp.setType("minres")
+    ksp.setTolerances(rtol=1e-10)
+    ksp.pc.setType("python")
+    ksp.pc.setPythonContext(cell.preconditioner(matrix))
+    ksp.solve(load, solution)
+    assert ksp.getConvergedReason() > 0
+    assert ksp.getIterationNumber() < 30
+
+
+def test_a_later_map_of_the_model_does_not_move_the_mesh(cell):
+    before = cell.space.mesh.geometry.x.copy()
+    MODEL.solve(CRISP, PHASES[0], [PHASES[1]])
+    ProductSpace(MODEL, CRISP)
+    assert (cell.space.mesh.geometry.x == before).all()
+
+
+def test_a_mesh_that_ignores_the_interface_has_no_measure_of_phases():
+    with pytest.raises(RefusedError, match="conforming"):
+        ProductSpace(PrismModel(0.6, 2, interface="sign"), CONE)
+
+
+def test_the_example_of_the_class_runs():
+    names = {"ProductSpace": ProductSpace, "PrismModel": PrismModel, "HermiteMap": HermiteMap}
+    failed, tried = doctest.testmod(product_space, extraglobs={**names, "ufl": ufl})
+    assert tried
+    assert not failed
+
+
+def test_a_mesh_from_a_file_has_its_measures_by_the_names_of_its_groups():
+    model = PrismModel(mesh=MESHES / "two-particles.msh")
+    cell = ProductSpace(model, TruncatedNormal())
+    share = 1 - cell.mean(cell.density * cell.dx["matrix"])
+    assert share == pytest.approx(np.pi * (0.35**2 + 0.40**2) / 4, rel=1e-3)
+    with pytest.raises(RefusedError, match="law of θ is on -2 … 2"):
+        ProductSpace(model, TruncatedNormal(-2, 2))
