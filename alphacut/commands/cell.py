@@ -37,7 +37,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHOD",
         help="solve by a second method; fail if E differs by more than modulus.tolerance",
     )
-    parser.add_argument("--export", metavar="FILE", help="mesh, displacements and stresses as .vtu")
+    parser.add_argument(
+        "--export", metavar="FILE", help="mesh, displacements, stresses: .msh, .vtu, .xdmf, .inp"
+    )
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
@@ -81,12 +83,14 @@ def difference(first: Homogenised, second: Homogenised, tolerance: float) -> flo
 
 def export(radius: AnyRadius, phases: RoundCell, mesh: Mesh, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns counts."""
-    from alphacut.export.mesh import cell_fields, write_mesh
+    from alphacut.export.cell_files import write_cell
+    from alphacut.rve.prism.fields import cell_fields
+    from alphacut.rve.prism.model import PrismModel
 
-    require(path.suffix == ".vtu", "--export", str(path), "names that end in .vtu")
-    fields = cell_fields(cell.modal_cell(radius, phases), mesh.size, mesh.layers)
-    write_mesh(fields, path)
-    return {"file": str(path), "nodes": len(fields.points)}
+    modal = cell.modal_cell(radius, phases)
+    model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)
+    fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion)
+    return {"file": str(path), "nodes": write_cell(fields, path)}
 
 
 def summary(result: Homogenised, document: Document) -> str:

@@ -19,7 +19,7 @@ from alphacut.case.material import Mesh
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
-from alphacut.rve.cell import LOADS, Cell
+from alphacut.rve.cell import Cell
 
 if TYPE_CHECKING:
     import meshio
@@ -80,28 +80,6 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
     radius = reference_radius(cell.radius, outline)
     grid = extrude(size=size, radius=radius, layers=layers, outline=outline)
     return wedges(grid.positions(cell.radius), grid.cells, grid.inside.astype(np.int64))
-
-
-def cell_fields(cell: Cell, size: float, layers: int) -> meshio.Mesh:
-    """The mesh with total displacements and stresses under both loads.
-
-    Stresses are means over the wedges of one phase that meet in a node; nodes on the interface
-    stand twice, once for each phase, since stresses jump there. Point data:
-    ``displacement_1_in_half_sides`` (halves of the cell's side) and ``stress_1_11_Pa`` … under ε11
-    = ε22 = 0.01 (load 1) and ε12 = 0.01 (load 2).
-    """
-    from alphacut.rve.prism import fields as prism
-    from alphacut.rve.prism.model import PrismModel
-
-    model = PrismModel(size, layers, outline=cell.outline)
-    fields = prism.cell_fields(model, cell.radius, cell.matrix, cell.inclusion)
-    data = {}
-    for load in range(len(LOADS)):
-        flat = np.pad(fields.displacement[..., load], ((0, 0), (0, 1)))
-        data[f"displacement_{load + 1}_in_half_sides"] = flat
-        for row, name in enumerate(COMPONENTS):
-            data[f"stress_{load + 1}_{name}_Pa"] = fields.stress[:, row, load]
-    return wedges(fields.points, fields.cells, fields.phase, data)
 
 
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:

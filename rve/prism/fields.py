@@ -30,6 +30,7 @@ class CellFields:
         stress: (σ11, σ22, σ12), means over the wedges of one phase that meet in a node, shape
             (n, 3, loads), in Pa.
         names: Names of the phases.
+        node: Node of the mesh that each point is, shape (n,).
     """
 
     points: Array
@@ -38,6 +39,7 @@ class CellFields:
     displacement: Array
     stress: Array
     names: tuple[str, ...]
+    node: Rows
 
 
 def cell_fields(
@@ -74,4 +76,4 @@ def cell_fields(
     np.add.at(mean, cells, stress)
     mean /= np.bincount(cells.ravel())[:, None, None]
     nodes = kept % grid.nodes
-    return CellFields(positions[nodes], cells, grid.phase, total[nodes], mean, grid.names)
+    return CellFields(positions[nodes], cells, grid.phase, total[nodes], mean, grid.names, nodes)

@@ -1,0 +1,83 @@
+"""Files of a cell with its fields: Gmsh's, VTK's, XDMF and Abaqus's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.export.mesh import COMPONENTS, ORDER, wedges
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.io.files import say, whole_file
+from alphacut.rve.mesh.file import write
+
+if TYPE_CHECKING:
+    from alphacut.rve.prism.fields import CellFields
+
+FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf", ".inp": "abaqus"}
+"""Endings of names with the format that they mean."""
+
+
+def write_cell(fields: CellFields, path: Path) -> int:
+    """Write mesh, phases, displacements and stresses by the ending of a name; nodes written.
+
+    Gmsh's file holds the mesh once, with fields as values at the nodes of its elements; in VTK's
+    and XDMF nodes of the interface stand twice, since stresses jump there. Abaqus's has no fields.
+
+    Raises:
+        RefusedError: The name ends otherwise.
+    """
+    kind = FORMATS.get(path.suffix)
+    if kind is None:
+        allowed = f"names that end in {', '.join(FORMATS)}"
+        raise RefusedError("--export", str(path), allowed)
+    if kind == "gmsh":
+        return _write_gmsh(fields, path)
+    import meshio
+
+    mesh = wedges(fields.points, fields.cells, fields.phase, _at_points(fields))
+    if kind == "abaqus":
+        say(f"{path} holds mesh and phases; displacements and stresses go to .msh, .vtu or .xdmf")
+        mesh = _abaqus(fields)
+    if kind == "xdmf":
+        meshio.write(path, mesh, file_format=kind, data_format="XML")
+        return len(fields.points)
+    with whole_file(path) as partial:
+        meshio.write(partial, mesh, file_format=kind)
+    return len(mesh.points)
+
+
+def _write_gmsh(fields: CellFields, path: Path) -> int:
+    """By Gmsh itself, nodes once."""
+    count = int(fields.node.max()) + 1
+    points: Array = np.empty((count, 3))
+    points[fields.node] = fields.points
+    values = {name: data[fields.cells] for name, data in _at_points(fields).items()}
+    shaped = {name: x.reshape(len(x), 15, -1) for name, x in values.items()}
+    write(path, points, fields.node[fields.cells], fields.phase, fields.names, shaped)
+    return count
+
+
+def _at_points(fields: CellFields) -> dict[str, Array]:
+    """Displacements, (n, 3), and stresses, (n,), by name with their unit."""
+    data = {}
+    for load in range(fields.displacement.shape[-1]):
+        flat = np.pad(fields.displacement[..., load], ((0, 0), (0, 1)))
+        data[f"displacement_{load + 1}_in_half_sides"] = flat
+        for row, name in enumerate(COMPONENTS):
+            data[f"stress_{load + 1}_{name}_Pa"] = fields.stress[:, row, load]
+    return data
+
+
+def _abaqus(fields: CellFields) -> object:
+    """Abaqus's wedges, not mirrored, nodes once, a set of elements for each phase."""
+    import meshio
+
+    count = int(fields.node.max()) + 1
+    points: Array = np.empty((count, 3))
+    points[fields.node] = fields.points
+    cells = fields.node[fields.cells][:, ORDER]
+    sets = {name: [np.flatnonzero(fields.phase == k)] for k, name in enumerate(fields.names)}
+    return meshio.Mesh(points, [("wedge15", cells)], cell_sets=sets)
