@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.dual.attained import (
     Modal,
     loads_at_named_nodes,
@@ -15,7 +16,6 @@ from alphacut.frame.dual.attained import (
     modes_at,
     outputs_at,
 )
-from alphacut.frame.dual.expansion import Expansion
 from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
@@ -66,15 +66,16 @@ class Box:
         points[..., self.active] += ((self.high - self.low) / 2)[self.active] * unit
         return np.clip(points, self.low, self.high)
 
-    def level(self, nodes: Rows | slice = slice(None)) -> Level:
-        """Models of all outputs at some nodes.
+    def level(self, nodes: Rows | slice = slice(None), allowed: Array | None = None) -> Level:
+        """Models of all outputs at some nodes; `allowed` as of `Models.of`.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
         try:
             moved = sources(self.system, self.structure)
-            return Level.of(self.structure, self.system.ground, self.time[nodes], moved)
+            time = self.time[nodes]
+            return Level.of(self.structure, self.system.ground, time, moved, allowed)
         except UnprovedError as refusal:
             if refusal.along is not None:
                 refusal.along = int(self.active[refusal.along])
@@ -150,9 +151,9 @@ class Box:
 def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:
     """The structure over a box of its inputs."""
     active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
-    inputs, d = Expansion.inputs(centre[active], radius[active]), len(active)
+    inputs, d = TaylorModel.variables(centre[active], radius[active]), len(active)
     own = {name: float(x) for name, x in zip(names, centre, strict=True)}
-    p = {name: Expansion.constant(x, d) for name, x in {**system.parameters, **own}.items()}
+    p = {name: TaylorModel.constant(x, d) for name, x in {**system.parameters, **own}.items()}
     p |= {names[int(i)]: inputs[place] for place, i in enumerate(active)}
     return classical(system, p)
 

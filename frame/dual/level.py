@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.frame.calculus.monomials import monomials
+from alphacut.frame.calculus.taylor_model import ROUND_OFF, TaylorModel
 from alphacut.frame.dual.dual_function import EXPECTED, Data, require_in_range
-from alphacut.frame.dual.eigenpairs import modes
-from alphacut.frame.dual.expansion import ROUND_OFF, Expansion
-from alphacut.frame.dual.homogeneous import monomials, packed
-from alphacut.frame.dual.intervening import Group, Oscillator, oscillators
+from alphacut.frame.dual.intervening import Oscillator
+from alphacut.frame.dual.models import Models
+from alphacut.frame.dual.rest import Excitation
 from alphacut.frame.dual.slabs import Effort, bounds
 from alphacut.frame.dual.structure import Classical
-from alphacut.frame.dual.waves import Grid, Oscillators
+from alphacut.frame.dual.waves import Grid, Oscillators, spanned
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, share
 
@@ -39,8 +39,6 @@ WORK_OF_PASSES = 0.0, 0.05, 0.75, 1.0
 """Shares of the work at which the passes of a level begin and end, about."""
 BLOCK = 40
 """Nodes of a piece, about."""
-OF_GROUP = (160, 8)
-"""The same of the group's, over its own range."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +50,6 @@ class Tables:
         error: Bounds of what interpolation and round-off miss, shape (K, sources, T).
         stray: Bounds of what responses stray from straight lines in the step to a node, the same.
         grids: For each mode its points.
-        middle: Of the group, half way between its least and greatest response, (sources, T).
-        half: Half their distance, with the tables' error.
-        group_stray: As `stray`.
         time: Nodes, shape (T,), in s.
     """
 
@@ -62,34 +57,20 @@ class Tables:
     error: dict[int, Array]
     stray: dict[int, Array]
     grids: list[Grid]
-    middle: dict[int, Array]
-    half: dict[int, Array]
-    group_stray: dict[int, Array]
     time: Array
 
 
-def tables(
-    single: Sequence[Oscillator],
-    group: Group | None,
-    ground: Accelerogram | None,
-    time: Array,
-    sources: tuple[str, ...],
-    orders: Sequence[int],
-) -> Tables:
-    """Tables of all modes and of the group."""
-    points = _points(single, float(time[-1]))
-    grids = [_grid(mode.omega_range, mode.quotient_range, points) for mode in single]
-    excited = (ground if "load" in sources else None, time, sources, orders)
-    modes = [_responses(grid, *excited) for grid in grids]
-    made = [{o: np.stack([mode[o][i] for mode in modes]) for o in orders} for i in range(3)]
-    middle, half, group_stray = dict[int, Array](), dict[int, Array](), dict[int, Array]()
-    if group is not None:
-        grid = _grid(group.omega_range, group.quotient_range, OF_GROUP)
-        for order, (value, error, stray) in _responses(grid, *excited).items():
-            low, high = value.min(-1), value.max(-1)
-            middle[order], half[order] = (low + high) / 2, (high - low) / 2 + error
-            group_stray[order] = stray
-    return Tables(made[0], made[1], made[2], grids, middle, half, group_stray, time)
+def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -> Tables:
+    """Tables of all oscillators; `orders` are those of all outputs."""
+    ground, time, sources = excitation
+    points, different = _points(single, float(time[-1])), sorted(map(int, set(orders)))
+    grids = [spanned(mode.omega_range, mode.quotient_range, points) for mode in single]
+    modes = [
+        _responses(grid, ground if "load" in sources else None, time, sources, different)
+        for grid in grids
+    ]
+    made = [{o: np.stack([mode[o][i] for mode in modes]) for o in different} for i in range(3)]
+    return Tables(made[0], made[1], made[2], grids, time)
 
 
 def _responses(
@@ -120,39 +101,30 @@ def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
     return (int(np.clip(most[0], *POINTS[0])) + 1, int(np.clip(most[1], *POINTS[1])) + 1)
 
 
-def _grid(
-    omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
-) -> Grid:
-    """Points that span a range; at least two along each axis."""
-    q = quotient if quotient[1] > quotient[0] else (quotient[0], quotient[0] + 1e-12)
-    w = omega if omega[1] > omega[0] * (1 + 1e-12) else (omega[0], omega[0] * (1 + 1e-9))
-    return Grid(
-        *(np.asarray(np.linspace(*x, n), float) for x, n in zip((w, q), points, strict=True))
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Level:
     """One level's models and tables.
 
     Args:
         structure: The structure over the level's box.
-        single: Its single modes.
-        group: The others, or None.
-        tables: Responses.
+        models: Its motion.
+        tables: Responses of its oscillators.
         sources: Names of what moves the structure.
     """
 
     structure: Classical
-    single: list[Oscillator]
-    group: Group | None
+    models: Models
     tables: Tables
     sources: tuple[str, ...]
 
+    @property
+    def single(self) -> list[Oscillator]:
+        """Oscillators, one a mode that is enclosed."""
+        return self.models.single
+
     def within(self, low: Array, high: Array) -> Level:
         """The same models over a part of the box, low ≤ u ≤ high."""
-        group = self.group and self.group.within(low, high)
-        return replace(self, single=[mode.within(low, high) for mode in self.single], group=group)
+        return replace(self, models=self.models.within(low, high))
 
     @classmethod
     def of(
@@ -161,18 +133,16 @@ class Level:
         ground: Accelerogram | None,
         time: Array,
         sources: tuple[str, ...],
+        allowed: Array | None = None,
     ) -> Level:
-        """The level of a structure over its box.
+        """The level of a structure over its box; `allowed` as of `Models.of`.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
-        single, group = oscillators(structure, modes(structure), sources)
-        if not single:
-            raise UnprovedError("no mode keeps clear of the others", "take narrower inputs")
-        orders = sorted({int(order) for order in structure.order})
-        made = tables(single, group, ground, time, sources, orders)
-        return cls(structure, single, group, made, sources)
+        excitation = (ground, time, sources)
+        models = Models.of(structure, excitation, allowed)
+        return cls(structure, models, tables(models.single, excitation, structure.order), sources)
 
     def bounds(
         self, enough: Array, slabs: int, steps: int, workers: int, tick: Progress | None = None
@@ -229,9 +199,9 @@ class Level:
             total: Array = np.zeros(len(made.time))
             for k, mode in enumerate(self.single):
                 total = total + mode.share.size()[:, o] @ made.stray[order][k]
-            if self.group is not None:
-                total = total + self.group.doubt.size()[:, o] @ made.group_stray[order]
-            columns.append(total)
+            for rest in self.models.rests:
+                total = total + rest.stray[:, o]
+            columns.append(total + self.models.strays[:, o])
         return np.stack(columns, -1)
 
 
@@ -296,10 +266,10 @@ class Problem:
         self.out[0, nodes] = np.minimum(self.out[0, nodes], out[0])
 
 
-def _ends(every: Sequence[Sequence[Expansion]]) -> tuple[Array, Array]:
+def _ends(every: Sequence[Sequence[TaylorModel]]) -> tuple[Array, Array]:
     """Centres and radii of variables, one row a mode."""
     return (
-        np.array([[float(x.parts[0]) for x in row] for row in every]),
+        np.array([[float(x.value) for x in row] for row in every]),
         np.array([[_spread(x) for x in row] for row in every]),
     )
 
@@ -335,20 +305,24 @@ def _models(level: Level, o: int) -> list[Array]:
 
 
 def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
-    """The last fields of `Data`, the group's, and all constants at all nodes, (2, T)."""
-    made, d, order = level.tables, level.structure.rayleigh.inner, int(level.structure.order[o])
+    """The last fields of `Data`, of modes known by sums, and all constants at all nodes, (2, T)."""
+    made, order = level.tables, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(made.time)))
+    constant[1] = level.models.added[:, o]
     for k, mode in enumerate(level.single):
         constant[1] += mode.share.size()[:, o] @ made.error[order][k]
-    if level.group is None:
+    d, sources = level.structure.rayleigh.inputs, range(len(level.sources))
+    if not level.models.rests:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
-    share, doubt = level.group.share[:, o], level.group.doubt[:, o]
-    wave = np.concatenate([made.middle[order], side * made.half[order]])
-    rows = [_scaled(one[s], 1.0) for one in (share, doubt) for s in range(len(level.sources))]
-    linear, quadratic, cubic, rest = _stacked(rows)
-    constant[0] += side * share.parts[0] @ made.middle[order]
-    constant[1] += doubt.parts[0] @ made.half[order]
-    constant[1] += (rest + np.abs(cubic).sum(1)) @ np.abs(wave)
+    waves, rows = list[Array](), list[tuple[Array, ...]]()
+    for rest in level.models.rests:
+        middle, half = rest.middle[:, o], rest.half[:, o]
+        waves += [middle, side * half]
+        rows += [_scaled(model[s, o], 1.0) for model in (rest.share, rest.doubt) for s in sources]
+        constant[0] += side * rest.share.value[:, o] @ middle
+        constant[1] += rest.doubt.value[:, o] @ half
+    wave, (linear, quadratic, cubic, beyond) = np.concatenate(waves), _stacked(rows)
+    constant[1] += (beyond + np.abs(cubic).sum(1)) @ np.abs(wave)
     return [wave, linear, quadratic], constant
 
 
@@ -356,18 +330,18 @@ def _stacked(rows: Sequence[tuple[Array, ...]]) -> list[Array]:
     return [np.stack(column) for column in zip(*rows, strict=True)]
 
 
-def _spread(x: Expansion) -> float:
-    return max(float(x.spread()), 1e-9 * abs(float(x.parts[0])), LEAST_SPREAD)
+def _spread(x: TaylorModel) -> float:
+    return max(float(x.spread()), 1e-9 * abs(float(x.value)), LEAST_SPREAD)
 
 
-def _scaled(x: Expansion, radius: float) -> tuple[Array, ...]:
-    """Linear, packed quadratic and cubic parts, and the bound of the rest, over radius."""
-    bend, twist = (packed(x.parts[m], m) / radius for m in (2, 3))
+def _scaled(x: TaylorModel, radius: float) -> tuple[Array, ...]:
+    """Linear, quadratic and cubic coefficients, and the bound of the rest, over radius."""
     # pairs by rows, as the kernel has them
-    lists = monomials(x.inner, 2)
+    lists = monomials(x.inputs, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
-    rest = np.asarray((x.rest + ROUND_OFF * np.abs(x.parts[0])) / radius)
-    return np.asarray(x.parts[1] / radius), bend[order], np.asarray(twist), rest
+    rest = np.asarray(x.rest + ROUND_OFF * np.abs(x.value))
+    linear, quadratic, cubic = (x.part(degree) for degree in (1, 2, 3))
+    return linear / radius, quadratic[order] / radius, cubic / radius, rest / radius
 
 
 def _blocks(nodes: Rows) -> list[Rows]:

@@ -50,6 +50,9 @@ NEAR = 1e-3
 """Share of the box about the modal inputs over which modes are enclosed if any part of the box can
 be proved."""
 
+DOUBT = 0.1
+"""Share of a gap that modes may take which are not enclosed."""
+
 
 @dataclass(frozen=True)
 class DualProof:
@@ -108,7 +111,7 @@ class DualProof:
         ends = np.stack([boxes.lower[0], boxes.upper[0]])
         near = boxes.modal + NEAR * (ends - boxes.modal)
         if (near[1] > near[0]).any():
-            Box(flow.system, boxes.names, flow.time, *near).level(np.arange(2))
+            Box(flow.system, boxes.names, flow.time, *near).level(np.arange(2), np.full(len(flow.outputs), np.inf))
         return float(self.slabs * self.steps)
 
     def bounds(
@@ -154,7 +157,8 @@ class _Bounding:
         self.needed, self.outer = goal.needed[k], goal.outer[k].copy()
         self.top = goal.incumbent[k].copy()
         self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
-        self.level = box.level(self.nodes)
+        gap = proof.gap if self.needed.all() else proof.peaks
+        self.level = box.level(self.nodes, DOUBT * gap * goal.peak)
         d = len(box.active)
         self.unit = np.zeros((*self.outer.shape, d))
         self.shares = np.zeros((*self.outer.shape[1:], d))

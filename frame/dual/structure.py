@@ -6,20 +6,20 @@ undamped modes uncouple the motion; what else a structure has is refused with th
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 
 import numpy as np
 
-from alphacut.frame.dual.expansion import Expansion, product, stacked
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.matrix import Factor, MatrixStructure, Terms, value_of
 from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
 
-Inputs = Mapping[str, Expansion]
+Inputs = Mapping[str, TaylorModel]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +39,15 @@ class Classical:
         ratio: ζ_k of the modes by rising frequency, V = (n,).
     """
 
-    mass: Expansion
-    stiffness: Expansion
+    mass: TaylorModel
+    stiffness: TaylorModel
     rows: Array
-    factor: Expansion
+    factor: TaylorModel
     order: Array
-    start: Expansion
+    start: TaylorModel
     pattern: Array
-    rayleigh: Expansion
-    ratio: Expansion
+    rayleigh: TaylorModel
+    ratio: TaylorModel
 
 
 @singledispatch
@@ -81,8 +81,8 @@ def _(system: StoreyFrame, p: Inputs) -> Classical:
     start = stacked([_of_floors(system, p, f"{x}{{}}_0") for x in "qv"])
     ratios = [p[name] for name in system.ratios]
     return Classical(
-        combined(_of_floors(system, p, "m{}"), np.eye(n)[:, :, None] * np.eye(n)[:, None]),
-        combined(elastic, below[:, :, None] * below[:, None]),
+        _of_floors(system, p, "m{}").contract(np.eye(n)[:, :, None] * np.eye(n)[:, None]),
+        elastic.contract(below[:, :, None] * below[:, None]),
         np.array(rows),
         stacked(factor),
         np.array(order),
@@ -121,12 +121,12 @@ def _(system: MatrixStructure, p: Inputs) -> Classical:
     )
 
 
-def _of_floors(system: StoreyFrame, p: Inputs, pattern: str) -> Expansion:
+def _of_floors(system: StoreyFrame, p: Inputs, pattern: str) -> TaylorModel:
     """Values of all floors, V = (n,), named as `pattern`."""
     return stacked([p[pattern.format(z + 1)] for z in range(system.floors)])
 
 
-def _springs(system: StoreyFrame, p: Inputs) -> Expansion:
+def _springs(system: StoreyFrame, p: Inputs) -> TaylorModel:
     """k_z, V = (n,), as given or 12 c E I / l³."""
     if system.stiffness:
         return _of_floors(system, p, "k{}")
@@ -135,14 +135,10 @@ def _springs(system: StoreyFrame, p: Inputs) -> Expansion:
     return own * inertia * stacked([p["E"] * 12.0])
 
 
-def _softening(system: StoreyFrame, p: Inputs) -> Expansion:
+def _softening(system: StoreyFrame, p: Inputs) -> TaylorModel:
     """P_z / l_z of the weight above, V = (n,)."""
     n = system.floors
-    above = product(
-        Expansion.constant(system.gravity * np.triu(np.ones((n, n))), p["m1"].inner),
-        _of_floors(system, p, "m{}"),
-        "ij,j->i",
-    )
+    above = _of_floors(system, p, "m{}").contract(system.gravity * np.tri(n))
     return above * _of_floors(system, p, "l{}") ** -1.0
 
 
@@ -158,13 +154,13 @@ def _refuse_dashpots(system: StoreyFrame, p: Inputs) -> None:
         )
 
 
-def _of_modes(ratios: list[Expansion], n: int, like: Expansion) -> Expansion:
+def _of_modes(ratios: list[TaylorModel], n: int, like: TaylorModel) -> TaylorModel:
     """ζ_k, V = (n,): one for all, one for each, or none."""
     each = ratios or [like[0] * 0.0]
     return stacked(each * n if len(each) == 1 else each)
 
 
-def _value(factor: Factor | str | float, p: Inputs) -> Expansion | float:
+def _value(factor: Factor | str | float, p: Inputs) -> TaylorModel | float:
     """Value of a factor over the box.
 
     Raises:
@@ -178,22 +174,20 @@ def _value(factor: Factor | str | float, p: Inputs) -> Expansion | float:
         ) from None
 
 
-def _total(terms: Terms, p: Inputs, n: int) -> Expansion:
+def _total(terms: Terms, p: Inputs, n: int) -> TaylorModel:
     """Sum of arrays times factors, V = (n, n)."""
     out = spread(next(iter(p.values())) * 0.0, np.zeros((n, n)))
     for factor, array in terms:
         value = _value(factor, p)
-        out = out + (spread(value, array) if isinstance(value, Expansion) else value * array)
+        out = out + (spread(value, array) if isinstance(value, TaylorModel) else value * array)
     return out
 
 
-def spread(one: Expansion, array: Array) -> Expansion:
+def stacked(models: Sequence[TaylorModel]) -> TaylorModel:
+    """Several as one, V with a new first axis."""
+    return concatenate([x[None] for x in models], -1 - models[0].rest.ndim)
+
+
+def spread(one: TaylorModel, array: Array) -> TaylorModel:
     """One function times an array of numbers, V = the array's shape."""
-    parts = tuple(np.multiply.outer(np.asarray(array, float), part) for part in one.parts)
-    return Expansion(parts, np.multiply.outer(np.abs(array), one.rest))
-
-
-def combined(values: Expansion, arrays: Array) -> Expansion:
-    """Sum of functions V = (e,) times arrays of numbers (e, …)."""
-    parts = tuple(np.asarray(np.tensordot(arrays, part, (0, 0)), float) for part in values.parts)
-    return Expansion(parts, np.tensordot(np.abs(arrays), values.rest, (0, 0)))
+    return one[(None,) * np.ndim(array)] * array

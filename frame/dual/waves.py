@@ -38,6 +38,7 @@ class Waves:
         value: Responses, shape (T, Q, W).
         error: What they stray from bilinear interpolation at most, with rounding, shape (T,).
         stray: What they stray from straight lines in the step to each node at most, shape (T,).
+        largest: Bounds of |G| and |G'| over the grid, shape (2, T).
     """
 
     omega: Array
@@ -45,6 +46,7 @@ class Waves:
     value: Array
     error: Array
     stray: Array
+    largest: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,17 @@ class Grid:
     def sigma(self) -> Array:
         """σ of all points, shape (Q, W)."""
         return np.asarray((-self.quotient[:, None] + 1j) * self.omega)
+
+
+def spanned(
+    omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
+) -> Grid:
+    """Points that span ranges of ω and g/ω; at least two along each axis."""
+    q = quotient if quotient[1] > quotient[0] else (quotient[0], quotient[0] + 1e-12)
+    w = omega if omega[1] > omega[0] * (1 + 1e-12) else (omega[0], omega[0] * (1 + 1e-9))
+    return Grid(
+        *(np.asarray(np.linspace(*x, n), float) for x, n in zip((w, q), points, strict=True))
+    )
 
 
 class Oscillators:
@@ -99,14 +112,14 @@ class Oscillators:
             value = G[0].imag / omega * (-1.0 if source == "load" else 1.0)
             rounding /= omega
         shape = (len(self.time), len(g.quotient), len(g.omega))
-        error, size = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
-        stray = self._stray(size, source, order)
-        return Waves(g.omega, g.quotient, value.reshape(shape), error + rounding.max(-1), stray)
+        error, largest = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
+        error, stray = error + rounding.max(-1), self._stray(largest[0], source, order)
+        return Waves(g.omega, g.quotient, value.reshape(shape), error, stray, largest)
 
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool
     ) -> tuple[Array, Array]:
-        """Bounds of how far responses stray from bilinear interpolation, and sup |G|, each (T,).
+        """Bounds of what interpolation misses, (T,), and of |G| and |G'|, (2, T).
 
         Along ω at constant q, dσ = (−q + i) dω; along q, dσ = −ω dq.
         """
@@ -128,7 +141,7 @@ class Oscillators:
         else:  # Im G / ω
             along = turn * second / low + 2 * turn**0.5 * first / low**2 + 2 * zero / low**3
             across = high * second
-        return np.asarray((h**2 * along + k**2 * across) / 8), np.asarray(zero)
+        return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
     def _stray(self, size: Array, source: str, order: int) -> Array:
         """Bounds of how far responses stray from straight lines in the step to each node, (T,).

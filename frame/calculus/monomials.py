@@ -1,0 +1,97 @@
+"""Monomials of d variables: their places among all of one degree, and products of polynomials.
+
+A monomial u_i u_j … of degree m is a rising list of m variables; its place among all of that
+degree is Σ_k C(i_k + k, k + 1), k = 0 … m − 1 (the combinatorial number system). A homogeneous
+polynomial is an array whose first axis runs over the monomials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from itertools import combinations_with_replacement
+from math import comb
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array, Rows
+
+
+def count(d: int, degree: int) -> int:
+    """Number of monomials of one degree."""
+    return comb(d + degree - 1, degree) if d else int(degree == 0)
+
+
+@cache
+def monomials(d: int, degree: int) -> Rows:
+    """All rising lists of `degree` out of d variables by place, shape (monomials, degree)."""
+    lists = list(combinations_with_replacement(range(d), degree))
+    rows = np.array(lists, np.int64).reshape(len(lists), degree)
+    return rows[np.argsort(places(rows, d))]
+
+
+@cache
+def _binomials(d: int, degree: int) -> Rows:
+    """C(i + k, k + 1) for variables i and k, shape (d, degree)."""
+    return np.array([[comb(i + k, k + 1) for k in range(degree)] for i in range(d)], np.int64)
+
+
+def places(lists: Rows, d: int) -> Rows:
+    """Places of rising lists (N, m), shape (N,)."""
+    degree = lists.shape[1]
+    if degree == 0:
+        return np.zeros(len(lists), np.int64)
+    return np.asarray(_binomials(d, degree)[lists, np.arange(degree)].sum(1))
+
+
+@cache
+def product_places(d: int, m: int, q: int) -> Rows:
+    """Places of the products of all monomials of degree m with all of degree q, shape (M, Q)."""
+    a, b = monomials(d, m), monomials(d, q)
+    both = np.concatenate([np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))], axis=1)
+    return places(np.sort(both, axis=1), d).reshape(len(a), len(b))
+
+
+@cache
+def exponents(d: int, degree: int) -> Rows:
+    """How often each variable stands in each monomial, shape (monomials, d)."""
+    lists = monomials(d, degree)
+    return np.asarray((lists[:, :, None] == np.arange(d)).sum(1))
+
+
+def convolve(
+    a: Array, b: Array, degrees: tuple[int, int], d: int, bilinear: Callable[[Array, Array], Array]
+) -> Array:
+    """Product of homogeneous polynomials a and b by a bilinear product of their coefficients.
+
+    Args:
+        a: Coefficients, shape (monomials, …).
+        b: The same, of another degree.
+        degrees: Degrees of a and b.
+        d: Number of variables.
+        bilinear: Product that broadcasts over the leading axes.
+    """
+    at, total = product_places(d, *degrees), count(d, sum(degrees))
+    out = np.zeros((total, *bilinear(a[0], b[0]).shape))
+    if len(a) <= len(b):
+        for x in np.flatnonzero(a.reshape(len(a), -1).any(1)):
+            out[at[x]] += bilinear(a[x][None], b)
+    else:
+        for y in np.flatnonzero(b.reshape(len(b), -1).any(1)):
+            out[at[:, y]] += bilinear(a, b[y][None])
+    return out
+
+
+def matmul(a: Array, b: Array) -> Array:
+    """Products of matrices, as `numpy.matmul`; as one where the right factor is one alone."""
+    if b.ndim == 3 and len(b) == 1 and a.ndim > 2:
+        return np.asarray(np.tensordot(a, b[0], 1))
+    return np.asarray(np.matmul(a, b))
+
+
+def derivative(part: Array, degree: int, direction: Array) -> Array:
+    """Derivative of a homogeneous polynomial along a direction (d,), of one degree less."""
+    d = len(direction)
+    at, often = product_places(d, 1, degree - 1), exponents(d, degree - 1).T + 1
+    weight = direction[:, None] * often
+    return np.asarray(np.einsum("ib,ib...->b...", weight, part[at]))

@@ -1,0 +1,332 @@
+"""Taylor models: polynomials over the unit box with a proved bound of all that they leave out.
+
+A Taylor model stands for functions f(u) of inputs u in [−1, 1]^d: |f(u) − p(u)| ≤ rest for all u of
+the box, p a polynomial (Makino, Berz 2003). Sums, products, powers and solutions of linear systems
+of Taylor models are Taylor models. What a product has above the order kept is bounded by the sums
+of magnitudes of its factors' coefficients, a power's by the derivative of the next order. Round-off
+of the coefficients is not counted here; `ROUND_OFF` of each size is added where a bound is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from alphacut.frame.calculus.monomials import (
+    convolve,
+    count,
+    derivative,
+    matmul,
+    monomials,
+    places,
+)
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array, Rows
+
+ORDER = 3
+"""Order of a Taylor model unless another is given."""
+ROUND_OFF = 1e-11
+"""Share of a function's size that covers the round-off of its coefficients."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaylorModel:
+    """Functions of the unit box, an array of shape V of them.
+
+    Args:
+        parts: Coefficients of degree 0, 1, …, shapes (monomials, *V); missing ones are zero.
+        rest: Bound of what they leave out, shape V, never negative.
+        inputs: Number of inputs d.
+        order: Degree to which products are kept.
+    """
+
+    __array_ufunc__ = None  # an array on the left leaves the operation to the model
+
+    parts: tuple[Array, ...]
+    rest: Array
+    inputs: int
+    order: int = ORDER
+
+    @classmethod
+    def constant(cls, value: ArrayLike, inputs: int, order: int = ORDER) -> TaylorModel:
+        """Functions without dependence on the inputs, values of shape V."""
+        array = np.asarray(value, float)
+        return cls((array[None],), np.zeros(array.shape), inputs, order)
+
+    @classmethod
+    def variables(cls, centre: Array, radius: Array, order: int = ORDER) -> TaylorModel:
+        """The inputs themselves, centre + radius u, V = (d,)."""
+        parts = np.asarray(centre, float)[None], np.diag(np.asarray(radius, float))
+        return cls(parts, np.zeros(len(centre)), len(centre), order)
+
+    def like(self, value: ArrayLike) -> TaylorModel:
+        """A constant of the same inputs and order."""
+        return TaylorModel.constant(value, self.inputs, self.order)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape V."""
+        return self.rest.shape
+
+    @property
+    def value(self) -> Array:
+        """Values of the polynomials in the middle of the box, shape V."""
+        return np.asarray(self.parts[0][0])
+
+    @property
+    def T(self) -> TaylorModel:  # noqa: N802
+        """Transposed matrices, V = (m, n) for (n, m)."""
+        parts = tuple(part.swapaxes(-1, -2) for part in self.parts)
+        return TaylorModel(parts, self.rest.swapaxes(-1, -2), self.inputs, self.order)
+
+    def part(self, degree: int) -> Array:
+        """Coefficients of one degree, shape (monomials, *V)."""
+        if degree < len(self.parts):
+            return self.parts[degree]
+        return np.zeros((count(self.inputs, degree), *self.shape))
+
+    def sizes(self) -> list[Array]:
+        """Bounds of the parts over the box, each of shape V."""
+        return [np.asarray(np.abs(part).sum(0)) for part in self.parts]
+
+    def size(self) -> Array:
+        """Bound of |f| over the box, shape V."""
+        return np.asarray(sum(self.sizes()) + self.rest)
+
+    def spread(self) -> Array:
+        """Bound of |f − value|, shape V."""
+        return np.asarray(sum(self.sizes()[1:]) + self.rest)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds over the box, each of shape V."""
+        return self.value - self.spread(), self.value + self.spread()
+
+    def loosened(self, more: ArrayLike) -> TaylorModel:
+        """Functions that may be off by `more`, shape V."""
+        return TaylorModel(self.parts, self.rest + np.asarray(more), self.inputs, self.order)
+
+    def at(self, u: Array) -> Array:
+        """The polynomials' values at points u (S, d), shape (S, *V)."""
+        total: Array = np.zeros((len(u), *self.shape))
+        for degree, part in enumerate(self.parts):
+            powers = u[:, monomials(self.inputs, degree)].prod(-1)
+            total += np.tensordot(powers, part, 1)
+        return total
+
+    def present(self) -> Rows:
+        """Inputs that the functions depend on."""
+        found = np.zeros(self.inputs, bool)
+        for degree, part in enumerate(self.parts[1:], 1):
+            some = part.reshape(len(part), -1).any(1)
+            found[monomials(self.inputs, degree)[some]] = True
+        return np.flatnonzero(found)
+
+    def on(self, inputs: Rows) -> TaylorModel:
+        """The same as functions of some inputs alone; they depend on no others."""
+        d = len(inputs)
+        lists = (inputs[monomials(d, degree)] for degree in range(len(self.parts)))
+        rows = [places(chosen, self.inputs) for chosen in lists]
+        parts = tuple(part[at] for part, at in zip(self.parts, rows, strict=True))
+        return TaylorModel(parts, self.rest, d, self.order)
+
+    def among(self, inputs: Rows, d: int) -> TaylorModel:
+        """The same as functions of d inputs, of which those at `inputs` (rising) are its own."""
+        parts = []
+        for degree, part in enumerate(self.parts):
+            full = np.zeros((count(d, degree), *self.shape))
+            full[places(inputs[monomials(self.inputs, degree)], d)] = part
+            parts.append(full)
+        return TaylorModel(tuple(parts), self.rest, d, self.order)
+
+    def cut(self, order: int) -> TaylorModel:
+        """The same to a lower order, with the sizes of what is dropped in the rest."""
+        rest = self.rest + sum(self.sizes()[order + 1 :])
+        return TaylorModel(self.parts[: order + 1], np.asarray(rest), self.inputs, order)
+
+    def to_order(self, order: int) -> TaylorModel:
+        """The same, whose products are kept to another order."""
+        return (
+            TaylorModel(self.parts, self.rest, self.inputs, order)
+            if order >= self.order
+            else self.cut(order)
+        )
+
+    def within(self, low: Array, high: Array) -> TaylorModel:
+        """The same over a part of the box, low ≤ u ≤ high, as functions of its own unit box."""
+        middle, half = (low + high) / 2, (high - low) / 2
+        moved = [np.zeros_like(part) for part in self.parts]
+        for degree, part in enumerate(self.parts):
+            term = part  # (middle·∇)^k p / k!
+            for k in range(degree + 1):
+                moved[degree - k] = moved[degree - k] + term
+                if k < degree:
+                    term = derivative(term, degree - k, middle) / (k + 1)
+        parts = []
+        for degree, part in enumerate(moved):
+            scale = half[monomials(self.inputs, degree)].prod(-1)
+            parts.append(scale.reshape(-1, *[1] * self.rest.ndim) * part)
+        return TaylorModel(tuple(parts), self.rest, self.inputs, self.order)
+
+    def __getitem__(self, index: Any) -> TaylorModel:
+        key = index if isinstance(index, tuple) else (index,)
+        parts = tuple(part[(slice(None), *key)] for part in self.parts)
+        return TaylorModel(parts, self.rest[key], self.inputs, self.order)
+
+    def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        b = other if isinstance(other, TaylorModel) else self.like(_numbers(other))
+        degrees, shape = (
+            max(len(self.parts), len(b.parts)),
+            np.broadcast_shapes(self.shape, b.shape),
+        )
+        parts = []
+        for degree in range(degrees):
+            part = np.zeros((count(self.inputs, degree), *shape))
+            for x in (self, b):
+                if degree < len(x.parts):
+                    part += _padded(x.parts[degree], len(shape))
+            parts.append(part)
+        return TaylorModel(tuple(parts), self.rest + b.rest, self.inputs, max(self.order, b.order))
+
+    __radd__ = __add__
+
+    def __neg__(self) -> TaylorModel:
+        return TaylorModel(tuple(-part for part in self.parts), self.rest, self.inputs, self.order)
+
+    def __sub__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        return self + -(other if isinstance(other, TaylorModel) else _numbers(other))
+
+    def __rsub__(self, other: ArrayLike) -> TaylorModel:
+        return -self + other
+
+    def __mul__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        if isinstance(other, TaylorModel):
+            return _product(self, other, np.multiply)
+        factor = _numbers(other)
+        parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
+        return TaylorModel(parts, self.rest * np.abs(factor), self.inputs, self.order)
+
+    __rmul__ = __mul__
+
+    def __matmul__(self, other: TaylorModel | Array) -> TaylorModel:
+        if isinstance(other, TaylorModel):
+            return _product(self, other, matmul)
+        return self._linear(np.matmul, _numbers(other))
+
+    def __rmatmul__(self, other: Array) -> TaylorModel:
+        return self._linear(lambda x, factor: np.matmul(factor, x), _numbers(other))
+
+    def __truediv__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        return self * (other**-1.0 if isinstance(other, TaylorModel) else 1.0 / _numbers(other))
+
+    def __rtruediv__(self, other: ArrayLike) -> TaylorModel:
+        return self**-1.0 * other
+
+    def __pow__(self, exponent: float) -> TaylorModel:
+        """A real power of positive functions.
+
+        Raises:
+            UnprovedError: A function is not known to be positive.
+        """
+        middle, spread, N = self.value, self.spread(), self.order
+        least = middle - spread
+        if not (least > 0).all():
+            raise UnprovedError(
+                "a quantity that must be positive is not known to be so over the box",
+                "take narrower inputs",
+            )
+        step, factor = self - middle, 1.0
+        out, term = self.like(middle**exponent), self.like(np.ones_like(middle))
+        for k in range(1, N + 1):
+            factor = factor * (exponent - k + 1) / k
+            term = term * step
+            out = out + term * (factor * middle ** (exponent - k))
+        after, power = abs(factor * (exponent - N) / (N + 1)), exponent - N - 1
+        steep = np.maximum(least**power, (middle + spread) ** power)
+        return out.loosened(after * steep * spread ** (N + 1))
+
+    def contract(self, arrays: Array) -> TaylorModel:
+        """Sum of functions V = (…, e) times arrays of numbers (e, …)."""
+        return self._linear(
+            lambda x, factor: np.asarray(np.tensordot(x, factor, 1)), _numbers(arrays)
+        )
+
+    def _linear(self, bilinear: Callable[[Array, Array], Array], factor: Array) -> TaylorModel:
+        """A linear map by numbers, under which the rest stays no less than zero."""
+        rest = np.asarray(bilinear(self.rest, np.abs(factor)))
+        parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
+        return TaylorModel(parts, rest, self.inputs, self.order)
+
+
+def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
+    """Joins Taylor models along a negative `axis` of V."""
+    degrees = range(max(len(x.parts) for x in models))
+    parts = tuple(np.concatenate([x.part(k) for x in models], axis) for k in degrees)
+    rest = np.concatenate([x.rest for x in models], axis)
+    return TaylorModel(parts, rest, models[0].inputs, max(x.order for x in models))
+
+
+def inverse_bound(matrix: TaylorModel) -> Array:
+    """Bound of |A⁻¹| over the box, entry by entry, by Neumann's series, shape (n, n).
+
+    Raises:
+        UnprovedError: The series diverges.
+    """
+    first = np.linalg.inv(matrix.value)
+    ratio = np.abs(first) @ matrix.spread()
+    if np.abs(np.linalg.eigvals(ratio)).max() >= 1:
+        raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
+    return np.asarray(np.linalg.inv(np.eye(len(first)) - ratio) @ np.abs(first))
+
+
+def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
+    """Solution Y of A Y = B by series in u, with what A times it leaves of B bounded.
+
+    Args:
+        matrix: A, V = (n, n).
+        right: B, V = (n, m).
+
+    Raises:
+        UnprovedError: A may be singular.
+    """
+    d, order = matrix.inputs, max(matrix.order, right.order)
+    first, parts = np.linalg.inv(matrix.value), list[Array]()
+    for degree in range(order + 1):
+        known = right.part(degree)
+        for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
+            pair = (k, degree - k)
+            known = known - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
+        parts.append(first @ known)
+    found = TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
+    return found.loosened(inverse_bound(matrix) @ ((matrix @ found).rest + right.rest))
+
+
+def _numbers(value: ArrayLike) -> Array:
+    return np.asarray(value, float)
+
+
+def _padded(part: Array, ndim: int) -> Array:
+    """A part with V extended on the left by axes of length 1 up to `ndim` axes."""
+    missing = ndim - (part.ndim - 1)
+    return part.reshape(len(part), *[1] * max(missing, 0), *part.shape[1:])
+
+
+def _product(
+    a: TaylorModel, b: TaylorModel, bilinear: Callable[[Array, Array], Array]
+) -> TaylorModel:
+    """A product that is linear in both factors, to the higher order of both."""
+    d, order, ndim = a.inputs, max(a.order, b.order), max(a.rest.ndim, b.rest.ndim)
+    s, t = a.sizes(), b.sizes()
+    rest = bilinear(a.rest, np.asarray(sum(t)) + b.rest) + bilinear(np.asarray(sum(s)), b.rest)
+    degrees = range(min(order, len(s) + len(t) - 2) + 1)
+    parts = [np.zeros((count(d, k), *rest.shape)) for k in degrees]
+    for i, x in enumerate(a.parts):
+        for j, y in enumerate(b.parts):
+            if i + j <= order:
+                parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
+            else:
+                rest = rest + bilinear(s[i], t[j])
+    return TaylorModel(tuple(parts), np.asarray(rest), d, order)

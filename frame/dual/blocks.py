@@ -1,0 +1,310 @@
+"""Invariant subspaces K X = M X L over the whole box, with proved bounds of what series miss.
+
+A block is one mode, or several whose frequencies meet somewhere in the box, apart from the others
+(Davis, Kahan 1970; Stewart 1973). In coordinates in which the middle of the box has diagonal M and
+K, its columns X have a rotation R, given, in the p rows b of the block, which makes them smooth,
+however the block's own modes cross. Perturbation theory gives polynomials X̃(u) and L̃(u) of some
+degree N. They need no proof; what they miss, R = K X̃ − M X̃ L̃, has parts of higher degree alone,
+and is bounded over the box by the sums of magnitudes of coefficients.
+The subspace X = X̃ + Z, Z zero in the rows b, with L = L̃ + D obeys, o being all other rows,
+
+    (K − L̃_jj M)_oo Z_j = −R_j + Σ_i D_ij (M X̃_i)_o + Σ_i (D_ij + F_ij) M_oo Z_i,
+    N D = X̃ᵀR + RᵀZ + L̃ᵀW − W L̃ − W D,    N = X̃ᵀM X̃,  W = X̃ᵀM Z,  F = L̃ off its diagonal.
+
+1. The matrices on the left are bounded away from singular (`pencil`).
+2. Where bounds |Z| ≤ Y and |D| ≤ E give themselves back through these equations, Brouwer's theorem
+   gives a subspace there, at every u of the box (as Rump 2001). Products of the unknowns count
+   twice, so the map contracts: the subspace is the only one there and continuous in u.
+3. The equations' derivative is then regular, which it would not be if L shared an eigenvalue with
+   the modes outside. So no mode of a block ever meets another of outside: a block holds the same
+   numbers of modes, counted from below, as in the middle, and blocks are M-orthogonal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+
+from alphacut.frame.calculus.monomials import convolve, count, matmul
+from alphacut.frame.calculus.taylor_model import ROUND_OFF, TaylorModel, inverse_bound
+from alphacut.frame.dual.pencil import Comparison, Pencil
+from alphacut.fuzzy.arrays import Array, Rows
+
+MAX_MONOMIALS = 33_000
+"""Monomials of the series' highest degree, at most."""
+DEGREES = (4, 10)
+"""Least and greatest degree of the series."""
+FINE = 3e-4
+"""Doubt of L and of N, as a share of each, at which no higher degree is tried."""
+ROUGH = 0.05
+"""Doubt above which a block counts as not enclosed."""
+MAX_SHAPE = 10.0
+"""Bound of an entry of X, which is 1 in the block's own row, above which none is found."""
+ROUNDS = 60
+"""Most rounds in which the bounds of a block are widened until they hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """p modes over the box as one invariant subspace; vectors are rows.
+
+    Args:
+        modes: Their numbers from below, from 0, rising, shape (p,).
+        rate: Lᵀ: K x_j = Σ_i rate_ji M x_i, V = (p, p), in 1/s².
+        shape: x_j, V = (p, n).
+        moved: M x_j, V = (p, n).
+        norm: x_iᵀ M x_j, V = (p, p).
+    """
+
+    modes: Rows
+    rate: TaylorModel
+    shape: TaylorModel
+    moved: TaylorModel
+    norm: TaylorModel
+
+    @property
+    def doubt(self) -> float:
+        """Greatest doubt of L's diagonal and of N, as a share of each."""
+        rate, norm = (np.diag(x.rest) / np.diag(x.value) for x in (self.rate, self.norm))
+        return float(max(rate.max(), norm.max()))
+
+    def cut(self, order: int) -> Block:
+        """The same to a lower order."""
+        parts = (x.cut(order) for x in (self.rate, self.shape, self.moved, self.norm))
+        return Block(self.modes, *parts)
+
+    def among(self, used: Rows, inputs: int) -> Block:
+        """The same as functions of all inputs, of which those at `used` are its own."""
+        parts = (x.among(used, inputs) for x in (self.rate, self.shape, self.moved, self.norm))
+        return Block(self.modes, *parts)
+
+
+@dataclass(frozen=True, eq=False)
+class Centre:
+    """M and K over the box in coordinates in which its middle has both diagonal.
+
+    Args:
+        mass: M, V = (n, n), as functions of the inputs that M and K depend on.
+        stiffness: K, the same.
+        basis: Displacements are basis @ x, shape (n, n).
+        modes: Number of modes; the other coordinates, which follow, have no mass.
+    """
+
+    mass: TaylorModel
+    stiffness: TaylorModel
+    basis: Array
+    modes: int
+
+    @property
+    def squared(self) -> Array:
+        """λ of the modes in the middle, rising, shape (modes,), in 1/s²."""
+        return np.diag(self.stiffness.value)[: self.modes]
+
+    def apart(self, rate: float) -> Array:
+        """Diagonal of K − rate M in the middle, shape (n,)."""
+        return np.asarray(
+            np.diag(self.stiffness.value) - rate * (np.arange(len(self.basis)) < self.modes)
+        )
+
+
+Series = tuple[list[Array], list[Array], list[Array]]
+
+
+def subspace_series(
+    block: Rows, degree: int, centre: Centre, lower: Series | None = None
+) -> Series:
+    """Perturbation series of a block: Λ x_j − λ_j M₀ x_j = Σ_i L_ij e_i + what lower degrees add.
+
+    Args:
+        block: Numbers of its modes.
+        degree: Degree N.
+        centre: The structure.
+        lower: The same to a lower degree, where it is known.
+
+    Returns:
+        Coefficients of degree 0 to N of Lᵀ (monomials, p, p), of x_j and M x_j (monomials, p, n).
+    """
+    mass, stiffness, d = centre.mass, centre.stiffness, centre.mass.inputs
+    middle = centre.squared[block]
+    apart = np.stack([centre.apart(x) for x in middle])
+    apart[:, block] = np.inf
+    if lower is None:
+        unit = np.eye(len(centre.basis))[block][None]
+        lower = [np.diag(middle)[None]], [unit], [unit]
+    rate, shape, moved = (list(parts) for parts in lower)
+    for m in range(len(rate), degree + 1):
+        of_mass, of_stiffness = (
+            sum(
+                (
+                    convolve(shape[m - b], x.parts[b], (m - b, b), d, matmul)
+                    for b in range(1, min(m, len(x.parts) - 1) + 1)
+                ),
+                np.zeros((count(d, m), *shape[0].shape[1:])),
+            )
+            for x in (mass, stiffness)
+        )
+        right = middle[:, None] * of_mass - of_stiffness
+        for a in range(1, m):
+            right += convolve(rate[a], moved[m - a], (a, m - a), d, matmul)
+        rate.append(-right[:, :, block])
+        shape.append(right / apart)
+        weight = np.arange(len(centre.basis)) < centre.modes
+        moved.append(of_mass + shape[m] * weight)
+    return rate, shape, moved
+
+
+def sharpest(block: Rows, rotation: Array, centre: Centre) -> Block | None:
+    """The block by the least degree that is fine, or the greatest affordable; None if rough."""
+    series: Series | None = None
+    found = None
+    for degree in range(DEGREES[0], _max_degree(centre.mass.inputs) + 1):
+        series = subspace_series(block, degree, centre, series)
+        found = enclosed(block, rotation, series, centre)
+        if found is None and degree > DEGREES[0]:
+            break  # sizes of all degrees together stand in the way; more of them do not help
+        if found is not None and found.doubt < FINE:
+            break
+    return found if found is not None and found.doubt < ROUGH else None
+
+
+def _max_degree(d: int) -> int:
+    """The greatest degree whose monomials are affordable."""
+    degree = DEGREES[0]
+    while degree < DEGREES[1] and comb(d + degree, degree + 1) <= MAX_MONOMIALS:
+        degree += 1
+    return degree
+
+
+def _turned(series: Series, rotation: Array) -> Series:
+    """The series of the rotated columns Rᵀ x."""
+    rate, shape, moved = series
+    turn = rotation.T
+    return [turn @ x @ rotation for x in rate], [turn @ x for x in shape], [turn @ x for x in moved]
+
+
+def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Block | None:
+    """A block proved, or None where it is not enclosed."""
+    mass, stiffness = centre.mass, centre.stiffness
+    n, d, N = len(centre.basis), mass.inputs, len(series[0]) - 1
+    o = np.setdiff1d(np.arange(n), block)
+    rate, shape, moved = _turned(series, rotation)
+    order = {"inputs": d, "order": N}
+    L = TaylorModel(tuple(rate), np.zeros(rotation.shape), **order)
+    x = TaylorModel(tuple(shape), np.zeros(shape[0].shape[1:]), **order)
+    beyond = _beyond(mass, x.sizes(), N)
+    Mx = TaylorModel(tuple(moved), beyond, **order)
+    pencils = [
+        Pencil.of([part[:, j, j] for part in rate], mass, stiffness) for j in range(len(block))
+    ]
+    diagonal = np.diag(L.value)
+    systems = [
+        Comparison.of(pencil, centre.apart(float(ell)), o)
+        for pencil, ell in zip(pencils, diagonal, strict=True)
+    ]
+    if not all(system.regular for system in systems):
+        return None
+    norm = x @ Mx.T
+    if np.abs(np.linalg.eigvals(norm.spread())).max() >= 1:
+        return None
+    off = 1.0 - np.eye(len(block))
+    data = _Unknowns(
+        missed=_missed(pencils, L, x, Mx, stiffness),
+        size=x.size(),
+        side=Mx.size(),
+        coupling=L.size() * off,
+        difference=_differences(L),
+        heavy=mass.size(),
+        inverse_norm=inverse_bound(norm),
+        others=o,
+    )
+    bounds = data.bounded(systems)
+    if bounds is None:
+        return None
+    Y, E = bounds
+    wrong = Y @ data.side.T
+    norm = norm.loosened(wrong + wrong.T + Y @ data.heavy @ Y.T)
+    return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ data.heavy), norm)
+
+
+def _beyond(mass: TaylorModel, x: list[Array], N: int) -> Array:
+    """Bound of what M x̃ has above degree N, shape (p, n)."""
+    sizes = mass.sizes()
+    beyond = np.asarray(sum(x) @ mass.rest)
+    for b in range(1, len(sizes)):
+        beyond = beyond + sum(x[max(N + 1 - b, 0) :], np.zeros_like(x[0])) @ sizes[b]
+    return beyond
+
+
+def _missed(
+    pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel, stiffness: TaylorModel
+) -> Array:
+    """Bound of R = K x̃_j − Σ_i L̃_ji M x̃_i over the box, shape (p, n)."""
+    of_x, N, off = x.sizes(), L.order, 1.0 - np.eye(len(pencils))
+    of_L, of_Mx = [size * off for size in L.sizes()], Mx.sizes()
+    missed = np.zeros(x.shape) + ROUND_OFF * stiffness.size().max(1)
+    for j, pencil in enumerate(pencils):
+        t = pencil.sizes
+        missed[j] += t[-1] @ np.sum(of_x, 0)[j]
+        for m in range(1, N + 1):
+            missed[j] += t[m] @ np.sum(of_x[N + 1 - m :], 0)[j]
+    for a in range(N + 1):
+        missed += of_L[a] @ (sum(of_Mx[N + 1 - a :], np.zeros(x.shape)) + Mx.rest)
+    return missed
+
+
+def _differences(L: TaylorModel) -> Array:
+    """Bounds of |L̃_jj − L̃_ii| over the box, shape (p, p)."""
+    p = len(L.rest)
+    diagonal = L[np.arange(p), np.arange(p)]
+    return (diagonal[:, None] - diagonal[None, :]).size()
+
+
+@dataclass(frozen=True, eq=False)
+class _Unknowns:
+    """What bounds of Z and D depend on; rows as in `Block`.
+
+    Args:
+        missed: Bound of |R|, shape (p, n).
+        size: Of |x̃|, shape (p, n).
+        side: Of |M x̃|, shape (p, n).
+        coupling: Of |F|, shape (p, p).
+        difference: Of |L̃_jj − L̃_ii|, shape (p, p).
+        heavy: Of |M|, shape (n, n).
+        inverse_norm: Of |N⁻¹|, shape (p, p).
+        others: Coordinates o outside the block.
+    """
+
+    missed: Array
+    size: Array
+    side: Array
+    coupling: Array
+    difference: Array
+    heavy: Array
+    inverse_norm: Array
+    others: Rows
+
+    def bounded(self, systems: list[Comparison]) -> tuple[Array, Array] | None:
+        """Bounds Y of |Z|, (p, n), and E of |D|, (p, p), that give themselves back, if any."""
+        Y, E = np.zeros_like(self.missed), np.zeros_like(self.coupling)
+        for _ in range(ROUNDS):
+            new_Y, new_E = self._images(systems, Y, E)
+            if not (new_Y.max() < MAX_SHAPE and np.isfinite(new_E).all()):
+                return None
+            if (new_Y <= Y).all() and (new_E <= E).all():
+                return Y, E
+            Y, E = 1.02 * np.maximum(new_Y, Y), 1.02 * np.maximum(new_E, E)
+        return None
+
+    def _images(self, systems: list[Comparison], Y: Array, E: Array) -> tuple[Array, Array]:
+        """Bounds of Z and D that the equations give for those; products of both count twice."""
+        o, F = self.others, self.coupling
+        right = self.missed + E @ self.side + (F + 2 * E) @ Y @ self.heavy
+        new_Y = np.zeros_like(Y)
+        for j, system in enumerate(systems):
+            new_Y[j, o] = system.solved(right[j, o])
+        W = Y @ self.side.T
+        own = self.missed @ self.size.T + Y @ self.missed.T + self.difference * W
+        own = own + W @ F.T + F @ W + 2 * E @ W
+        return new_Y, own @ self.inverse_norm

@@ -1,0 +1,197 @@
+"""Which modes form blocks: those that meet or come near in the box, and a basis smooth there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.dual.blocks import Block, Centre, sharpest
+from alphacut.frame.dual.pencil import form_variation
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+
+NEAR = 2.0
+"""Share of their distance that two λ vary against one another from which they are a block without
+an attempt to enclose them alone, which fails at some number between 1 and 2."""
+LEAST_NEAR = 0.4
+"""The same from which a mode joins a block that is not enclosed without it."""
+MAX_BLOCK = 12
+"""Most modes of a block."""
+SWEEPS = 12
+"""Sweeps of Jacobi rotations at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Subspaces:
+    """Enclosed blocks of a structure over its box.
+
+    Args:
+        blocks: Blocks, of functions of the inputs at `used`.
+        used: Inputs that mass and stiffness depend on.
+        centre: Mass and stiffness in the coordinates of the blocks.
+        low: Least λ of all modes by number from below, shape (modes,), in 1/s².
+        high: Greatest.
+        variation: Bounds of the norms of the variations of M and K, in the order of forms.
+        along: Input whose bisection parts the closest pair that is not enclosed; None if all are.
+    """
+
+    blocks: list[Block]
+    used: Rows
+    centre: Centre
+    low: Array
+    high: Array
+    variation: tuple[float, float]
+    along: int | None
+
+    @property
+    def others(self) -> Rows:
+        """Numbers of the modes that are not enclosed, rising."""
+        taken = [block.modes for block in self.blocks]
+        return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
+
+
+def subspaces(centre: Centre, used: Rows, wanted: int) -> Subspaces:
+    """Blocks of the lowest modes, from below until one is not enclosed.
+
+    Args:
+        centre: The structure in the coordinates of the middle of the box.
+        used: Inputs that it depends on, among all.
+        wanted: How many modes.
+
+    Raises:
+        UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
+    """
+    weight = (np.arange(len(centre.basis)) < centre.modes) * 1.0
+    heavy = form_variation(centre.mass, weight)
+    stiff = form_variation(centre.stiffness, np.diag(centre.stiffness.value) ** -0.5)
+    slopes = _slopes(centre)
+    if not (heavy < 1 and stiff < 1):
+        along = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
+        raise UnprovedError("the structure may lose its stiffness", "take narrower inputs", along)
+    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes))
+    along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
+    low, high = (1 - stiff) / (1 + heavy), (1 + stiff) / (1 - heavy)
+    ends = low * centre.squared, high * centre.squared
+    return Subspaces(blocks, used, centre, *ends, (heavy, stiff), along)
+
+
+def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
+    """M and K in coordinates that make both diagonal in the middle of the box, of inputs used.
+
+    Args:
+        mass: M, V = (n, n); rows of zeros where unknowns have no mass.
+        stiffness: K, V = (n, n).
+
+    Unknowns without mass follow the others there, x_b = −K_bb⁻¹ K_ba x_a, and have coordinates of
+    their own, in which K is as large as the greatest λ.
+
+    Raises:
+        UnprovedError: The structure can move rigidly, or is unstable, in the middle.
+    """
+    massive = mass.size().any(1)
+    M, K, n = mass.value, stiffness.value, len(massive)
+    a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
+    own, turn = np.linalg.eigh(K[np.ix_(b, b)])
+    _require_stiff(own, K)
+    follow = -(turn / own) @ turn.T @ K[np.ix_(b, a)]
+    light = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
+    squared, turned = np.linalg.eigh(light @ (K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow) @ light.T)
+    _require_stiff(squared, squared)
+    basis = np.zeros((n, n))
+    basis[np.ix_(a, range(len(a)))] = light.T @ turned
+    basis[np.ix_(b, range(len(a)))] = follow @ light.T @ turned
+    basis[np.ix_(b, range(len(a), n))] = turn * np.sqrt(squared[-1] / own)
+    used = np.union1d(mass.present(), stiffness.present())
+    used = used if len(used) else np.arange(1)
+    seen = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
+    return Centre(*seen, basis, len(a)), used
+
+
+def _require_stiff(values: Array, like: Array) -> None:
+    if len(values) and values.min() <= 1e-12 * np.abs(like).max():
+        raise UnprovedError(
+            "the structure may move rigidly or lose its stiffness",
+            "take the method improved-graph-follower",
+        )
+
+
+def _slopes(centre: Centre) -> Array:
+    """∂λ_j/∂u_i in the middle, shape (modes, d)."""
+    at = np.arange(centre.modes)
+    stiff, heavy = (x.part(1)[:, at, at] for x in (centre.stiffness, centre.mass))
+    return np.asarray((stiff - centre.squared * heavy).T)
+
+
+def _couplings(centre: Centre, some: Rows) -> Array:
+    """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
+    block = (slice(None), *np.ix_(some, some))
+    mean = (centre.squared[some, None] + centre.squared[some]) / 2
+    return np.asarray(centre.stiffness.part(1)[block] - mean * centre.mass.part(1)[block])
+
+
+def _nearness(centre: Centre, slopes: Array) -> Array:
+    """How far λ_j and λ_k may vary against one another, over their distance, (modes, modes).
+
+    At 1 their series meet a point where both are equal, for complex inputs within the unit discs.
+    """
+    moved: Array = np.zeros((centre.modes, centre.modes))
+    for slope, coupling in zip(slopes.T, _couplings(centre, np.arange(centre.modes)), strict=True):
+        moved += np.abs(slope[:, None] - slope) + 2 * np.abs(coupling)
+    distance = np.abs(centre.squared[:, None] - centre.squared)
+    near = moved / np.maximum(distance, 1e-9 * centre.squared)
+    near[np.diag_indices_from(near)] = 0.0
+    return near
+
+
+def _from_below(
+    centre: Centre, slopes: Array, wanted: int
+) -> tuple[list[Block], tuple[int, int] | None]:
+    """Blocks of the lowest modes; modes that are nearest one another where it ends before."""
+    near, blocks, free = _nearness(centre, slopes), list[Block](), np.arange(centre.modes)
+    while len(free) and free[0] < wanted:
+        modes = _component(near > NEAR, free[:1], free)
+        while (found := sharpest(modes, rotation(centre, modes), centre)) is None:
+            outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
+            inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
+            if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:
+                return blocks, (int(modes[inner]), int(free[outer]))
+            modes = _component(near > NEAR, np.append(modes, free[outer]), free)
+        blocks.append(found)
+        free = np.setdiff1d(free, modes)
+    return blocks, None
+
+
+def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
+    """All free modes that are linked to some, by others or directly."""
+    while True:
+        more = np.union1d(modes, np.intersect1d(free, np.flatnonzero(linked[modes].any(0))))
+        if len(more) == len(modes):
+            return np.sort(modes)
+        modes = more
+
+
+def rotation(centre: Centre, modes: Rows) -> Array:
+    """Rotation of modes after which K − λ M is nearly diagonal in the box, shape (p, p).
+
+    Joint diagonalisation of the middle and of all first derivatives by Jacobi rotations (Cardoso,
+    Souloumiac 1996): modes that cross go on through the crossing.
+    """
+    p = len(modes)
+    matrices = np.concatenate([np.diag(centre.squared[modes])[None], _couplings(centre, modes)])
+    turn, pairs = np.eye(p), [(i, j) for i in range(p) for j in range(i)]
+    for _ in range(SWEEPS):
+        largest = 0.0
+        for i, j in pairs:
+            h = np.stack([matrices[:, i, i] - matrices[:, j, j], 2 * matrices[:, i, j]])
+            on, off = float(h[0] @ h[0] - h[1] @ h[1]), float(2 * h[0] @ h[1])
+            angle = np.arctan2(off, on + np.hypot(on, off)) / 2
+            step = np.eye(p)
+            step[i, i] = step[j, j] = np.cos(angle)
+            step[j, i], step[i, j] = np.sin(angle), -np.sin(angle)
+            matrices, turn = step.T @ matrices @ step, turn @ step
+            largest = max(largest, abs(angle))
+        if largest < 1e-12:
+            break
+    return turn

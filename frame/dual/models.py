@@ -1,0 +1,96 @@
+"""Motion of a structure over a box: oscillators, what couples them, and all other modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from alphacut.frame.dual.clusters import Subspaces, centred, subspaces
+from alphacut.frame.dual.coupling import coupling_of
+from alphacut.frame.dual.intervening import BlockShares, Oscillator, oscillators, sources_of
+from alphacut.frame.dual.rest import Excitation, Rest, rest_of_block, rest_of_modes
+from alphacut.frame.dual.structure import Classical
+from alphacut.frame.dual.wanted import modes_wanted
+from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.fuzzy.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """A structure's motion over a box.
+
+    Args:
+        single: Oscillators, one a mode that is enclosed.
+        rests: Modes that are known by sums: those of a block, and all that are not enclosed.
+        added: Bound of what couples the oscillators of blocks, shape (T, m).
+        strays: Bound of how far blocks of several stray from straight lines between nodes, (T, m).
+        along: Input whose bisection helps to enclose more modes; None where all wanted are.
+    """
+
+    single: list[Oscillator]
+    rests: list[Rest]
+    added: Array
+    strays: Array
+    along: int | None
+
+    def within(self, low: Array, high: Array) -> Models:
+        """The same over a part of the box, low ≤ u ≤ high."""
+        single = [mode.within(low, high) for mode in self.single]
+        return replace(self, single=single, rests=[x.within(low, high) for x in self.rests])
+
+    @classmethod
+    def of(
+        cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
+    ) -> Models:
+        """Models of a structure over its box.
+
+        Args:
+            structure: The structure.
+            excitation: The record, the nodes and the names of the sources.
+            allowed: Doubt of each output that modes may leave which are not enclosed, shape (m,);
+                none unless given.
+
+        Raises:
+            UnprovedError: None of its modes can be enclosed.
+        """
+        centre, used = centred(structure.mass, structure.stiffness)
+        excited = sources_of(structure, excitation[2]) @ np.linalg.inv(centre.basis).T
+        wanted = centre.modes
+        if allowed is not None:
+            wanted = max(1, modes_wanted(structure, centre, excited, excitation, allowed))
+        found = subspaces(centre, used, wanted)
+        if not found.blocks:
+            raise UnprovedError(
+                "no mode keeps clear of the others", "take narrower inputs", found.along
+            )
+        rows = structure.rows @ centre.basis
+        shares = [BlockShares.of(block, rows, excited, used) for block in found.blocks]
+        nothing = np.zeros((len(excitation[1]), len(structure.order)))
+        models = cls([], [], nothing, nothing, found.along)
+        for of_block in shares:
+            models = models.with_block(structure, of_block, found, excitation, allowed)
+        rest = rest_of_modes(structure, found, shares, excited, excitation)
+        return models if rest is None else replace(models, rests=[*models.rests, rest])
+
+    def with_block(
+        self,
+        structure: Classical,
+        of_block: BlockShares,
+        found: Subspaces,
+        excitation: Excitation,
+        allowed: Array | None,
+    ) -> Models:
+        """With a block as oscillators, or known by its sums where that is narrower."""
+        more = oscillators(structure, of_block, found)
+        if len(more) == 1:
+            return replace(self, single=self.single + more)
+        coupling = coupling_of(structure, of_block, found)
+        added, strays = coupling.bounds(structure.order, excitation)
+        ends = coupling.omega_range, coupling.quotient_range
+        rest = rest_of_block(structure, found, of_block, ends, excitation)
+        scale = np.maximum(added.max(0) if allowed is None else allowed, 1e-300)
+        if (rest.width / scale).max() < (added.max(0) / scale).max():
+            return replace(self, rests=[*self.rests, rest])
+        added, strays = self.added + added, self.strays + strays
+        return replace(self, single=self.single + more, added=added, strays=strays)

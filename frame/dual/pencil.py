@@ -1,0 +1,165 @@
+"""The pencil K − ℓ M of a column over the box, and bounds of solutions of its linear systems.
+
+Coordinates are those in which the middle of the box has diagonal K and M (M with zeros where
+unknowns have no mass). ℓ is a polynomial near an eigenvalue; T is the pencil in all coordinates
+but those of the block that the eigenvalue belongs to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.frame.calculus.monomials import convolve, monomials
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+
+REFINED = 8
+"""Rounds that improve bounds of single entries by those of the others."""
+CORNERS = 12
+"""Inputs whose signs are all tried together."""
+
+
+def form_variation(matrix: TaylorModel, scale: Array) -> float:
+    """Bound of the norm of a symmetric form's variation over the box, in scaled coordinates."""
+    weight = scale[:, None] * scale
+    low = _linear_norm(matrix.part(1) * weight)
+    squares = _squares(matrix.inputs)
+    part = matrix.part(2) * weight
+    low += max(_norm_of_terms(sign * part, squares) for sign in (1.0, -1.0))
+    higher = sum(matrix.sizes()[3:]) + matrix.rest
+    return low + float(np.linalg.norm(weight * higher, 2))
+
+
+def _linear_norm(terms: Array) -> float:
+    """Greatest norm of Σ_i u_i V_i over the box: the largest V_i at all corners, others in sum."""
+    terms = terms[np.argsort(-np.linalg.norm(terms, axis=(1, 2)))]
+    first, others = terms[:CORNERS], terms[CORNERS:]
+    signs = 1 - 2 * (np.arange(2 ** (len(first) - 1))[:, None] >> np.arange(len(first)) & 1)
+    at_corners = np.abs(np.linalg.eigvalsh(np.tensordot(signs, first, 1))).max()
+    return float(at_corners) + _norm_of_terms(others, np.zeros(len(others), bool))
+
+
+def _norm_of_terms(terms: Array, squares: Mask) -> float:
+    """Norm of Σ_α |V_α| in the order of forms, of squares u_i² without what raises the form."""
+    some = terms.any((1, 2))
+    if not some.any():
+        return 0.0
+    value, vector = np.linalg.eigh(terms[some])
+    lowers = np.where(squares[some, None], np.maximum(-value, 0.0), np.abs(value))
+    total = np.einsum("aij,aj,akj->ik", vector, lowers, vector, optimize=True)
+    return float(np.linalg.norm(total, 2))
+
+
+def _squares(d: int) -> Mask:
+    lists = monomials(d, 2)
+    return np.asarray(lists[:, 0] == lists[:, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """Parts of K − ℓ M.
+
+    Args:
+        sizes: Bounds of the parts of degree 0 (none), 1, … N, and of the rest, each (n, n).
+        linear: Coefficients of degree 1, in which what moves all frequencies alike cancels.
+        quadratic: The same of degree 2.
+    """
+
+    sizes: list[Array]
+    linear: Array
+    quadratic: Array
+
+    @classmethod
+    def of(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
+        """The pencil of ℓ with coefficients (monomials,) of degree 0 to N."""
+        N, d = len(rate) - 1, mass.inputs
+        ell, of_k, of_m = (
+            [float(np.abs(part).sum()) for part in rate],
+            [*stiffness.sizes()],
+            mass.sizes(),
+        )
+        sizes = [np.zeros_like(mass.rest) for _ in range(N + 2)]
+        for m in range(1, len(of_k)):
+            sizes[m] = sizes[m] + of_k[m]
+        for a in range(N + 1):
+            for b in range(len(of_m)):
+                if (a, b) != (0, 0):
+                    sizes[min(a + b, N + 1)] += ell[a] * of_m[b]
+        sizes[-1] = sizes[-1] + sum(ell) * mass.rest + stiffness.rest
+        parts = []
+        for m in (1, 2):
+            part = stiffness.part(m)
+            for a in range(max(0, m + 1 - len(mass.parts)), m + 1):
+                scaled = rate[a][:, None, None]
+                part = part - convolve(scaled, mass.parts[m - a], (a, m - a), d, np.multiply)
+            parts.append(part)
+            sizes[m] = np.minimum(sizes[m], np.abs(part).sum(0))
+        return cls(sizes, *parts)
+
+    def loss(self, o: Rows, distance: Array, sign: float) -> float:
+        """Bound of how far the block o, scaled by distances, of its sign × T falls over the box."""
+        if not len(o):
+            return 0.0
+        block, weight = np.ix_(o, o), sign / np.sqrt(np.outer(distance, distance))
+        norms = [float(np.linalg.norm(size[block] * weight, 2)) for size in self.sizes[1:]]
+        line, bend = (part[:, o[:, None], o] * weight for part in (self.linear, self.quadratic))
+        norms[0] = min(norms[0], _linear_norm(line))
+        squares = _squares(len(line))
+        norms[1] = min(norms[1], _norm_of_terms(bend, squares))
+        return sum(norms)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Bounds of solutions of T y = r: by Ostrowski's comparison matrix, or in the norm √Σ D y².
+
+    With A = D^-½ T D^-½ and J = diag ±1, as T_jj is positive or negative, (J y)·A y has no part of
+    the blocks that join those above to those below. So |A y| ≥ least |y| where neither the block
+    above nor that below, with its sign turned, falls under `least`.
+
+    Args:
+        distance: D = |T_jj| in the middle of the box, shape (n − p,).
+        diagonal: Bound of |T_jj| from below.
+        off: Bounds of |T_jl|, j ≠ l, from above, shape (n − p, n − p).
+        inverse: Of the comparison matrix; None where it has a negative entry.
+        least: Bound of both blocks of J A from below.
+    """
+
+    distance: Array
+    diagonal: Array
+    off: Array
+    inverse: Array | None
+    least: float
+
+    @classmethod
+    def of(cls, pencil: Pencil, apart: Array, o: Rows) -> Comparison:
+        """Bounds over the box; `apart` are the T_jj in its middle, o all but the block."""
+        total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
+        distance, above = np.abs(apart[o]), apart[o] > 0
+        blocks = ((above, 1.0), (~above, -1.0))
+        least = 1 - max(pencil.loss(o[some], distance[some], sign) for some, sign in blocks)
+        diagonal, off = distance - np.diag(total), total - np.diag(np.diag(total))
+        inverse = np.asarray(np.linalg.inv(np.diag(diagonal) - off), float)
+        positive = bool((inverse >= 0).all() and (diagonal > 0).all())
+        return cls(distance, diagonal, off, inverse if positive else None, least)
+
+    @property
+    def regular(self) -> bool:
+        """True if T is singular nowhere in the box."""
+        return self.inverse is not None or self.least > 0
+
+    def solved(self, right: Array) -> Array:
+        """Bounds of |y| where |r| ≤ right, shape (n − p,)."""
+        scale = self.distance**-0.5
+        y: Array = np.full(len(right), np.inf)
+        if self.least > 0:
+            y = np.asarray(scale * np.linalg.norm(scale * right) / self.least)
+        if self.inverse is not None:
+            y = np.minimum(y, self.inverse @ right)
+        positive = self.diagonal > 0
+        divisor = np.where(positive, self.diagonal, 1.0)
+        for _ in range(REFINED):
+            y = np.where(positive, np.minimum(y, (right + self.off @ y) / divisor), y)
+        return y

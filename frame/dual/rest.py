@@ -1,0 +1,268 @@
+"""What the modes have together that are not enclosed: sums over all modes, less the others.
+
+With a_k = r·φ_k and β_k = φ_k·M v, sums over all modes are known without them: Σ a β = r·v,
+Σ a² = r·M⁻¹ r, Σ β² = v·M v, and with λ in the denominator r·K⁻¹ M v, r·K⁻¹ r, (M v)·K⁻¹ M v. What
+the enclosed modes leave of them is C, A and B. By Cauchy and Schwarz the others' motion is within
+
+    C e ± √(A B) Δe            of mass:       e ± Δe holds all their responses;
+    ± √(A B) sup |ω e|         of both:       A of stiffness, B of mass;
+    C ε ± √(A B) Δε            of stiffness:  ε ± Δε holds all λ e, about the static motion C ε.
+
+The least of the three is taken. For √(A B) stands (A t + B/t)/2, t a number, which is no less and
+a Taylor model: at inputs where A is large B is often small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from alphacut.frame.calculus.monomials import convolve, matmul
+from alphacut.frame.calculus.taylor_model import ROUND_OFF, TaylorModel, solve
+from alphacut.frame.dual.clusters import Subspaces
+from alphacut.frame.dual.intervening import DEGREE, BlockShares, Ends, damped_range, dots
+from alphacut.frame.dual.ranges import Ranges, response_ranges
+from alphacut.frame.dual.structure import Classical
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.fuzzy.arrays import Array
+
+Excitation = tuple[Accelerogram | None, Array, Sequence[str]]
+"""The record, the nodes, and the names of what moves the structure."""
+UNKNOWN = 1e60
+"""Stands for a sum that is not known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Modes that are known by sums.
+
+    Args:
+        share: C, V = (sources, m).
+        doubt: Bound of √(A B), V = (sources, m).
+        middle: Middle of the responses that the share is multiplied by, shape (sources, m, T).
+        half: Half their range, that the doubt is multiplied by.
+        stray: Bound of how far the motion strays from straight lines between nodes, (T, m).
+    """
+
+    share: TaylorModel
+    doubt: TaylorModel
+    middle: Array
+    half: Array
+    stray: Array
+
+    @property
+    def width(self) -> Array:
+        """Bound of the half width at the node where it is greatest, shape (m,)."""
+        return np.asarray((self.doubt.size()[..., None] * self.half).max(-1).sum(0))
+
+    def within(self, low: Array, high: Array) -> Rest:
+        """The same over a part of the box, low ≤ u ≤ high."""
+        share, doubt = (x.within(low, high) for x in (self.share, self.doubt))
+        return replace(self, share=share, doubt=doubt)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over modes, without the outputs' factors.
+
+    Args:
+        shares: Σ a β and Σ a β / λ, V = (sources, m) each.
+        outputs: Σ a² and Σ a² / λ, V = (m,) each.
+        sources: Σ β² and Σ β² / λ, V = (sources,) each.
+    """
+
+    shares: tuple[TaylorModel, TaylorModel]
+    outputs: tuple[TaylorModel, TaylorModel]
+    sources: tuple[TaylorModel, TaylorModel]
+
+    def less(self, other: _Sums) -> _Sums:
+        """What another's leave, with round-off of the difference."""
+
+        def left(a: TaylorModel, b: TaylorModel) -> TaylorModel:
+            return (a - b).loosened(ROUND_OFF * a.size())
+
+        return _Sums(
+            (self.shares[0] - other.shares[0], self.shares[1] - other.shares[1]),
+            (left(self.outputs[0], other.outputs[0]), left(self.outputs[1], other.outputs[1])),
+            (left(self.sources[0], other.sources[0]), left(self.sources[1], other.sources[1])),
+        )
+
+
+def rest_of_modes(
+    structure: Classical,
+    found: Subspaces,
+    shares: Sequence[BlockShares],
+    excited: TaylorModel,
+    excitation: Excitation,
+) -> Rest | None:
+    """All modes that are not enclosed; None if there are none.
+
+    Args:
+        structure: The structure.
+        found: Its enclosed modes.
+        shares: What they take and give.
+        excited: Sources in the coordinates of `found`, V = (sources, n).
+        excitation: The record, the nodes and the names of the sources.
+    """
+    others = found.others
+    if not len(others):
+        return None
+    sums = _of_all(structure, found, excited)
+    for of_block in shares:
+        sums = sums.less(_of_block(of_block))
+    low, high = float(found.low[others].min()), float(found.high[others].max())
+    ends = damped_range(structure, low, high, others)
+    return _known_by(sums, ends, structure, found, excitation)
+
+
+def rest_of_block(
+    structure: Classical,
+    found: Subspaces,
+    of_block: BlockShares,
+    ends: tuple[Ends, Ends],
+    excitation: Excitation,
+) -> Rest:
+    """The modes of a block, known by their sums; `ends` are those of ω and g/ω."""
+    return _known_by(_of_block(of_block), ends, structure, found, excitation)
+
+
+def _known_by(
+    sums: _Sums,
+    ends: tuple[Ends, Ends],
+    structure: Classical,
+    found: Subspaces,
+    excitation: Excitation,
+) -> Rest:
+    """Modes of which sums and the ranges of ω and g/ω are known."""
+    orders = sorted({int(order) for order in structure.order})
+    ranges = response_ranges(*ends, *excitation, orders)
+    return _least(structure, _bounds(sums, structure, found), ranges)
+
+
+def _of_all(structure: Classical, found: Subspaces, excited: TaylorModel) -> _Sums:
+    """Sums over all modes."""
+    centre, order = found.centre, DEGREE
+    mass, stiffness = centre.mass, centre.stiffness
+    if (excited - excited.value).size().any():
+        order, d = excited.order, excited.inputs
+        mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))
+    else:
+        excited = mass.like(excited.value)
+    mass, stiffness = mass.to_order(order), stiffness.to_order(order)
+    rows = stiffness.like(structure.rows @ centre.basis)
+    massive, light = slice(0, centre.modes), slice(centre.modes, None)
+    heavy, stiff = found.variation
+    forced = excited @ mass
+    of_mass = _diagonal(
+        _inverse_form(mass[massive, massive], rows[:, massive], rows[:, massive], 1 - heavy)
+    )
+    of_stiffness = _diagonal(_inverse_form(stiffness, rows, rows, 1 - stiff))
+    if centre.modes < len(centre.basis):
+        followers = rows[:, light]
+        within = _inverse_form(stiffness[light, light], followers, followers, 1 - stiff)
+        of_stiffness = of_stiffness - _diagonal(within)
+        of_mass = of_mass.loosened(np.where(followers.size().any(1), UNKNOWN, 0.0))
+    return _Sums(
+        (excited @ rows.T, _inverse_form(stiffness, forced, rows, 1 - stiff)),
+        (of_mass, of_stiffness),
+        (
+            _diagonal(forced @ excited.T),
+            _diagonal(_inverse_form(stiffness, forced, forced, 1 - stiff)),
+        ),
+    )
+
+
+def _inverse_form(
+    matrix: TaylorModel, left: TaylorModel, right: TaylorModel, least: float
+) -> TaylorModel:
+    """Form left A⁻¹ rightᵀ of rows V = (l, n) and (r, n), by series whose residuals meet in A⁻¹.
+
+    Args:
+        matrix: A, diagonal in the middle of the box, V = (n, n).
+        left: Rows.
+        right: Rows.
+        least: A is no less than this times its middle, in the order of forms.
+    """
+    middle = np.diag(matrix.value)
+    x, left_missed = _row_series(matrix, left)
+    y, right_missed = _row_series(matrix, right)
+    norms = (np.sqrt((missed**2 / middle).sum(1)) for missed in (left_missed, right_missed))
+    return (x @ right.T).loosened(left_missed @ y.size().T + np.outer(*norms) / least)
+
+
+def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Array]:
+    """Series of rows A⁻¹, and a bound of what they times A leave of the rows."""
+    middle, parts = np.diag(matrix.value), list[Array]()
+    for degree in range(matrix.order + 1):
+        known = rows.part(degree)
+        for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
+            pair = (degree - k, k)
+            known = known - convolve(parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul)
+        parts.append(known / middle)
+    found = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
+    return found, (found @ matrix).rest + rows.rest
+
+
+def _of_block(of_block: BlockShares) -> _Sums:
+    """Sums over the modes of a block, whose projected stiffness is N L."""
+    projected = of_block.block.norm @ of_block.block.rate.T
+    read, driven = of_block.read, of_block.driven
+    flexible, pushed = solve(projected, read), solve(projected, driven)
+    return _Sums(
+        (of_block.answer.T @ read, driven.T @ flexible),
+        (of_block.of_outputs, dots(read, flexible)),
+        (of_block.of_sources, dots(driven, pushed)),
+    )
+
+
+def _diagonal(matrix: TaylorModel) -> TaylorModel:
+    at = np.arange(len(matrix.rest))
+    return matrix[at, at]
+
+
+def _bounds(
+    sums: _Sums, structure: Classical, found: Subspaces
+) -> list[tuple[TaylorModel, TaylorModel]]:
+    """C and the bound of √(A B) for each power of λ, V = (sources, m), with outputs' factors."""
+    d, order = structure.start.inputs, structure.start.order
+    (C0, C1), (A0, A1), (B0, B1) = (
+        [x.cut(order) if x.inputs == d else x.cut(order).among(found.used, d) for x in pair]
+        for pair in (sums.shares, sums.outputs, sums.sources)
+    )
+    pairs = ((C0, A0, B0), (C0 * 0.0, A1, B0), (C1, A1, B1))
+    factor = structure.factor
+    return [(C * factor, _root(A, B) * factor) for C, A, B in pairs]
+
+
+def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
+    """Bound (A t + B/t)/2 of √(A B) for A, V = (m,), and B, V = (sources,), V = (sources, m)."""
+    of_A, of_B = (np.maximum(x.bounds()[1], 1e-300) for x in (A, B))
+    t = np.sqrt(of_B[:, None] / of_A)
+    return A[None] * (t / 2) + B[:, None] * (0.5 / t)
+
+
+def _least(
+    structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
+) -> Rest:
+    """The bound of each source and output whose doubt is least at its largest."""
+    middle, half, stray = (
+        np.stack([part(ranges[int(order)]) for order in structure.order], 2)
+        for part in (
+            lambda x: (x.low + x.high) / 2,
+            lambda x: (x.high - x.low) / 2,
+            lambda x: x.stray,
+        )
+    )  # (powers, sources, m, T)
+    middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]
+    doubts = np.stack([doubt.size() for _, doubt in bounds])
+    best = (doubts * half.max(-1)).argmin(0)
+    chosen = [(best == k) * 1.0 for k in range(len(bounds))]
+    share, doubt = (
+        sum((pair[i] * mask for pair, mask in zip(bounds, chosen, strict=True)), 0.0)
+        for i in range(2)
+    )
+    s, o = np.indices(best.shape)
+    strays = (doubts[..., None] * stray).min(0).sum(0)
+    return Rest(share, doubt, middle[best, s, o], half[best, s, o], strays.T)

@@ -1,0 +1,77 @@
+"""How many modes are worth enclosing: an estimate at the middle of the box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.dual.blocks import Centre
+from alphacut.frame.dual.ranges import POWERS
+from alphacut.frame.dual.rest import Excitation
+from alphacut.frame.dual.structure import Classical
+from alphacut.frame.dual.waves import Grid, Oscillators
+from alphacut.fuzzy.arrays import Array
+
+MAX_NODES = 500
+"""Nodes at which responses are compared."""
+
+
+def modes_wanted(
+    structure: Classical,
+    centre: Centre,
+    excited: TaylorModel,
+    excitation: Excitation,
+    allowed: Array,
+) -> int:
+    """Least number of modes from below beside which the others' doubt is allowed.
+
+    The doubt is that of `rest`, with sums and responses in the middle of the box.
+
+    Args:
+        structure: The structure.
+        centre: Its modes in the middle of the box.
+        excited: Sources in the coordinates of `centre`, V = (sources, n).
+        excitation: The record, the nodes and the names of the sources.
+        allowed: Doubt of each output, shape (m,).
+    """
+    ground, time, sources = excitation
+    time = time[:: -(-len(time) // MAX_NODES)]
+    squared, n = centre.squared, centre.modes
+    read = (structure.rows @ centre.basis)[:, :n] * structure.factor.value[:, None]
+    given = excited.value[:, :n]
+    light = (structure.rows @ centre.basis)[:, n:].any(1)
+    a, b = structure.rayleigh.value
+    decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
+    omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
+    doubt = np.zeros((n, len(allowed)))
+    tables = [Oscillators(_point(x), ground, time) for x in zip(omega, decay / omega, strict=True)]
+    for o, order in enumerate(structure.order):
+        for s, source in enumerate(sources):
+            waves = np.stack([table.waves(source, int(order)).value.ravel() for table in tables])
+            each = []
+            for power in POWERS:
+                row, share = (
+                    _above(x**2 / squared**p)
+                    for x, p in ((read[o], float(power > 0)), (given[s], float(power == 1)))
+                )
+                scaled = waves * squared[:, None] ** power
+                high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
+                half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2
+                each.append(np.sqrt(row * share) * half.max(1))
+            doubt[:, o] += np.min(each[light[o] :], axis=0)
+    enough = (doubt <= allowed).all(1)
+    return int(enough.argmax()) if enough.any() else n
+
+
+def _point(at: tuple[float, float]) -> Grid:
+    return Grid(np.array([at[0]]), np.array([at[1]]))
+
+
+def _with_below(x: Array) -> Array:
+    """Each row as the one before: ranges reach down to the mode below, as frequencies vary."""
+    return np.concatenate([x[:1], x[:-1]])
+
+
+def _above(x: Array) -> Array:
+    """Sums of each entry and all that follow."""
+    return np.asarray(np.cumsum(x[::-1])[::-1])
