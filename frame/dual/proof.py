@@ -3,7 +3,7 @@
 1. A linear structure with classical modes answers as Σ_k F_k(z_k): z_k are few intervening
    variables of mode k (section 7), its frequency, its decay and its shares, F_k the exact
    response of one oscillator. They bend little over the box: z = Z u + quadratic terms + R, |R|
-   proved (`eigenpairs`, `intervening`). The F_k stand in tables of proved error (`waves`).
+   proved (`blocks`, `intervening`). The F_k stand in tables of proved error (`waves`).
 2. For any multipliers μ
 
        max Σ_k F_k(z_k(u)) ≤ Σ_k max (F_k − μ_k·z_k) + max μ·(z − R)(u) + |μ|·R,
@@ -111,7 +111,9 @@ class DualProof:
         ends = np.stack([boxes.lower[0], boxes.upper[0]])
         near = boxes.modal + NEAR * (ends - boxes.modal)
         if (near[1] > near[0]).any():
-            Box(flow.system, boxes.names, flow.time, *near).level(np.arange(2), np.full(len(flow.outputs), np.inf))
+            Box(flow.system, boxes.names, flow.time, *near).level(
+                np.arange(2), np.full(len(flow.outputs), np.inf)
+            )
         return float(self.slabs * self.steps)
 
     def bounds(

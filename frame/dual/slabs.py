@@ -16,6 +16,10 @@ from alphacut.fuzzy.arrays import Array, Rows
 JUMPS, CLIMBS = 4, 16
 """Most steps of the model's ascent from one point: towards ends of the box, and along gradients."""
 
+TRIED, MIN_PROGRESS = 8, 0.5
+"""Slabs after which the effort for a node ends where its gap has fallen by less than this share of
+an even fall to what suffices."""
+
 
 class Effort(NamedTuple):
     """Effort that a node is worth.
@@ -220,11 +224,14 @@ def refine(
     reached = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)
     mu[:] = slabs.mu[0]
     floor = effort.floor * (constant[1] + dot(np.abs(mu), data.rest))
-    count = 1
+    count, begun = 1, slabs.value[0]
     while count < effort.slabs:
         first = int(np.argmax(slabs.value[:count]))
         aim = sufficient(reached, floor, effort, constant)
-        if slabs.value[first] <= aim or not divided(slabs, first, count):
+        even = begun - (begun - aim) * MIN_PROGRESS * count / effort.slabs
+        if slabs.value[first] <= aim or (count >= TRIED and slabs.value[first] > even):
+            break
+        if not divided(slabs, first, count):
             break
         for own in (first, count):
             reached = examine(own, node, side, data, effort.steps, aim, slabs, reached, u)
