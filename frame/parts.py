@@ -24,11 +24,11 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.structures.modes import ModalError
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError

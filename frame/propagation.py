@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.checks.step_error import (
     step_error,
     with_step_error,
@@ -28,7 +29,6 @@ from alphacut.frame.methods.search import Search
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError, require_modal_order
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.fuzzy import FuzzyNumber

@@ -24,7 +24,7 @@ from alphacut.frame.calculus.monomials import (
     monomials,
     places,
 )
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 ORDER = 3

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.attained import (
     Modal,
     loads_at_named_nodes,
@@ -20,7 +21,6 @@ from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 MOST_ENTRIES = 400_000

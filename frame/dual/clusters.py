@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.blocks import Block, Centre, sharpest
 from alphacut.frame.dual.pencil import form_variation
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 NEAR = 2.0

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 LARGEST = 1e100

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.blocks import Block
 from alphacut.frame.dual.clusters import Subspaces
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.waves import Grid
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 DEGREE = 6

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.clusters import Subspaces, centred, subspaces
 from alphacut.frame.dual.coupling import coupling_of
 from alphacut.frame.dual.intervening import BlockShares, Oscillator, oscillators, sources_of
 from alphacut.frame.dual.rest import Excitation, Rest, rest_of_block, rest_of_modes
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.wanted import modes_wanted
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array
 
 

@@ -29,6 +29,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import Boxes, UnitFlow
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.least_peaks import least_peak
 from alphacut.frame.dual.level import Problem
@@ -37,7 +38,6 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.parts import WIDE, Goal, PartBounds, can_be_halved, prove
 from alphacut.frame.structures.linear import frequencies
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import RefusedError

@@ -13,9 +13,9 @@ from functools import singledispatch
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.matrix import Factor, MatrixStructure, Terms, value_of
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
 
@@ -36,7 +36,7 @@ class Classical:
         start: Initial displacements and velocities, V = (2, n).
         pattern: ι, how the unknowns move with the ground, shape (n,).
         rayleigh: a and b, V = (2,).
-        ratio: ζ_k of the modes by rising frequency, V = (n,).
+        ratio: ζ_k of the modes by rising frequency, V = (modes,); unknowns without mass have none.
     """
 
     mass: TaylorModel
@@ -117,7 +117,7 @@ def _(system: MatrixStructure, p: Inputs) -> Classical:
         spread(nothing + 1.0, np.array(start)),
         np.ones(n) if system.pattern is None else np.asarray(system.pattern, float),
         factors,
-        _of_modes(ratios, n, factors),
+        _of_modes(ratios, len(system.massive), factors),
     )
 
 

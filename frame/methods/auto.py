@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import SHARE, UnitFlow
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -27,7 +28,6 @@ from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
 from alphacut.frame.parts import WIDE, exact, refusing
 from alphacut.frame.structures.modes import ModalError
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import real

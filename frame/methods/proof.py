@@ -18,6 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from alphacut.frame.boxes import SHARE, Boxes, UnitFlow
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
@@ -26,11 +27,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.parts import BisectionError, Goal, PartBounds, prove
-from alphacut.frame.structures.polynomial_dependence import (
-    UnprovedError,
-    degrees,
-    without_ratio,
-)
+from alphacut.frame.structures.polynomial_dependence import degrees, without_ratio
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import real

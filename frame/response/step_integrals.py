@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array
 
 UNIT_ROUNDOFF = np.finfo(float).eps / 2

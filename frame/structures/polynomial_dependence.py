@@ -11,32 +11,17 @@ from math import ceil, log, sqrt
 
 import numpy as np
 
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError
 
 Box = Mapping[str, tuple[float, float]]
 ROUND_OFF = 1e-17
 """Relative size from which on a Chebyshev coefficient counts as none: a hundredth of the precision
 that everything is computed in.
 """
-
-
-class UnprovedError(FailedError):
-    """A property that a proof needs does not hold, or is not known to hold.
-
-    Args:
-        what: The property.
-        cure: What the caller can change.
-        along: Input, by its place among those of the box, whose bisection is most likely to help;
-            None where none stands out.
-    """
-
-    def __init__(self, what: str, cure: str = "", along: int | None = None) -> None:
-        super().__init__(what, cure)
-        self.along = along
 
 
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
@@ -60,6 +45,10 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
             raise UnprovedError(f"{what}, and is known to be {own.range or 'finite'}")
     if isinstance(system, StoreyFrame):
         return _of_storey_frame(system, box)
+    if len(system.massless):
+        raise UnprovedError(
+            "unknowns without mass are condensed, which no polynomial is", "take the method dual"
+        )
     if any(map(callable, system.row_factors.values())):
         raise UnprovedError("an output has a factor that is a function of the parameters")
     for kind in ("mass", "damping", "stiffness"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import DualProof, envelope
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy import Nature
 from tests.calibration.declared import Calibration, free_seed
 from tests.calibration.motions import exact_flow, judged, random_frame, reached

@@ -7,10 +7,10 @@ import pytest
 
 from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.boxes import UnitFlow, boxes
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.parts import BisectionError, PartBounds, prove
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Interval, Triangular
 
 NAMES = ("k", "m", "z")

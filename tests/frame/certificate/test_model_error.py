@@ -20,6 +20,7 @@ from alphacut.frame import (
 )
 from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.polynomial import Polynomial
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate import model_error
 from alphacut.frame.certificate.model_error import proved_error
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
@@ -30,11 +31,7 @@ from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.structures.linear import evaluate
 from alphacut.frame.structures.modes import ModalError
-from alphacut.frame.structures.polynomial_dependence import (
-    UnprovedError,
-    degrees,
-    inverse_cube_degree,
-)
+from alphacut.frame.structures.polynomial_dependence import degrees, inverse_cube_degree
 from alphacut.fuzzy import Interval, Triangular
 
 FRAME = StoreyFrame(

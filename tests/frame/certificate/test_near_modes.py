@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, MatrixStructure, Proof, envelope
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.modes import ModalError
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Interval
 
 STEP, DURATION = 0.05, 3.0

@@ -5,6 +5,7 @@ import pytest
 from scipy.linalg import eigh, expm
 
 from alphacut.frame import MatrixStructure
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual import rest
 from alphacut.frame.dual.box import over_box, sources
 from alphacut.frame.dual.clusters import centred, subspaces
@@ -12,7 +13,6 @@ from alphacut.frame.dual.models import Models
 from alphacut.frame.dual.ranges import response_ranges
 from alphacut.frame.dual.waves import Oscillators, spanned
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""

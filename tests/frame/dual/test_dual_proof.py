@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Auto, StoreyFrame, envelope
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual import dual_function as kernel
 from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.level import Problem
@@ -14,7 +15,6 @@ from alphacut.frame.methods import auto
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.result import Nature
 

@@ -7,12 +7,12 @@ import pytest
 from scipy.linalg import expm
 
 from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.dual_function import deflected, require_in_range
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Crisp, Triangular
 from tests.frame.dual.test_dual_proof import CASES, level_of
 

@@ -9,6 +9,7 @@ from scipy.linalg import eigh
 from alphacut.frame import StoreyFrame
 from alphacut.frame.calculus.monomials import convolve, monomials
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual import dual_function
 from alphacut.frame.dual.box import over_box
 from alphacut.frame.dual.clusters import centred, subspaces
@@ -17,7 +18,6 @@ from alphacut.frame.dual.structure import classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""

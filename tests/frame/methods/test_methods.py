@@ -7,8 +7,8 @@ import pytest
 
 from alphacut import frame
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods import search
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.fuzzy.result import Nature

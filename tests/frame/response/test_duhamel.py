@@ -6,6 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import (
     responses_at_named_nodes,
     responses_at_nodes,
@@ -20,7 +21,6 @@ from alphacut.frame.response.step_integrals import (
     step_integrals,
 )
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""
