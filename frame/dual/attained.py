@@ -20,11 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_named_nodes, responses_at_nodes
 from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF
 from alphacut.frame.structures.linear import Accelerogram, LinearSystem, evaluate
-from alphacut.frame.structures.polynomial_dependence import UnprovedError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 ENTRY_ROUNDINGS = 8
@@ -128,7 +128,7 @@ def modes_at(
         of_mass,
         rows.value,
         structure.order,
-        structure.rows,
+        structure.rows[:, :n],  # accelerations are read of structures whose unknowns all have mass
     )
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, concatenate, variables
+from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
 from alphacut.frame.structures.linear import Accelerogram, Matrices
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import chosen, real, require, require_numbers
 
 KINDS = ("mass", "damping", "stiffness")
@@ -25,7 +26,8 @@ class MatrixStructure:
     """M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with M(p) = Σ_i f_i(p) M_i, likewise D and K.
 
     A factor is a number, the name of a parameter, or a function of all parameters in plain
-    arithmetic, such as `lambda p: p["E"] * p["l"] ** -3`.
+    arithmetic, such as `lambda p: p["E"] * p["l"] ** -3`. Unknowns without mass follow the others,
+    q_b = −K_bb⁻¹ K_ba q_a, and are condensed (Guyan 1965); outputs may read them.
 
     Args:
         parameters: All parameters with their modal values, in SI units.
@@ -47,8 +49,9 @@ class MatrixStructure:
 
     Raises:
         RefusedError: A shape does not fit, a number is not finite, a factor names no parameter, an
-            array is not symmetric, the modal mass matrix is not positive definite, or the modal
-            ratio is outside [0, 1).
+            array is not symmetric, the modal mass of the unknowns that have mass is not positive
+            definite, one without mass has a damper or no stiffness, or the modal ratio is outside
+            [0, 1).
     """
 
     parameters: Mapping[str, float]
@@ -75,11 +78,9 @@ class MatrixStructure:
         for name, factor in self.row_factors.items():
             chosen("row_factors", name, self.observed)
             self._require_factor(f"observed: {name}", factor)
-        modal = sum(float(value_of(f, self.parameters)) * A for f, A in self.mass)
-        positive = np.linalg.eigvalsh(modal).min() > 0
-        require(positive, "mass", "not positive definite", "a mass for every unknown")
+        self._require_definite()
         own = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
-        fits = len(own) in (0, 1, self.size) and all(
+        fits = len(own) in (0, 1, len(self.massive)) and all(
             Parameter("", range=RATIO).admits(x, x) for x in own
         )
         require(fits, "ratios", self.ratios, f"one number or parameter, or one a mode, {RATIO}")
@@ -88,6 +89,40 @@ class MatrixStructure:
     def size(self) -> int:
         """Number of unknowns n."""
         return len(self.mass[0][1])
+
+    @cached_property
+    def massive(self) -> Rows:
+        """Unknowns that have mass, rising."""
+        return np.flatnonzero(np.any([array.any(1) for _, array in self.mass], axis=0))
+
+    @cached_property
+    def massless(self) -> Rows:
+        """Unknowns that have none."""
+        return np.setdiff1d(np.arange(self.size), self.massive)
+
+    def _require_definite(self) -> None:
+        """Refuse masses, and springs and dampers of unknowns without mass, that have no motion."""
+        mass, stiffness = (
+            sum(float(value_of(f, self.parameters)) * A for f, A in terms)
+            for terms in (self.mass, self.stiffness)
+        )
+        a, b = self.massive, self.massless
+        positive = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
+        allowed = "a positive definite matrix of the unknowns that have mass"
+        require(positive, "mass", "not positive definite", allowed)
+        if not len(b):
+            return
+        least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
+        allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
+        require(least > 1e-14, "stiffness", "not positive definite there", allowed)
+        damped = [k for k in b if any(array[k].any() for _, array in self.damping)]
+        allowed = "dampers between unknowns that have mass"
+        require(
+            not damped,
+            "damping",
+            f"of unknowns {np.array(damped[:5]).tolist()} without mass",
+            allowed,
+        )
 
     @property
     def outputs(self) -> tuple[Output, ...]:
@@ -151,17 +186,16 @@ class MatrixStructure:
         """M, D, K and the initial state at S parameter sets."""
         like = next(iter(p.values()))
         n, samples = self.size, like.value.size
-
-        def total(terms: Terms) -> Jet:
-            out = like.like(np.zeros((samples, n, n)))
-            for factor, array in terms:
-                out = out + lifted(factor, p)[:, None, None] * array
-            return out
-
         start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
         q0, v0 = (like.like(np.tile(x[None, :, None], (samples, 1, 1))) for x in start)
         rigid = np.ones(n) if self.pattern is None else np.asarray(self.pattern, float)
-        mass, damping, stiffness = (total(getattr(self, kind)) for kind in KINDS)
+        mass, damping, stiffness = (self._total(getattr(self, kind), p) for kind in KINDS)
+        if len(self.massless):
+            a, b = self.massive, self.massless
+            mass, damping = (x[:, a[:, None], a] for x in (mass, damping))
+            follow = _follow(stiffness, a, b)
+            stiffness = stiffness[:, a[:, None], a] + stiffness[:, a[:, None], b] @ follow
+            q0, v0, rigid = q0[:, a], v0[:, a], rigid[a]
         if self.ratios:
             damping = damping + modal_damping(mass, stiffness, [lifted(x, p) for x in self.ratios])
         return Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
@@ -172,13 +206,32 @@ class MatrixStructure:
         rows = np.zeros((len(self.observed), 2 * self.size))
         for k, row in enumerate(self.observed.values()):
             rows[k, : len(row)] = row
+        made = like.like(np.tile(rows, (like.value.size, 1, 1)))
+        if len(self.massless):
+            a, b, n = self.massive, self.massless, self.size
+            follow = _follow(self._total(self.stiffness, p), a, b)
+            parts = (made[:, :, a + k] + made[:, :, b + k] @ follow for k in (0, n))
+            made = concatenate(list(parts), -1)
         if not self.row_factors:
-            return like.like(np.tile(rows, (like.value.size, 1, 1)))
+            return made
         factors = concatenate([lifted(self._row_factor(x), p)[:, None] for x in self.observed], -1)
-        return factors[:, :, None] * rows
+        return factors[:, :, None] * made
+
+    def _total(self, terms: Terms, p: Mapping[str, Jet]) -> Jet:
+        """Sum of arrays times factors, V = (S, n, n)."""
+        like = next(iter(p.values()))
+        out = like.like(np.zeros((like.value.size, self.size, self.size)))
+        for factor, array in terms:
+            out = out + lifted(factor, p)[:, None, None] * array
+        return out
 
     def _row_factor(self, output: str) -> Factor | str | float:
         return self.row_factors.get(output, 1.0)
+
+
+def _follow(stiffness: Jet, a: Rows, b: Rows) -> Jet:
+    """−K_bb⁻¹ K_ba, V = (S, b, a)."""
+    return -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
 
 
 def lifted(factor: Factor | str | float, p: Mapping[str, Jet]) -> Jet:

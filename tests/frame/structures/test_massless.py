@@ -1,0 +1,71 @@
+"""Unknowns without mass follow the others: motions, outputs that read them, and what is refused."""
+
+import numpy as np
+import pytest
+
+from alphacut.frame import DualProof, MatrixStructure, Proof, envelope
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.structures.linear import Accelerogram
+from alphacut.fuzzy import Interval
+from alphacut.fuzzy.refused import RefusedError
+
+K = np.array([[3.0, -1, 0, 0], [-1, 2, -1, 0], [0, -1, 1.5, -0.4], [0, 0, -0.4, 1.0]])
+SOIL = np.diag([0, 0, 0, 1.0])
+RECORD = Accelerogram(0.02, np.sin(np.arange(100) * 0.21) * np.sin(np.arange(100) * 0.047))
+
+
+def frame(light=0.0, **values):
+    """Two floors and two rotations, on a soil spring, the rotations with mass `light`."""
+    given = {
+        "parameters": {"k": 1.0, "s": 1.0},
+        "mass": [(1.0, np.diag([1.0, 2.0, light, light]))],
+        "stiffness": [("k", 100 * K), ("s", 60 * SOIL)],
+        "observed": {"roof": np.array([0, 1.0, 0, 0]), "turn": np.array([0, 0, 0.5, 1.0])},
+        "ground": RECORD,
+        "pattern": np.array([1.0, 1.0, 0, 0]),
+        "ratios": (0.03,),
+    }
+    return MatrixStructure(**{**given, **values})
+
+
+def test_motions_are_the_limit_of_small_masses():
+    points = np.array([[1.0, 1.0], [1.1, 0.7]])
+    motions = [
+        LinearFlow(frame(light), ["k", "s"], 2.0, 0.05, Exact()).values(points)
+        for light in (0.0, 1e-7)
+    ]
+    size = np.abs(motions[0]).max((0, 1))
+    assert (np.abs(motions[0] - motions[1]).max((0, 1)) < 1e-4 * size).all()
+
+
+def test_the_dual_proof_bounds_outputs_that_read_them():
+    fuzzy = {"k": Interval(0.9, 1.1), "s": Interval(0.7, 1.3)}
+    given = {"duration": 2.0, "step": 0.05, "alpha": (0,), "progress": False}
+    found = envelope(frame(), fuzzy, method=DualProof(), **given)
+    ends = np.array([number.support for number in fuzzy.values()])
+    unit = np.random.default_rng(0).uniform(0, 1, (200, 2))
+    unit[::2] = unit[::2].round()
+    points = ends[:, 0] + unit * (ends[:, 1] - ends[:, 0])
+    values = LinearFlow(frame(), list(fuzzy), 2.0, 0.05, Exact()).values(points)
+    slack = 1e-9 * np.abs(values).max((0, 1))
+    assert (values.max(0) <= found.upper[0] + slack).all()
+    assert (values.min(0) >= found.lower[0] - slack).all()
+    assert found.facts["gap_of_peaks"] < 0.03
+    with pytest.raises(UnprovedError, match="take the method dual"):
+        envelope(frame(), fuzzy, method=Proof(), **given)
+
+
+@pytest.mark.parametrize(
+    ("values", "match"),
+    [
+        ({"damping": [(1.0, np.diag([0, 0, 1.0, 0]))]}, "damping is of unknowns.*without mass"),
+        ({"stiffness": [("k", 100 * np.diag([1.0, 1, 1, 0]))]}, "stiffness is not positive"),
+        ({"mass": [(1.0, np.diag([1.0, -1.0, 0, 0]))]}, "mass is not positive definite"),
+    ],
+)
+def test_what_has_no_motion_is_refused_in_one_line(values, match):
+    with pytest.raises(RefusedError, match=match) as failure:
+        frame(**values)
+    assert "\n" not in str(failure.value)
