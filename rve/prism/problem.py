@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import AREA
-from alphacut.rve.fenicsx import MPI, PETSc
+from alphacut.rve.fenicsx import MPI, PETSc, fem, petsc
 from alphacut.rve.form import WHOLE
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES
@@ -108,9 +108,29 @@ class PrismProblem:
         forces = [self.form.elastic.load(one, parts) for one in strains]
         return [reduced(one, self.local_map, own, size) for one in forces]
 
-    def solver(self, options: SolverOptions) -> PETSc.KSP:
-        """The solver of the stiffness as assembled."""
-        return krylov_solver(self.matrix, self.numbering, self.map.distribution, options)
+    def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
+        """The solver of the stiffness as assembled, or of another symmetric operator.
+
+        Args:
+            options: PETSc options.
+            matrix: Reduced operator, as of `assemble_operator`.
+        """
+        operator = self.matrix if matrix is None else matrix
+        return krylov_solver(operator, self.numbering, self.map.distribution, options)
+
+    def assemble_operator(self, form: fem.Form) -> PETSc.Mat:
+        """Reduced matrix of a bilinear form of one's own on `form.space`."""
+        matrix = self.matrix.duplicate()
+        matrix.setLGMap(self.local_map, self.local_map)
+        matrix.zeroEntries()
+        petsc.assemble_matrix(matrix, form)
+        matrix.assemble()
+        return matrix
+
+    def assemble_forces(self, form: fem.Form) -> PETSc.Vec:
+        """Reduced vector of a linear form of one's own on `form.space`."""
+        values = fem.assemble_vector(form).array
+        return reduced(values, self.local_map, len(self.numbering.rows), self.numbering.size)
 
     def field(self, vector: PETSc.Vec) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
