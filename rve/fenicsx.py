@@ -18,21 +18,6 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.interruption import uninterrupted
 
-with uninterrupted():
-    import petsc4py  # after MPI, and before DOLFINx: its wheels need that
-    from mpi4py import MPI
-
-    petsc4py.init(["alphacut", "-skip_petscrc", "-no_signal_handler"])
-    import basix
-    import basix.ufl
-    import dolfinx
-    import ufl
-    from dolfinx import fem
-    from dolfinx.fem import petsc
-    from petsc4py import PETSc
-
-__all__ = ["MPI", "PETSc", "basix", "fem", "petsc", "ufl"]  # imported from here by others
-
 
 def require_real(scalar: type) -> None:
     """Refuse a PETSc of complex numbers, whose matrices are not those of elasticity here.
@@ -45,7 +30,24 @@ def require_real(scalar: type) -> None:
         raise RefusedError("PETSc", "built for complex numbers", "a build for real numbers", cure)
 
 
-require_real(PETSc.ScalarType)
+with uninterrupted():
+    import petsc4py  # after MPI, and before DOLFINx: its wheels need that
+    from mpi4py import MPI
+
+    petsc4py.init(["alphacut", "-skip_petscrc", "-no_signal_handler"])
+    from petsc4py import PETSc
+
+    require_real(PETSc.ScalarType)  # before DOLFINx, which has no module for another build
+    import basix
+    import basix.ufl
+    import dolfinx
+    import ufl
+    from dolfinx import fem
+    from dolfinx.fem import petsc
+
+__all__ = ["MPI", "PETSc", "basix", "fem", "petsc", "ufl"]  # imported from here by others
+
+
 # twice as fast as the default -O2, equal to round-off; other processes may compile the same
 JIT = {"cffi_extra_compile_args": ["-O3", "-ffast-math"], "timeout": 120}
 

@@ -15,7 +15,13 @@ from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES
 from alphacut.rve.prism.form import PrismForm
 from alphacut.rve.solver.krylov import krylov_solver
-from alphacut.rve.solver.numbering import LevelNumbering, map_of, reduced, zero_matrix
+from alphacut.rve.solver.numbering import (
+    LevelNumbering,
+    NodeScatter,
+    map_of,
+    reduced,
+    zero_matrix,
+)
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap
 
@@ -77,8 +83,10 @@ class PrismProblem:
         self.numbering = LevelNumbering(grid, comm)
         pairs, rows = self.numbering.pairs, self.numbering.rows
         self.local_map = map_of(pairs[self.form.node], comm)
-        self.matrix = zero_matrix(pairs[grid.cells], self.local_map, rows, self.numbering.size)
-        self._scatter, self._whole = PETSc.Scatter.toAll(self.matrix.createVecRight())
+        layers = grid.cells.reshape(grid.layers, -1, grid.cells.shape[1])
+        cells = layers[self.numbering.layers].reshape(-1, layers.shape[-1])
+        self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
+        self._to_nodes = NodeScatter(pairs[self.form.node], self.matrix.createVecRight())
 
     def move(self, radius_map: RadiusMap) -> None:
         """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
@@ -134,8 +142,7 @@ class PrismProblem:
 
     def field(self, vector: PETSc.Vec) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""
-        self._scatter.scatter(vector, self._whole)
-        return self.numbering.to_nodes(np.array(self._whole.array_r), self.form.node)
+        return self._to_nodes(vector)
 
     def slice_strains(self, fields: Sequence[tuple[Array, Array | None]]) -> SliceStrains:
         """Mean strains of fields, each a macroscopic strain (3,) and a fluctuation (nodes, 2).

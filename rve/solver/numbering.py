@@ -28,7 +28,8 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
     """Matrix of zeros with room for all unknowns that share a cell.
 
     Args:
-        pairs: Pairs of unknowns of each cell's nodes, −1 where dropped, shape (cells, nodes).
+        pairs: Pairs of unknowns of the nodes of the cells that touch these rows, −1 where dropped,
+            shape (cells, nodes).
         local_map: Of the nodes of this rank.
         rows: Unknowns of this rank.
         size: Unknowns in all.
@@ -61,6 +62,30 @@ def reduced(values: Array, local_map: PETSc.LGMap, own: int, size: int) -> PETSc
     return vector
 
 
+class NodeScatter:
+    """Scatter of reduced unknowns to nodes of this rank, which takes no others.
+
+    Args:
+        pairs: Pair of unknowns of each node, −1 where dropped, shape (nodes,).
+        vector: Any vector of reduced unknowns.
+    """
+
+    def __init__(self, pairs: Rows, vector: PETSc.Vec) -> None:
+        self._kept = np.flatnonzero(pairs >= 0)
+        self._shape = len(pairs), 2
+        blocks = pairs[self._kept].astype(PETSc.IntType)
+        needed = PETSc.IS().createBlock(2, blocks, comm=PETSc.COMM_SELF)
+        self._values = PETSc.Vec().createSeq(2 * len(blocks), comm=PETSc.COMM_SELF)
+        self._scatter = PETSc.Scatter().create(vector, needed, self._values, None)
+
+    def __call__(self, vector: PETSc.Vec) -> Array:
+        """Displacements of the nodes, zero where dropped, shape (nodes, 2)."""
+        self._scatter.scatter(vector, self._values)
+        displacements = np.zeros(self._shape)
+        displacements[self._kept] = self._values.array_r.reshape(-1, 2)
+        return displacements
+
+
 class LevelNumbering:
     """Reduced unknowns, two at each node that is left.
 
@@ -76,6 +101,7 @@ class LevelNumbering:
         levels: Levels of this rank.
         middles: Half-way levels of this rank.
         rows: Unknowns of this rank.
+        layers: Layers with a cell that has one of these unknowns.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
@@ -89,6 +115,7 @@ class LevelNumbering:
         self.middles = range(first, min(self.levels.stop, grid.layers))
         ends = (min(k * self.stride, self.size) for k in (first, self.levels.stop))
         self.rows = range(*ends)
+        self.layers = range(max(0, first - 1), self.middles.stop) if self.levels else range(0)
 
     @cached_property
     def pairs(self) -> Rows:
@@ -99,11 +126,6 @@ class LevelNumbering:
         on = np.where(planar >= 0, planar + first, -1)
         half = np.where(vertices >= 0, vertices + self.planar // 2 + first[:-1], -1)
         return np.concatenate([on.ravel(), half.ravel()])
-
-    def to_nodes(self, values: Array, nodes: Rows) -> Array:
-        """Displacements of nodes, zero on the fixed line, shape (nodes, 2), from all unknowns."""
-        pairs = np.concatenate([values.reshape(-1, 2), np.zeros((1, 2))])  # −1 is the last
-        return np.asarray(pairs[self.pairs[nodes]])
 
     def by_level(self, values: Array) -> tuple[Array, Array]:
         """Unknowns on the levels, (layers + 1, planar), and half-way, (layers, between); copies."""

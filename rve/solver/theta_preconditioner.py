@@ -21,8 +21,8 @@ Both summands are positive semidefinite, their sum is definite; P is off by the 
 K between levels, so the number of iterations depends on neither mesh size nor contrast and falls
 with more layers. Any symmetric PETSc preconditioner solves the levels (prefix ``rve_level_``).
 
-Each rank solves for its own levels; PETSc scatters the vectors, from which it takes its rows of the
-products along θ.
+Each rank solves for its own levels and forms its own rows of the products along θ. M^-½ and G^-½
+are full, so that these need the vectors of all levels, which PETSc scatters.
 """
 
 from __future__ import annotations
@@ -150,27 +150,44 @@ class ThetaPreconditioner:
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc."""
-        numbering, mass, corners = self.numbering, self.mass, self.numbering.between
+        numbering, corners = self.numbering, self.numbering.between
         hats, bubbles = numbering.by_level(self._of_all_ranks(residual))
         hats[:-1, :corners] += bubbles / 2
         hats[1:, :corners] += bubbles / 2
-        bubbles -= mass.shift.T @ (hats @ self.injection)  # Jᵀ
-        solved = self._solved(self.levels, mass.root[list(numbering.levels)] @ hats)
-        excess = self._solved(self.middles, mass.excess[list(numbering.middles)] @ bubbles)
-        self.own.array[:] = numbering.joined(solved, excess)
+        self.own.array[:] = self._solved_levels(hats, bubbles)
         hats, bubbles = numbering.by_level(self._of_all_ranks(self.own))
-        hats, bubbles = mass.root @ hats, mass.excess @ bubbles
-        hats -= (mass.shift @ bubbles) @ self.injection.T  # J
-        bubbles += (hats[:-1, :corners] + hats[1:, :corners]) / 2
-        rows = numbering.rows
-        result.array[:] = numbering.joined(hats, bubbles)[rows.start : rows.stop]
+        hats, bubbles = self._own_rows(hats, bubbles)
+        half = len(bubbles)
+        bubbles += (hats[:half, :corners] + hats[1 : half + 1, :corners]) / 2
+        result.array[:] = numbering.joined(hats[: len(self.levels)], bubbles)
+
+    def _solved_levels(self, hats: Array, bubbles: Array) -> Array:
+        """This rank's part of diag(K⁻¹) (M^-½ ⊗ 1; (G^-½ ⊗ 1) Jᵀ Zᵀ) on hats and bubbles."""
+        mass = self.mass
+        root, excess = (
+            mass.root[list(self.numbering.levels)],
+            mass.excess[list(self.numbering.middles)],
+        )
+        orthogonal = excess @ bubbles - (excess @ mass.shift.T @ hats) @ self.injection  # Jᵀ
+        return self.numbering.joined(
+            self._solved(self.levels, root @ hats), self._solved(self.middles, orthogonal)
+        )
+
+    def _own_rows(self, hats: Array, bubbles: Array) -> tuple[Array, Array]:
+        """(M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) on this rank's levels, with the one above, and half-way."""
+        numbering, mass = self.numbering, self.mass
+        reach = len(numbering.middles) + 1  # the level above takes part in the values half-way
+        rows = slice(numbering.levels.start, numbering.levels.start + reach)
+        shifted = (mass.shift[rows] @ mass.excess @ bubbles) @ self.injection.T  # J
+        return mass.root[rows] @ hats - shifted, mass.excess[list(numbering.middles)] @ bubbles
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
         """Show the solver of a level, called by PETSc for ``-rve_ksp_view``."""
-        count = f"{len(self.levels)} levels and {len(self.middles)} half-way on this rank"
+        count = f"{len(self.levels)} levels and {len(self.middles)} half-way on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         own = viewer.getSubViewer(PETSc.COMM_SELF)
-        self.levels[0].view(own)
+        if self.numbering.levels.start == 0:  # the first rank's, which are like all others
+            self.levels[0].view(own)
         viewer.restoreSubViewer(own)
 
     def _of_all_ranks(self, vector: PETSc.Vec) -> Array:

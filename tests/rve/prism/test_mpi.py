@@ -36,7 +36,7 @@ for layers, radius_map, options in (
     model = PrismModel(0.4, layers, parallel=True, **options)
     result = model.solve(radius_map, Phase(20e9), [Phase(78e9), Phase(80e9)])[1]
     values = [*result.curve.mean, *result.curve.s11, *result.curve.s12, *result.checks.values()]
-    results.append([values, result.iterations, result.unknowns, result.estimated_error])
+    results.append([values, result.iterations, result.unknowns, result.estimated_error, result.modulus])
 if MPI.COMM_WORLD.rank == 0:
     print(json.dumps(results))
 """
@@ -67,6 +67,7 @@ def test_any_number_of_ranks_gives_the_same_means_iterations_and_errors(alone, r
         assert many[0] == pytest.approx(one[0], rel=1e-10, abs=2e-8)
         assert many[1:3] == one[1:3]
         assert many[3] == pytest.approx(one[3], rel=1e-5, nan_ok=True)
+        assert many[4] == pytest.approx(one[4], rel=1e-12)
 
 
 def test_only_one_rank_prints_and_the_command_shares_a_cell():

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from alphacut.rve.mesh.periodicity import identify
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver import theta_preconditioner as preconditioner
 from alphacut.rve.solver.krylov import krylov_solver, solve
+from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner, theta_mass
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -93,6 +95,21 @@ def test_linear_fields_reach_edge_midpoints_by_their_mean(problem):
     values = np.concatenate([values, np.zeros((1, 2))])  # the corner last
     for ends, unknown in zip(plane.ends, period.unknown[plane.vertices :], strict=True):
         assert nodes[unknown] == pytest.approx(values[period.unknown[ends]].mean(axis=0))
+
+
+@pytest.mark.parametrize("ranks", [1, 3, 5])
+def test_a_rank_takes_the_cells_of_its_own_rows_and_no_others(problem, ranks):
+    grid, rows = problem.form.grid, []
+    for rank in range(ranks):  # of 4 levels: the fifth rank has none
+        numbering = LevelNumbering(grid, SimpleNamespace(size=ranks, rank=rank))
+        first, last = numbering.rows.start // 2, numbering.rows.stop // 2
+        pairs = numbering.pairs[grid.cells]
+        layers = np.flatnonzero(((pairs >= first) & (pairs < last)).any(axis=1)) // (
+            len(grid.cells) // grid.layers
+        )
+        assert sorted({*layers}) == list(numbering.layers)
+        rows += numbering.rows
+    assert rows == list(range(problem.numbering.size))
 
 
 class Interrupted:
