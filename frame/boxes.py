@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -176,11 +177,15 @@ class UnitFlow:
         flow: The flow in physical parameters.
         boxes: The boxes; its names must be those of `flow`.
         relative: Whether tolerances are shares of each output's peak instead of lengths.
+        store: Folder of the bounds of parts, from which a proof goes on; None for none.
+        interruptible: Whether an interruption of a proof leaves the bounds known so far.
     """
 
     flow: Flow
     boxes: Boxes
     relative: bool = True
+    store: Path | None = None
+    interruptible: bool = False
 
     @property
     def time(self) -> Array:

@@ -12,23 +12,23 @@ A node's bound is the largest over all parts (Adjiman, Floudas 1998; pruning by 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Protocol
 
 import numpy as np
 
+from alphacut.frame.box_proof import BisectionError, BoxProof, Goal, PartBounds, refusing
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.envelope import Ends, Envelope
-from alphacut.frame.structures.modes import ModalError
+from alphacut.frame.part_store import PartStore
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError
@@ -51,117 +51,6 @@ ADDED = ("boxes", "evaluations")
 """Facts of parts that are added; of the others the largest counts."""
 NARROWED = 0.5
 """Shares pruned from all inputs, in sum, from which on a part is bounded anew, not bisected."""
-
-
-@dataclass(frozen=True, eq=False)
-class Goal:
-    """What is asked of the bounds of a part, L levels.
-
-    Args:
-        scale: Units of the tolerances of each output, shape (m,).
-        peak: Peak of each output at the modal inputs and the probes, shape (m,).
-        needed: Bounds of (−output, output) that are asked for, shape (L, T, m, 2).
-        outer: Bounds that are known, the same shape; infinite where none is.
-        incumbent: Largest attained value on each side, shape (L, m, 2).
-        workers: Threads.
-        last: Whether the part is not bisected any more, so that wide bounds are better than none.
-        tick: Takes the share of the part that is done.
-    """
-
-    scale: Array
-    peak: Array
-    needed: Mask
-    outer: Array
-    incumbent: Array
-    workers: int
-    last: bool
-    tick: Progress
-
-
-@dataclass(frozen=True, eq=False)
-class PartBounds:
-    """Upper bounds of (−output, output) over one level of a part, n inputs.
-
-    Args:
-        outer: Proved, shape (T, m, 2).
-        inner: Attained, less rounding; −inf where nothing is.
-        at: By these inputs, shape (T, m, 2, n), in SI units.
-        between: Of outputs from straight lines in the step to a node, shape (T, m).
-        shares: Share of each input in the gap at each peak, shape (m, 2, n).
-        attained_error: What the exact motion at `at` may exceed `inner` by, shape (T, m); None for
-            rounding alone.
-        remaining: Lower and upper ends of what may hold each peak, shape (2, m, 2, n), in SI units;
-            None for all of the part.
-        pruned: Bounds over what may not, as far as nodes are asked for; None for nothing.
-        least_peaks: Lower bound of each output's smallest peak, and one that is reached, shapes
-            (m,); None where all nodes are not bounded.
-        facts: Further numbers by name.
-    """
-
-    outer: Array
-    inner: Array
-    at: Array
-    between: Array
-    shares: Array
-    attained_error: Array | None = None
-    remaining: Array | None = None
-    pruned: Array | None = None
-    least_peaks: Ends | None = None
-    facts: Mapping[str, float] = field(default_factory=dict)
-
-
-class BisectionError(UnprovedError):
-    """Bounds are not proved, and bisections would not help enough."""
-
-
-@contextmanager
-def refusing() -> Iterator[None]:
-    """Turn what modes and matrices have against a proof into its refusal.
-
-    Raises:
-        UnprovedError: It refuses.
-    """
-    try:
-        yield
-    except ModalError as error:
-        raise UnprovedError(error.what, error.cure) from None
-    except np.linalg.LinAlgError as error:
-        what = f"a matrix is singular ({str(error).lower()})"
-        raise UnprovedError(what, "take improved-graph-follower") from None
-
-
-class BoxProof(Protocol):
-    """A proof of bounds over any box of the inputs."""
-
-    name: ClassVar[str]
-
-    @property
-    def parts(self) -> int:
-        """Most parts that a box, or a peak of an output, is worth."""
-
-    @property
-    def workers(self) -> int | None:
-        """Threads; all cores unless given."""
-
-    def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Expected work on the box, in evaluations of a mode's motion at a node.
-
-        Raises:
-            UnprovedError: No part of the box can be proved.
-        """
-
-    def peak_gap(self, scale: Array, peak: Array) -> Array:
-        """Gap at peaks that suffices, shape (m,), in the units of the outputs; see `Goal`."""
-
-    def bounds(
-        self, flow: LinearFlow, boxes: Boxes, goal: Goal
-    ) -> Sequence[PartBounds | UnprovedError]:
-        """Bounds on each level of a part, or why there are none.
-
-        Raises:
-            UnprovedError: There are none on any level.
-            ModalError: The structure has no smooth oscillating modes over the part.
-        """
 
 
 @dataclass(eq=False)
@@ -230,6 +119,7 @@ class Queue:
         boxes: All levels, A of them.
         scale: As of `Goal`.
         peak: As of `Goal`.
+        store: Bounds of parts that a run before has made; None for none.
     """
 
     proof: BoxProof
@@ -237,6 +127,7 @@ class Queue:
     boxes: Boxes
     scale: Array
     peak: Array
+    store: PartStore | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.boxes.alpha), len(self.flow.time), len(self.flow.outputs), 2)
@@ -255,13 +146,19 @@ class Queue:
         self.spent, self.begun = dict[Key, int](), dict[Key, float]()
         self.abandoned = set[Key]()
 
-    def run(self, progress: Progress | None = None) -> None:
+    def run(self, progress: Progress | None = None, *, interruptible: bool = False) -> None:
         """Bound parts until none is open.
+
+        Args:
+            progress: Takes the share of the work that is done.
+            interruptible: Whether an interruption leaves the bounds known so far, if there are.
 
         Raises:
             UnprovedError: A part is refused, and so are many within it.
         """
-        with ThreadPoolExecutor(self.workers) as pool:
+        batch: list[Part] = []
+        pool = ThreadPoolExecutor(self.workers)
+        try:
             while batch := self._next():
                 tick = _Tick(progress, self.open, batch)
                 goals = [
@@ -271,6 +168,17 @@ class Queue:
                 found = list(pool.map(self._bounds, batch, goals))
                 for part, levels in zip(batch, found, strict=True):
                     self._settle(part, levels)
+        except KeyboardInterrupt:
+            self.open += batch
+            known = (np.isfinite(part.outer[part.needed]).all() for part in self.open)
+            if not interruptible or not all(known):
+                raise
+            self.facts["interrupted"] = 1.0
+            for part in self.open:
+                for k, level in enumerate(part.levels):
+                    self._close(level, part.needed[k], part.outer[k])
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
 
     def _next(self) -> list[Part]:
         """The most urgent parts, without the peaks whose gap is left as it is."""
@@ -308,11 +216,17 @@ class Queue:
         return Goal(self.scale, self.peak, *known, max(workers, 1), last, tick)
 
     def _bounds(self, part: Part, goal: Goal) -> Sequence[PartBounds | UnprovedError]:
+        path = None if self.store is None else self.store.path(part.boxes, goal)
+        if self.store is not None and path is not None and (stored := self.store.read(path)):
+            return stored
         try:
             with refusing():
-                return self.proof.bounds(self.flow, part.boxes, goal)
+                found = self.proof.bounds(self.flow, part.boxes, goal)
         except UnprovedError as refusal:
-            return [refusal] * len(part.levels)
+            found = [refusal] * len(part.levels)
+        if self.store is not None and path is not None:
+            self.store.write(path, found)
+        return found
 
     def _settle(self, part: Part, found: Sequence[PartBounds | UnprovedError]) -> None:
         """Take the bounds of a part over, and put what is open into the queue."""
@@ -434,7 +348,9 @@ class Queue:
         return count > most or (gap > WIDE * self.peak[output] and not can_be_halved(shares, most))
 
     def notes(self, outer: Array, inner: Array) -> Iterator[str]:
-        """Lines on the widest gap of a peak that is left: the inputs to be narrowed first."""
+        """Lines on an interruption, and on the inputs to narrow where a gap of a peak is left."""
+        if "interrupted" in self.facts:
+            yield f"interrupted, with {len(self.open)} parts left whose bounds are wider than asked"
         gaps = (outer.max(1) - inner.max(1)) / self.peak[:, None]  # (A, m, 2)
         key: Key = max(self.gap_shares, key=lambda key: gaps[key], default=(-1, 0, 0))
         if key not in self.gap_shares or gaps[key] * self.peak[key[1]] <= self.gap[key[1]]:
@@ -488,8 +404,9 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
     begun, linear, cuts = time.perf_counter(), exact(flow), flow.boxes
     with refusing():
         proof.forecast(linear, cuts)
-    queue = Queue(proof, linear, cuts, flow.scale, flow.peak)
-    queue.run(progress)
+    store = None if flow.store is None else PartStore(flow.store, _problem(proof, flow))
+    queue = Queue(proof, linear, cuts, flow.scale, flow.peak, store)
+    queue.run(progress, interruptible=flow.interruptible)
     outer = np.minimum.accumulate(queue.closed, axis=0)
     inner, at = queue.inner, queue.at
     for level in reversed(range(len(inner) - 1)):  # what a narrower cut attains is attained here
@@ -531,6 +448,14 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         facts=facts,
         notes=(*queue.notes(outer, inner),),
     )
+
+
+def _problem(proof: BoxProof, flow: UnitFlow) -> bytes:
+    """Fingerprint of a proof with its options, and of a structure by exact motions."""
+    options = {name: value for name, value in vars(proof).items() if name != "workers"}
+    words = repr((proof.name, options, flow.boxes.names))
+    motions = flow.flow.values(flow.boxes.probes)
+    return hashlib.sha256(words.encode() + motions.tobytes() + flow.scale.tobytes()).digest()
 
 
 def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None:

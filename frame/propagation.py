@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -67,6 +68,8 @@ def envelope(
     method: Method | str | None = None,
     integrator: str | Integrator | None = None,
     relative: bool = True,
+    store: Path | str | None = None,
+    interruptible: bool = True,
     progress: Progress | bool | None = None,
     **options: object,
 ) -> Envelope:
@@ -85,6 +88,10 @@ def envelope(
             systems it is midpoint.
         relative: Whether the method's tolerance is a share of each output's peak at the modal
             parameters and some corners, instead of a number in SI units.
+        store: Folder in which a proof keeps the bounds of parts of the boxes, and from which it
+            goes on after it was killed; None to keep nothing.
+        interruptible: Whether Ctrl-C ends a proof with the best bounds so far and a note, if there
+            are any; it raises KeyboardInterrupt otherwise.
         progress: Called with the share done; a bar on a terminal or in a notebook if not given,
             False for none.
         options: Options of a method that is named, or of auto.
@@ -105,7 +112,8 @@ def envelope(
     flow = flow_of(model, every.names, duration, step, integrator)
     require_admissible(model, every)
     cuts, which = every.distinct()
-    over = UnitFlow(flow, cuts, relative)
+    folder = None if store is None else Path(store)
+    over = UnitFlow(flow, cuts, relative, folder, interruptible)
     steps = step_error(over)
     with showing(progress) as tick:
         bounds = way.run(over, tick)

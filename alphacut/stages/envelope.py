@@ -86,6 +86,7 @@ class EnvelopeTask:
             method=self.section.method,
             integrator=self.section.integrator,
             relative=not self.tolerance(structure).unit,
+            interruptible=False,
             progress=work.tick or False,
             **self.options(structure),
         )
@@ -105,6 +106,7 @@ class EnvelopeTask:
                 alpha=self.section.alpha,
                 method=frame.Auto(PEAK_ERROR, peaks=True),
                 relative=True,
+                interruptible=False,
                 progress=work.tick or False,
             )
         )

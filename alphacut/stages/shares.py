@@ -88,6 +88,7 @@ def of_peaks(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask)
         fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
         method = frame.Auto(ACCURACY, peaks=True)
         motion: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}
+        motion["interruptible"] = False
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
             of = peaks(

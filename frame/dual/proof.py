@@ -28,6 +28,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.frame.box_proof import Goal, PartBounds
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.box import Box
@@ -36,7 +37,7 @@ from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.pruning import prune_ends, remainder
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
-from alphacut.frame.parts import WIDE, Goal, PartBounds, can_be_halved, prove
+from alphacut.frame.parts import WIDE, can_be_halved, prove
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress

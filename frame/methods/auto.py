@@ -17,6 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.frame.box_proof import refusing
 from alphacut.frame.boxes import SHARE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
@@ -26,7 +27,7 @@ from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
-from alphacut.frame.parts import WIDE, exact, refusing
+from alphacut.frame.parts import WIDE, exact
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress

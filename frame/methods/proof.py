@@ -17,6 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from alphacut.frame.box_proof import BisectionError, Goal, PartBounds
 from alphacut.frame.boxes import SHARE, Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.certificate import certify
@@ -26,7 +27,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.parts import BisectionError, Goal, PartBounds, prove
+from alphacut.frame.parts import prove
 from alphacut.frame.structures.polynomial_dependence import degrees, without_ratio
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress

@@ -104,6 +104,7 @@ def tolerances(
         alpha=[0.0],
         method=Auto(error, peaks=True),
         relative=True,
+        interruptible=False,
         progress=False,
     )
     tried: dict[float, _Step] = {}

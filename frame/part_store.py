@@ -1,0 +1,87 @@
+"""Bounds of parts in a folder, from which a proof that was killed goes on.
+
+A file is named by all that the bounds follow from: the proof and its options, exact motions of the
+structure at some inputs, the part, what is asked for and what is known.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from alphacut.frame.box_proof import Goal, PartBounds
+from alphacut.frame.boxes import Boxes
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.result import Ends
+
+Found = Sequence[PartBounds | UnprovedError]
+
+
+@dataclass(frozen=True)
+class PartStore:
+    """Bounds of parts by what they follow from.
+
+    Args:
+        folder: Where the files are; made if it does not exist.
+        problem: Fingerprint of the proof and the structure.
+    """
+
+    folder: Path
+    problem: bytes
+
+    def path(self, boxes: Boxes, goal: Goal) -> Path:
+        """File of the bounds of a part."""
+        digest = hashlib.sha256(self.problem)
+        known = goal.needed, goal.outer, goal.incumbent, np.array(goal.last)
+        for array in (boxes.alpha, boxes.lower, boxes.upper, *known):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return self.folder / f"part-{digest.hexdigest()[:32]}.npz"
+
+    def read(self, path: Path) -> Found | None:
+        """Bounds on each level, or None where there are none that can be read."""
+        try:
+            with np.load(path, allow_pickle=False) as arrays:
+                return [_unpacked(arrays, k) for k in range(int(arrays["levels"]))]
+        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+            return None
+
+    def write(self, path: Path, found: Found) -> None:
+        """Store bounds, all or none of a file."""
+        arrays: dict[str, Array] = {"levels": np.array(len(found))}
+        for k, one in enumerate(found):
+            arrays |= {f"{k}.{name}": array for name, array in _packed(one).items()}
+        self.folder.mkdir(parents=True, exist_ok=True)
+        number, name = tempfile.mkstemp(dir=self.folder)
+        with os.fdopen(number, "wb") as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+        os.replace(name, path)
+
+
+def _packed(one: PartBounds | UnprovedError) -> dict[str, Array]:
+    if isinstance(one, UnprovedError):
+        along = -1 if one.along is None else one.along
+        return {"refusal": np.array([one.what, one.cure]), "along": np.array(along)}
+    arrays = {field.name: getattr(one, field.name) for field in fields(one)}
+    facts = arrays.pop("facts")
+    arrays |= {"fact_names": np.array([*facts], str), "facts": np.array([*facts.values()], float)}
+    return {name: np.asarray(array) for name, array in arrays.items() if array is not None}
+
+
+def _unpacked(arrays: np.lib.npyio.NpzFile, k: int) -> PartBounds | UnprovedError:
+    own = {name.partition(".")[2]: arrays[name] for name in arrays if name.startswith(f"{k}.")}
+    if "refusal" in own:
+        along = int(own["along"])
+        return UnprovedError(*map(str, own["refusal"]), None if along < 0 else along)
+    names = own.pop("fact_names").tolist()
+    facts = dict(zip(names, own.pop("facts").tolist(), strict=True))
+    if "least_peaks" in own:
+        own["least_peaks"] = Ends(*own["least_peaks"])
+    return PartBounds(**own, facts=facts)
