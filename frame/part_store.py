@@ -13,6 +13,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,10 +77,12 @@ def _packed(one: PartBounds | UnprovedError) -> dict[str, Array]:
 
 
 def _unpacked(arrays: np.lib.npyio.NpzFile, k: int) -> PartBounds | UnprovedError:
-    own = {name.partition(".")[2]: arrays[name] for name in arrays if name.startswith(f"{k}.")}
+    own: dict[str, Any] = {
+        name.partition(".")[2]: arrays[name] for name in arrays if name.startswith(f"{k}.")
+    }
     if "refusal" in own:
-        along = int(own["along"])
-        return UnprovedError(*map(str, own["refusal"]), None if along < 0 else along)
+        along, (what, cure) = int(own["along"]), map(str, own["refusal"])
+        return UnprovedError(what, cure, None if along < 0 else along)
     names = own.pop("fact_names").tolist()
     facts = dict(zip(names, own.pop("facts").tolist(), strict=True))
     if "least_peaks" in own:
