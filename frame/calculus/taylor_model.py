@@ -3,14 +3,15 @@
 A Taylor model stands for functions f(u) of inputs u in [−1, 1]^d: |f(u) − p(u)| ≤ rest for all u of
 the box, p a polynomial (Makino, Berz 2003). Sums, products, powers and solutions of linear systems
 of Taylor models are Taylor models. What a product has above the order kept is bounded by the sums
-of magnitudes of its factors' coefficients, a power's by the derivative of the next order. Round-off
-of the coefficients is not counted here; `ROUND_OFF` of each size is added where a bound is drawn.
+of magnitudes of its factors' coefficients, a power's by the derivative of the next order. So is the
+rounding of the coefficients, by γ_n of the operations that make them (Higham 2002, section 3.1).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -24,13 +25,12 @@ from alphacut.frame.calculus.monomials import (
     monomials,
     places,
 )
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array, Rows
 
 ORDER = 3
 """Order of a Taylor model unless another is given."""
-ROUND_OFF = 1e-11
-"""Share of a function's size that covers the round-off of its coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class TaylorModel:
 
     Args:
         parts: Coefficients of degree 0, 1, …, shapes (monomials, *V); missing ones are zero.
-        rest: Bound of what they leave out, shape V, never negative.
+        rest: Bound of what they leave out and of their rounding, shape V, never negative.
         inputs: Number of inputs d.
         order: Degree to which products are kept.
     """
@@ -59,9 +59,9 @@ class TaylorModel:
 
     @classmethod
     def variables(cls, centre: Array, radius: Array, order: int = ORDER) -> TaylorModel:
-        """The inputs themselves, centre + radius u, V = (d,)."""
+        """The inputs themselves, centre + radius u, V = (d,), with the rounding of both."""
         parts = np.asarray(centre, float)[None], np.diag(np.asarray(radius, float))
-        return cls(parts, np.zeros(len(centre)), len(centre), order)
+        return cls(parts, gamma(2) * (np.abs(centre) + radius), len(centre), order)
 
     def like(self, value: ArrayLike) -> TaylorModel:
         """A constant of the same inputs and order."""
@@ -91,7 +91,8 @@ class TaylorModel:
 
     def sizes(self) -> list[Array]:
         """Bounds of the parts over the box, each of shape V."""
-        return [np.asarray(np.abs(part).sum(0)) for part in self.parts]
+        of_sums = len(self.parts) + 2
+        return [np.abs(part).sum(0) * (1 + gamma(len(part) + of_sums)) for part in self.parts]
 
     def size(self) -> Array:
         """Bound of |f| over the box, shape V."""
@@ -103,7 +104,8 @@ class TaylorModel:
 
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds over the box, each of shape V."""
-        return self.value - self.spread(), self.value + self.spread()
+        reach = self.spread() * (1 + gamma(2)) + UNIT_ROUNDOFF * np.abs(self.value)
+        return self.value - reach, self.value + reach
 
     def loosened(self, more: ArrayLike) -> TaylorModel:
         """Functions that may be off by `more`, shape V."""
@@ -169,7 +171,9 @@ class TaylorModel:
         for degree, part in enumerate(moved):
             scale = half[monomials(self.inputs, degree)].prod(-1)
             parts.append(scale.reshape(-1, *[1] * self.rest.ndim) * part)
-        return TaylorModel(tuple(parts), self.rest, self.inputs, self.order)
+        # sums of d terms, once for each derivative, of |middle| + half ≤ 1
+        rounding = gamma((len(self.parts) + 1) * (self.inputs + 4)) * np.sum(self.sizes(), 0)
+        return TaylorModel(tuple(parts), self.rest + rounding, self.inputs, self.order)
 
     def __getitem__(self, index: Any) -> TaylorModel:
         key = index if isinstance(index, tuple) else (index,)
@@ -189,7 +193,8 @@ class TaylorModel:
                 if degree < len(x.parts):
                     part += _padded(x.parts[degree], len(shape))
             parts.append(part)
-        return TaylorModel(tuple(parts), self.rest + b.rest, self.inputs, max(self.order, b.order))
+        exact = TaylorModel(tuple(parts), self.rest + b.rest, self.inputs, max(self.order, b.order))
+        return exact.rounded(1)
 
     __radd__ = __add__
 
@@ -207,17 +212,18 @@ class TaylorModel:
             return _product(self, other, np.multiply)
         factor = _numbers(other)
         parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
-        return TaylorModel(parts, self.rest * np.abs(factor), self.inputs, self.order)
+        return TaylorModel(parts, self.rest * np.abs(factor), self.inputs, self.order).rounded(1)
 
     __rmul__ = __mul__
 
     def __matmul__(self, other: TaylorModel | Array) -> TaylorModel:
         if isinstance(other, TaylorModel):
             return _product(self, other, matmul)
-        return self._linear(np.matmul, _numbers(other))
+        return self._linear(np.matmul, _numbers(other), self.shape[-1])
 
     def __rmatmul__(self, other: Array) -> TaylorModel:
-        return self._linear(lambda x, factor: np.matmul(factor, x), _numbers(other))
+        factor = _numbers(other)
+        return self._linear(lambda x, y: np.matmul(y, x), factor, factor.shape[-1])
 
     def __truediv__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         return self * (other**-1.0 if isinstance(other, TaylorModel) else 1.0 / _numbers(other))
@@ -240,25 +246,34 @@ class TaylorModel:
             )
         step, factor = self - middle, 1.0
         out, term = self.like(middle**exponent), self.like(np.ones_like(middle))
+        rounding = gamma(4) * middle**exponent
         for k in range(1, N + 1):
             factor = factor * (exponent - k + 1) / k
             term = term * step
-            out = out + term * (factor * middle ** (exponent - k))
+            scale = factor * middle ** (exponent - k)
+            out = out + term * scale
+            rounding = rounding + gamma(4 * k + 4) * np.abs(scale) * term.size()
         after, power = abs(factor * (exponent - N) / (N + 1)), exponent - N - 1
         steep = np.maximum(least**power, (middle + spread) ** power)
-        return out.loosened(after * steep * spread ** (N + 1))
+        return out.loosened(rounding + after * steep * spread ** (N + 1) * (1 + gamma(8 * N + 8)))
 
     def contract(self, arrays: Array) -> TaylorModel:
         """Sum of functions V = (…, e) times arrays of numbers (e, …)."""
-        return self._linear(
-            lambda x, factor: np.asarray(np.tensordot(x, factor, 1)), _numbers(arrays)
-        )
+        factor = _numbers(arrays)
+        return self._linear(lambda x, y: np.asarray(np.tensordot(x, y, 1)), factor, len(factor))
 
-    def _linear(self, bilinear: Callable[[Array, Array], Array], factor: Array) -> TaylorModel:
-        """A linear map by numbers, under which the rest stays no less than zero."""
-        rest = np.asarray(bilinear(self.rest, np.abs(factor)))
+    def rounded(self, count: int) -> TaylorModel:
+        """The same after `count` roundings of coefficients and rest, whose sums did not cancel."""
+        return self.loosened(gamma(count) * np.sum(self.sizes(), 0) + gamma(count + 3) * self.rest)
+
+    def _linear(
+        self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
+    ) -> TaylorModel:
+        """A linear map by numbers, sums of `terms`, under which the rest is not negative."""
+        rest = np.asarray(bilinear(self.rest, np.abs(factor))) * (1 + gamma(terms + 2))
+        rounding = gamma(terms) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
-        return TaylorModel(parts, rest, self.inputs, self.order)
+        return TaylorModel(parts, rest + rounding, self.inputs, self.order)
 
 
 def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
@@ -275,11 +290,14 @@ def inverse_bound(matrix: TaylorModel) -> Array:
     Raises:
         UnprovedError: The series diverges.
     """
-    first = np.linalg.inv(matrix.value)
-    ratio = np.abs(first) @ matrix.spread()
+    first, n = np.linalg.inv(matrix.value), len(matrix.value)
+    off = np.abs(np.eye(n) - first @ matrix.value)
+    off += gamma(n + 1) * (np.abs(first) @ np.abs(matrix.value))
+    ratio = np.abs(first) @ matrix.spread() + off
     if np.abs(np.linalg.eigvals(ratio)).max() >= 1:
         raise UnprovedError("a matrix may be singular in the box", "take narrower inputs")
-    return np.asarray(np.linalg.inv(np.eye(len(first)) - ratio) @ np.abs(first))
+    inverse = np.linalg.inv(np.eye(n) - ratio) * (1 + gamma(8 * n * n))
+    return np.asarray(inverse @ np.abs(first))
 
 
 def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
@@ -301,7 +319,7 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
             known = known - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
         parts.append(first @ known)
     found = TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
-    return found.loosened(inverse_bound(matrix) @ ((matrix @ found).rest + right.rest))
+    return found.loosened(inverse_bound(matrix) @ (matrix @ found - right).size())
 
 
 def _numbers(value: ArrayLike) -> Array:
@@ -317,16 +335,23 @@ def _padded(part: Array, ndim: int) -> Array:
 def _product(
     a: TaylorModel, b: TaylorModel, bilinear: Callable[[Array, Array], Array]
 ) -> TaylorModel:
-    """A product that is linear in both factors, to the higher order of both."""
+    """A product that is linear in both factors, to the higher order of both.
+
+    A coefficient of degree i + j is a sum over all ways to share its monomial and over the
+    contracted axis, if any.
+    """
     d, order, ndim = a.inputs, max(a.order, b.order), max(a.rest.ndim, b.rest.ndim)
     s, t = a.sizes(), b.sizes()
     rest = bilinear(a.rest, np.asarray(sum(t)) + b.rest) + bilinear(np.asarray(sum(s)), b.rest)
     degrees = range(min(order, len(s) + len(t) - 2) + 1)
     parts = [np.zeros((count(d, k), *rest.shape)) for k in degrees]
+    inner = a.shape[-1] if bilinear is matmul else 1
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
+            share = 1.0
             if i + j <= order:
                 parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
-            else:
-                rest = rest + bilinear(s[i], t[j])
+                share = gamma(inner * comb(i + j, i) + i + j + 1)
+            rest = rest + share * bilinear(s[i], t[j])
+    rest = rest * (1 + gamma(inner + (order + 1) ** 2))
     return TaylorModel(tuple(parts), np.asarray(rest), d, order)

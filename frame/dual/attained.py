@@ -20,10 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.response.duhamel import responses_at_named_nodes, responses_at_nodes
-from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF
 from alphacut.frame.structures.linear import Accelerogram, LinearSystem, evaluate
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
@@ -72,11 +72,6 @@ class Modal:
         size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
         read = np.einsum("si,sik->sk", row, shape)
         return read, gamma(n + ENTRY_ROUNDINGS) * size
-
-
-def gamma(count: int) -> float:
-    """γ_n = n u / (1 − n u), the relative error of n roundings (Higham 2002, lemma 3.1)."""
-    return count * UNIT_ROUNDOFF / (1 - count * UNIT_ROUNDOFF)
 
 
 def modes_at(

@@ -28,7 +28,8 @@ from math import comb
 import numpy as np
 
 from alphacut.frame.calculus.monomials import convolve, count, matmul
-from alphacut.frame.calculus.taylor_model import ROUND_OFF, TaylorModel, inverse_bound
+from alphacut.frame.calculus.rounding import gamma
+from alphacut.frame.calculus.taylor_model import TaylorModel, inverse_bound
 from alphacut.frame.dual.pencil import Comparison, Pencil
 from alphacut.fuzzy.arrays import Array, Rows
 
@@ -44,6 +45,8 @@ MAX_SHAPE = 10.0
 """Bound of an entry of X, which is 1 in the block's own row, above which none is found."""
 ROUNDS = 60
 """Most rounds in which the bounds of a block are widened until they hold."""
+SLACK = 1.001
+"""Factor by which bounds must hold, so that rounding of the systems they solve does not matter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +196,8 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Bl
     order = {"inputs": d, "order": N}
     L = TaylorModel(tuple(rate), np.zeros(rotation.shape), **order)
     x = TaylorModel(tuple(shape), np.zeros(shape[0].shape[1:]), **order)
-    beyond = _beyond(mass, x.sizes(), N)
-    Mx = TaylorModel(tuple(moved), beyond, **order)
+    rounding = _rounding(x, mass, 0)
+    Mx = TaylorModel(tuple(moved), _beyond(mass, x.sizes(), N) + rounding, **order)
     pencils = [
         Pencil.of([part[:, j, j] for part in rate], mass, stiffness) for j in range(len(block))
     ]
@@ -210,7 +213,7 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Bl
         return None
     off = 1.0 - np.eye(len(block))
     data = _Unknowns(
-        missed=_missed(pencils, L, x, Mx, stiffness),
+        missed=_missed(pencils, L, x, Mx) + _rounded(L, x, Mx, stiffness, rotation, rounding),
         size=x.size(),
         side=Mx.size(),
         coupling=L.size() * off,
@@ -237,13 +240,53 @@ def _beyond(mass: TaylorModel, x: list[Array], N: int) -> Array:
     return beyond
 
 
-def _missed(
-    pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel, stiffness: TaylorModel
+def _terms(n: int, p: int, degree: int) -> int:
+    """Roundings of a coefficient of a series: of products with M and K, with L, and of the turn."""
+    return n * sum(comb(degree, b) for b in range(4)) + p * 2**degree + 4 * p + 8
+
+
+def _rounding(x: TaylorModel, matrix: TaylorModel, least: int) -> Array:
+    """Rounding of the products of A's parts from degree `least` on with the series, (p, n)."""
+    of_x, of_matrix, (p, n) = x.sizes(), matrix.sizes(), x.shape
+    total: Array = np.zeros(x.shape)
+    for m in range(len(of_x)):
+        for b in range(least, min(m, len(of_matrix) - 1) + 1):
+            total += gamma(_terms(n, p, m)) * (of_x[m - b] @ of_matrix[b])
+    return total
+
+
+def _rounded(
+    L: TaylorModel,
+    x: TaylorModel,
+    Mx: TaylorModel,
+    stiffness: TaylorModel,
+    rotation: Array,
+    rounding: Array,
 ) -> Array:
+    """Bound of R's parts up to degree N, which are zero but for rounding, shape (p, n).
+
+    Args:
+        L: L̃ᵀ.
+        x: X̃.
+        Mx: Its product with M.
+        stiffness: K.
+        rotation: R, whose columns are orthogonal but for rounding.
+        rounding: Rounding of M x̃.
+    """
+    (p, n), of_L, of_Mx = x.shape, L.sizes(), Mx.sizes()
+    askew = float(np.abs(rotation.T @ rotation - np.eye(p)).sum(0).max())
+    total = _rounding(x, stiffness, 0) + np.sum(of_L, 0) @ rounding
+    for m in range(len(of_L)):
+        for a in range(m + 1):
+            total += (gamma(_terms(n, p, m)) + askew) * (of_L[a] @ of_Mx[m - a])
+    return total
+
+
+def _missed(pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel) -> Array:
     """Bound of R = K x̃_j − Σ_i L̃_ji M x̃_i over the box, shape (p, n)."""
     of_x, N, off = x.sizes(), L.order, 1.0 - np.eye(len(pencils))
     of_L, of_Mx = [size * off for size in L.sizes()], Mx.sizes()
-    missed = np.zeros(x.shape) + ROUND_OFF * stiffness.size().max(1)
+    missed: Array = np.zeros(x.shape)
     for j, pencil in enumerate(pencils):
         t = pencil.sizes
         missed[j] += t[-1] @ np.sum(of_x, 0)[j]
@@ -292,7 +335,7 @@ class _Unknowns:
             new_Y, new_E = self._images(systems, Y, E)
             if not (new_Y.max() < MAX_SHAPE and np.isfinite(new_E).all()):
                 return None
-            if (new_Y <= Y).all() and (new_E <= E).all():
+            if (SLACK * new_Y <= Y).all() and (SLACK * new_E <= E).all():
                 return Y, E
             Y, E = 1.02 * np.maximum(new_Y, Y), 1.02 * np.maximum(new_E, E)
         return None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.blocks import Block, Centre, sharpest
@@ -72,7 +73,8 @@ def subspaces(centre: Centre, used: Rows, wanted: int) -> Subspaces:
         raise UnprovedError("the structure may lose its stiffness", "take narrower inputs", along)
     blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes))
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
-    low, high = (1 - stiff) / (1 + heavy), (1 + stiff) / (1 - heavy)
+    slack = gamma(100 * len(weight))  # of norms
+    low, high = (1 - slack) * (1 - stiff) / (1 + heavy), (1 + slack) * (1 + stiff) / (1 - heavy)
     ends = low * centre.squared, high * centre.squared
     return Subspaces(blocks, used, centre, *ends, (heavy, stiff), along)
 
@@ -105,8 +107,17 @@ def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
     basis[np.ix_(b, range(len(a), n))] = turn * np.sqrt(squared[-1] / own)
     used = np.union1d(mass.present(), stiffness.present())
     used = used if len(used) else np.arange(1)
-    seen = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
-    return Centre(*seen, basis, len(a)), used
+    heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
+    weight = (np.arange(n) < len(a)) * 1.0
+    centre = Centre(_diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value)), basis, len(a))
+    return centre, used
+
+
+def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
+    """The same with a diagonal in the middle, which it has but for rounding, put into the rest."""
+    middle = np.diag(diagonal)
+    rest = matrix.rest + np.abs(matrix.value - middle)
+    return TaylorModel((middle[None], *matrix.parts[1:]), rest, matrix.inputs, matrix.order)
 
 
 def _require_stiff(values: Array, like: Array) -> None:

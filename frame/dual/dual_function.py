@@ -76,6 +76,11 @@ class Data(NamedTuple):
     group_quadratic: Array
 
 
+def roundings(modes: int, sources: int, inputs: int) -> int:
+    """Roundings of a term of the dual function: of its sums over variables, pairs and modes."""
+    return 2 * modes * (sources + 2) + 2 * inputs**2 + 4 * inputs + 4 * sources + 32
+
+
 def require_in_range(data: Data) -> None:
     """Refuse models and tables out of the range in which the dual function cannot overflow.
 

@@ -79,23 +79,25 @@ class BlockShares:
     answer: TaylorModel
 
     @classmethod
-    def of(cls, block: Block, rows: Array, excited: TaylorModel, used: Rows) -> BlockShares:
+    def of(cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows) -> BlockShares:
         """Shares of a block.
 
         Args:
             block: The block, as functions of the inputs at `used`.
-            rows: Outputs in the block's coordinates, shape (m, n).
+            rows: Outputs in the block's coordinates, V = (m, n), constant but for rounding.
             excited: Sources in the same, v = basis⁻¹ …, V = (sources, n), of all inputs.
             used: Inputs of the block.
         """
         fixed, varying = excited.value, excited - excited.value
         block = block.cut(DEGREE)
-        if varying.size().any():
+        if len(varying.present()):
             block = block.cut(excited.order).among(used, excited.inputs)
             driven = block.moved @ fixed.T + block.moved @ varying.T
         else:
-            driven = block.moved @ fixed.T
-        return cls(block, block.shape @ rows.T, driven, solve(block.norm, driven))
+            rounding = block.moved.size() @ excited.rest.T
+            driven = (block.moved @ fixed.T).loosened(rounding)
+        read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.rest.T)
+        return cls(block, read, driven, solve(block.norm, driven))
 
     @property
     def share(self) -> TaylorModel:
@@ -123,7 +125,7 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
     share = _in_all(of_block.share, structure, found.used)
     rate = _in_all(of_block.block.rate, structure, found.used)
     ratio = structure.ratio[modes]
-    if (ratio[1:] - ratio[:-1]).size().any():
+    if any((part[:, 1:] != part[:, :-1]).any() for part in ratio.parts):
         raise UnprovedError(
             "modes of different damping ratios may cross", "take one ratio for all modes"
         )

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.monomials import monomials
-from alphacut.frame.calculus.taylor_model import ROUND_OFF, TaylorModel
-from alphacut.frame.dual.dual_function import EXPECTED, Data, require_in_range
+from alphacut.frame.calculus.rounding import gamma
+from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.dual.dual_function import EXPECTED, Data, require_in_range, roundings
 from alphacut.frame.dual.intervening import Oscillator
 from alphacut.frame.dual.models import Models
 from alphacut.frame.dual.rest import Excitation
@@ -70,7 +71,10 @@ def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -
         for grid in grids
     ]
     made = [{o: np.stack([mode[o][i] for mode in modes]) for o in different} for i in range(3)]
-    return Tables(made[0], made[1], made[2], grids, time)
+    count = roundings(len(single), len(sources), single[0].omega.inputs)
+    of_sums = {o: 2 * gamma(count) * np.abs(made[0][o]).max(-1) for o in different}
+    error = {o: made[1][o] + of_sums[o] for o in different}
+    return Tables(made[0], error, made[2], grids, time)
 
 
 def _responses(
@@ -86,7 +90,7 @@ def _responses(
     for order in orders:
         waves = [oscillators.waves(source, order) for source in sources]
         value = np.stack([wave.value.reshape(len(time), -1) for wave in waves])
-        error = np.stack([wave.error for wave in waves]) + ROUND_OFF * np.abs(value).max(-1)
+        error = np.stack([wave.error for wave in waves])
         made[order] = value, error, np.stack([wave.stray for wave in waves])
     return made
 
@@ -301,7 +305,9 @@ def _models(level: Level, o: int) -> list[Array]:
     ]
     linear, quadratic, cubic, rest = _stacked([_scaled(x, _spread(x)) for x in every])
     size = np.asarray(np.abs(cubic).sum(1))
-    return [linear, quadratic, cubic, size, rest + EXPECTED * size]
+    # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
+    of_sums = 8 * gamma(roundings(len(level.single), len(level.sources), linear.shape[1]))
+    return [linear, quadratic, cubic, size, rest + of_sums + EXPECTED * size]
 
 
 def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
@@ -323,6 +329,9 @@ def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
         constant[1] += rest.doubt.value[:, o] @ half
     wave, (linear, quadratic, cubic, beyond) = np.concatenate(waves), _stacked(rows)
     constant[1] += (beyond + np.abs(cubic).sum(1)) @ np.abs(wave)
+    size = np.abs(linear).sum(1) + np.abs(quadratic).sum(1)
+    constant[1] += gamma(roundings(len(level.single), len(sources), d)) * (size @ np.abs(wave))
+    constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
     return [wave, linear, quadratic], constant
 
 
@@ -339,7 +348,7 @@ def _scaled(x: TaylorModel, radius: float) -> tuple[Array, ...]:
     # pairs by rows, as the kernel has them
     lists = monomials(x.inputs, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
-    rest = np.asarray(x.rest + ROUND_OFF * np.abs(x.value))
+    rest = np.asarray(x.rest + gamma(8) * x.size())
     linear, quadratic, cubic = (x.part(degree) for degree in (1, 2, 3))
     return linear / radius, quadratic[order] / radius, cubic / radius, rest / radius
 

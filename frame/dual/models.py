@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from alphacut.frame.calculus.rounding import gamma
+from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.clusters import Subspaces, centred, subspaces
 from alphacut.frame.dual.coupling import coupling_of
@@ -55,7 +57,7 @@ class Models:
             UnprovedError: None of its modes can be enclosed.
         """
         centre, used = centred(structure.mass, structure.stiffness)
-        excited = sources_of(structure, excitation[2]) @ np.linalg.inv(centre.basis).T
+        excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
         wanted = centre.modes
         if allowed is not None:
             wanted = max(1, modes_wanted(structure, centre, excited, excitation, allowed))
@@ -64,13 +66,13 @@ class Models:
             raise UnprovedError(
                 "no mode keeps clear of the others", "take narrower inputs", found.along
             )
-        rows = structure.rows @ centre.basis
+        rows = structure.start.like(structure.rows) @ centre.basis
         shares = [BlockShares.of(block, rows, excited, used) for block in found.blocks]
         nothing = np.zeros((len(excitation[1]), len(structure.order)))
         models = cls([], [], nothing, nothing, found.along)
         for of_block in shares:
             models = models.with_block(structure, of_block, found, excitation, allowed)
-        rest = rest_of_modes(structure, found, shares, excited, excitation)
+        rest = rest_of_modes(structure, found, shares, (rows, excited), excitation)
         return models if rest is None else replace(models, rests=[*models.rests, rest])
 
     def with_block(
@@ -94,3 +96,11 @@ class Models:
             return replace(self, rests=[*self.rests, rest])
         added, strays = self.added + added, self.strays + strays
         return replace(self, single=self.single + more, added=added, strays=strays)
+
+
+def inverse(basis: Array, like: TaylorModel) -> TaylorModel:
+    """The inverse of a matrix of numbers with its rounding, of the inputs of a model `like`."""
+    found, n = np.linalg.inv(basis), len(basis)
+    left = np.abs(np.eye(n) - basis @ found) + gamma(n + 1) * (np.abs(basis) @ np.abs(found))
+    # B⁻¹ − C = C (I − B C) + …, of which the terms beyond the first are far below a tenth
+    return like.like(found).loosened(1.1 * np.abs(found) @ left)

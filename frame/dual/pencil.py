@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.monomials import convolve, monomials
+from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
@@ -65,11 +66,13 @@ class Pencil:
         sizes: Bounds of the parts of degree 0 (none), 1, … N, and of the rest, each (n, n).
         linear: Coefficients of degree 1, in which what moves all frequencies alike cancels.
         quadratic: The same of degree 2.
+        rounding: Bounds of the rounding of both, shape (2, n, n).
     """
 
     sizes: list[Array]
     linear: Array
     quadratic: Array
+    rounding: Array
 
     @classmethod
     def of(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
@@ -88,15 +91,15 @@ class Pencil:
                 if (a, b) != (0, 0):
                     sizes[min(a + b, N + 1)] += ell[a] * of_m[b]
         sizes[-1] = sizes[-1] + sum(ell) * mass.rest + stiffness.rest
-        parts = []
+        parts, rounding = [], gamma(16) * np.stack(sizes[1:3])
         for m in (1, 2):
             part = stiffness.part(m)
             for a in range(max(0, m + 1 - len(mass.parts)), m + 1):
                 scaled = rate[a][:, None, None]
                 part = part - convolve(scaled, mass.parts[m - a], (a, m - a), d, np.multiply)
             parts.append(part)
-            sizes[m] = np.minimum(sizes[m], np.abs(part).sum(0))
-        return cls(sizes, *parts)
+            sizes[m] = np.minimum(sizes[m], np.abs(part).sum(0) + rounding[m - 1])
+        return cls(sizes, *parts, rounding)
 
     def loss(self, o: Rows, distance: Array, sign: float) -> float:
         """Bound of how far the block o, scaled by distances, of its sign × T falls over the box."""
@@ -105,10 +108,11 @@ class Pencil:
         block, weight = np.ix_(o, o), sign / np.sqrt(np.outer(distance, distance))
         norms = [float(np.linalg.norm(size[block] * weight, 2)) for size in self.sizes[1:]]
         line, bend = (part[:, o[:, None], o] * weight for part in (self.linear, self.quadratic))
-        norms[0] = min(norms[0], _linear_norm(line))
+        of_rounding = [float(np.linalg.norm(x[block] * weight, 2)) for x in self.rounding]
+        norms[0] = min(norms[0], _linear_norm(line) + of_rounding[0])
         squares = _squares(len(line))
-        norms[1] = min(norms[1], _norm_of_terms(bend, squares))
-        return sum(norms)
+        norms[1] = min(norms[1], _norm_of_terms(bend, squares) + of_rounding[1])
+        return sum(norms) + gamma(100 * len(o))
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +146,7 @@ class Comparison:
         least = 1 - max(pencil.loss(o[some], distance[some], sign) for some, sign in blocks)
         diagonal, off = distance - np.diag(total), total - np.diag(np.diag(total))
         inverse = np.asarray(np.linalg.inv(np.diag(diagonal) - off), float)
+        inverse = inverse * (1 + gamma(8 * len(o) ** 2))
         positive = bool((inverse >= 0).all() and (diagonal > 0).all())
         return cls(distance, diagonal, off, inverse if positive else None, least)
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.monomials import convolve, matmul
-from alphacut.frame.calculus.taylor_model import ROUND_OFF, TaylorModel, solve
+from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.dual.clusters import Subspaces
 from alphacut.frame.dual.intervening import DEGREE, BlockShares, Ends, damped_range, dots
 from alphacut.frame.dual.ranges import Ranges, response_ranges
@@ -78,15 +78,11 @@ class _Sums:
     sources: tuple[TaylorModel, TaylorModel]
 
     def less(self, other: _Sums) -> _Sums:
-        """What another's leave, with round-off of the difference."""
-
-        def left(a: TaylorModel, b: TaylorModel) -> TaylorModel:
-            return (a - b).loosened(ROUND_OFF * a.size())
-
+        """What another's leave."""
         return _Sums(
             (self.shares[0] - other.shares[0], self.shares[1] - other.shares[1]),
-            (left(self.outputs[0], other.outputs[0]), left(self.outputs[1], other.outputs[1])),
-            (left(self.sources[0], other.sources[0]), left(self.sources[1], other.sources[1])),
+            (self.outputs[0] - other.outputs[0], self.outputs[1] - other.outputs[1]),
+            (self.sources[0] - other.sources[0], self.sources[1] - other.sources[1]),
         )
 
 
@@ -94,7 +90,7 @@ def rest_of_modes(
     structure: Classical,
     found: Subspaces,
     shares: Sequence[BlockShares],
-    excited: TaylorModel,
+    coordinates: tuple[TaylorModel, TaylorModel],
     excitation: Excitation,
 ) -> Rest | None:
     """All modes that are not enclosed; None if there are none.
@@ -103,13 +99,13 @@ def rest_of_modes(
         structure: The structure.
         found: Its enclosed modes.
         shares: What they take and give.
-        excited: Sources in the coordinates of `found`, V = (sources, n).
+        coordinates: Outputs, V = (m, n), and sources, (sources, n), in the coordinates of `found`.
         excitation: The record, the nodes and the names of the sources.
     """
     others = found.others
     if not len(others):
         return None
-    sums = _of_all(structure, found, excited)
+    sums = _of_all(found, *coordinates)
     for of_block in shares:
         sums = sums.less(_of_block(of_block))
     low, high = float(found.low[others].min()), float(found.high[others].max())
@@ -141,17 +137,17 @@ def _known_by(
     return _least(structure, _bounds(sums, structure, found), ranges)
 
 
-def _of_all(structure: Classical, found: Subspaces, excited: TaylorModel) -> _Sums:
-    """Sums over all modes."""
+def _of_all(found: Subspaces, read: TaylorModel, excited: TaylorModel) -> _Sums:
+    """Sums over all modes of outputs `read` and sources, which may depend on the inputs."""
     centre, order = found.centre, DEGREE
     mass, stiffness = centre.mass, centre.stiffness
-    if (excited - excited.value).size().any():
+    if len(excited.present()):
         order, d = excited.order, excited.inputs
         mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))
     else:
-        excited = mass.like(excited.value)
+        excited = mass.like(excited.value).loosened(excited.rest)
     mass, stiffness = mass.to_order(order), stiffness.to_order(order)
-    rows = stiffness.like(structure.rows @ centre.basis)
+    rows = stiffness.like(read.value).loosened(read.rest)
     massive, light = slice(0, centre.modes), slice(centre.modes, None)
     heavy, stiff = found.variation
     forced = excited @ mass
@@ -202,7 +198,7 @@ def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Ar
             known = known - convolve(parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul)
         parts.append(known / middle)
     found = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
-    return found, (found @ matrix).rest + rows.rest
+    return found, (found @ matrix - rows).size()
 
 
 def _of_block(of_block: BlockShares) -> _Sums:

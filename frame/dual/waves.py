@@ -22,8 +22,9 @@ from math import comb, perm
 
 import numpy as np
 
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.response.step_integrals import UNIT_ROUNDOFF, require_in_range
+from alphacut.frame.response.step_integrals import require_in_range
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.fuzzy.arrays import Array
 

@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.step_integrals import (
-    UNIT_ROUNDOFF,
     error_of_integrals,
     require_in_range,
     step_integrals,

@@ -15,11 +15,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.fuzzy.arrays import Array
 
-UNIT_ROUNDOFF = np.finfo(float).eps / 2
-"""u, the largest relative error of one rounded operation."""
 TERMS = 26
 """Terms of the power series; from |z| ≤ 2 the rest is below 2²⁶/26! = 2e-19."""
 FROM_RECURRENCE = 2.0

@@ -6,6 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import (
     responses_at_named_nodes,
@@ -16,7 +17,6 @@ from alphacut.frame.response.duhamel import (
 from alphacut.frame.response.step_integrals import (
     ERROR_OF_INTEGRALS,
     FROM_RECURRENCE,
-    UNIT_ROUNDOFF,
     error_of_integrals,
     step_integrals,
 )
