@@ -155,6 +155,8 @@ def _method(
     if method is None:
         method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
     if not isinstance(method, str):
+        runs = hasattr(method, "run") and not isinstance(method, type)
+        require(runs, "method", repr(method), f"{', '.join(METHODS)}, or an object as Proof()")
         require(not options, "options", [*options], "none beside a method that is no name")
         return method
     chosen("method", method, METHODS)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from inspect import signature
 from pathlib import Path
 from time import perf_counter
 from typing import Literal
@@ -119,7 +120,9 @@ def propagate(
 def _checked(method: Method, on_failure: str) -> Method:
     """The method, which must be an object that runs."""
     runs = hasattr(method, "run") and not isinstance(method, type)
-    require(runs, "method", repr(method), "an object such as General() or Signed()")
+    runs = runs and len(signature(method.run).parameters) == 2  # campaign and domain
+    cure = "IntervalQuasiMonteCarlo().run(…) takes random inputs besides"
+    require(runs, "method", repr(method), "an object such as General() or Signed()", cure)
     chosen("on_failure", on_failure, ("raise", "skip"))
     return method
 

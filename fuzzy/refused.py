@@ -2,11 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from math import inf, isfinite, nan
 from numbers import Integral, Real
 
 import numpy as np
+
+LONGEST = 300
+"""Characters of a message; beyond it value and allowed values are cut, and never the cure."""
+LEAST_SHOWN = 20
+"""Characters that remain of a value or of allowed values."""
+
+
+def printable(value: object, most: int = LONGEST) -> str:
+    """A value on one line without control characters, and at most `most` characters of it."""
+    try:
+        text = str(value)[: 4 * most]
+    except ValueError:  # of an integer longer than Python writes
+        text = "a number of thousands of digits"
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return line if len(line) <= most else f"{line[: most - 1]}…"
+
+
+def fitted(value: str, allowed: str, line: Callable[[str, str], str], cure: str = "") -> str:
+    """A message of at most `LONGEST` characters.
+
+    Args:
+        value: The value, which is cut first.
+        allowed: Allowed values, which are cut next.
+        line: The message but its cure, from the two.
+        cure: The cure, which is added as it is.
+    """
+    end = f"; {cure}" if cure else ""
+    room = max(LONGEST - len(end), LEAST_SHOWN)
+    excess = len(line(value, allowed)) - room
+    value = printable(value, max(LEAST_SHOWN, len(value) - max(excess, 0)))
+    excess = len(line(value, allowed)) - room
+    allowed = printable(allowed, max(LEAST_SHOWN, len(allowed) - max(excess, 0)))
+    return printable(line(value, allowed), room) + end
 
 
 class RefusedError(ValueError):
@@ -21,8 +54,12 @@ class RefusedError(ValueError):
 
     def __init__(self, key: str, value: object, allowed: str, cure: str = "") -> None:
         self.key, self.value, self.allowed, self.cure = key, value, allowed, cure
-        has = "is missing" if value is None else f"is {value}"
-        super().__init__(f"{key} {has}; allowed: {allowed}" + (f"; {cure}" if cure else ""))
+
+        def line(value_text: str, allowed_text: str) -> str:
+            has = "is missing" if value is None else f"is {value_text}"
+            return f"{key} {has}; allowed: {allowed_text}"
+
+        super().__init__(fitted(printable(value), allowed, line, cure))
 
 
 class FailedError(RuntimeError):
@@ -35,7 +72,7 @@ class FailedError(RuntimeError):
 
     def __init__(self, what: str, cure: str = "") -> None:
         self.what, self.cure = what, cure
-        super().__init__(what + (f"; {cure}" if cure else ""))
+        super().__init__(fitted(what, "", lambda text, _: text, cure))
 
 
 def real(
@@ -62,12 +99,16 @@ def real(
     """
     least, kind = (max(least, 0), Integral) if whole else (least, Real)
     truth = type(value).__name__ in ("bool", "bool_")
-    number = float(value) if isinstance(value, kind) and not truth else nan
+    try:
+        number = float(value) if isinstance(value, kind) and not truth else nan
+    except OverflowError:  # of an integer
+        number = inf
     allowed = "whole numbers" if whole else "finite numbers"
     allowed += " greater than 0" if positive else f" from {least:g} on" if least > -inf else ""
     allowed += f", up to {most:g}" if most < inf else ""
     inside = isfinite(number) and least <= number <= most and (number > 0 or not positive)
-    require(inside, key, repr(value), allowed)
+    shown = printable(value) if isinstance(value, Integral) else repr(value)
+    require(inside, key, shown, allowed)
     return number
 
 

@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from alphacut.case.content import Content
 from alphacut.case.keys import every_key, sections
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import RefusedError, printable, require
 from alphacut.io.problem import BadInput, Problem, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
@@ -78,10 +78,11 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 def _parsed(path: Path, text: str) -> dict[str, object]:
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
-    except (RecursionError, tomllib.TOMLDecodeError) as error:
+    except (RecursionError, ValueError) as error:  # an integer too long is no TOMLDecodeError
         where = re.search(r"\(at line (\d+), column \d+\)", str(error))
         lines = [] if isinstance(error, RecursionError) else text.splitlines()
-        line = int(where[1]) if where else len(lines)
+        long = (k for k, text in enumerate(lines, 1) if re.search(r"[0-9_]{4000}", text))
+        line = int(where[1]) if where else next(long, len(lines))
         shown = lines[line - 1].strip() if len(lines) >= line > 0 else ""
         what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
         raise BadInput(Problem(shown or "the file", what, file=str(path), line=line)) from None
@@ -145,7 +146,7 @@ def _key(place: tuple[int | str, ...]) -> str:
 
 def _written(value: object) -> str:
     """A value as it stood in the file, near enough."""
-    return f'"{value}"' if isinstance(value, str) else str(value).replace("'", '"')
+    return f'"{value}"' if isinstance(value, str) else printable(value).replace("'", '"')
 
 
 def _located(
@@ -217,7 +218,7 @@ def _value(text: str) -> object:
     """Value of a change: TOML where it is TOML, names with commas as an array, else text."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
-    except (RecursionError, tomllib.TOMLDecodeError):
+    except (RecursionError, ValueError):
         pass
     if re.fullmatch(r"[\w .+-]+(,[\w .+-]+)+", text):
         return [_value(part.strip()) for part in text.split(",")]

@@ -16,13 +16,10 @@ from typing import Any, TextIO
 import numpy as np
 from pydantic_core import to_json
 
-from alphacut.fuzzy.refused import FailedError, RefusedError, require
-from alphacut.io.problem import printable
+from alphacut.fuzzy.refused import FailedError, RefusedError, printable, require
 
 FULL = 1 << 20
 """Bytes that a disk has at least where it is not full."""
-LONGEST = 1000
-"""Characters of a line to people."""
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
 OUTPUTS = ("out", "json", "export", "csv")
@@ -122,7 +119,7 @@ def say(message: str) -> None:
     """One line to people, on standard error; the first rank alone speaks."""
     if rank() == 0:
         with suppress(OSError):
-            print(f"alphacut: {printable(message, LONGEST)}", file=sys.stderr, flush=True)
+            print(f"alphacut: {printable(message)}", file=sys.stderr, flush=True)
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:

@@ -7,16 +7,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Self
 
-from alphacut.fuzzy.refused import RefusedError
-
-MOST = 200
-"""Characters of a value that a message shows."""
-
-
-def printable(text: object, most: int = MOST) -> str:
-    """The text on one line without control characters, and at most `most` characters of it."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in str(text)[: 4 * most]).split())
-    return line if len(line) <= most else f"{line[: most - 1]}…"
+from alphacut.fuzzy.refused import RefusedError, fitted, printable
 
 
 @dataclass(frozen=True)
@@ -44,17 +35,19 @@ class Problem:
     @classmethod
     def of(cls, error: RefusedError) -> Self:
         """The problem of a value that a constructor refused."""
-        value = "" if error.value is None else str(error.value)
+        value = "" if error.value is None else printable(error.value)
         what = "is missing" if error.value is None else ""
         return cls(error.key, what, value, error.allowed, error.cure)
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
-        value = f" is {printable(self.value)}" if self.value else ""
-        what = f"{':' * bool(value)} {self.what}" if self.what else ""
-        allowed = f"; allowed: {printable(self.allowed)}" if self.allowed else ""
-        cure = f"; {self.cure}" if self.cure else ""
-        return printable(f"{place}{printable(self.key)}{value}{what}{allowed}{cure}", 1000)
+
+        def line(value: str, allowed: str) -> str:
+            has = f" is {value}" if value else ""
+            what = f"{':' * bool(value)} {self.what}" if self.what else ""
+            return f"{place}{self.key}{has}{what}" + (f"; allowed: {allowed}" if allowed else "")
+
+        return fitted(printable(self.value), printable(self.allowed), line, printable(self.cure))
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Sequence
 
@@ -13,7 +12,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.io.quantity import factor
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import TextFile, acceleration_factor
-from alphacut.stochastic.particles.csv_columns import NUMBER
+from alphacut.stochastic.particles.csv_columns import NUMBER, cells_of
 
 HEAD = re.compile(r"(time|t)\s*[\[(](.+)[\])]|(acceleration|acc|a)\s*[\[(](.+)[\])]", re.IGNORECASE)
 ALLOWED = "time [s],acceleration [m/s^2], [g] or [gal]"
@@ -41,7 +40,7 @@ def _rows(file: TextFile) -> list[tuple[int, list[str]]]:
     allowed = "a header with units, and rows of numbers below it"
     require(len(lines) > 1, file.name, f"{len(lines)} lines", allowed)
     separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    return [(place, next(csv.reader([line], delimiter=separator))) for place, line in lines]
+    return [(place, cells_of(file.name, place + 1, line, separator)) for place, line in lines]
 
 
 def _units(file: TextFile, head: list[str]) -> tuple[float, str, float]:

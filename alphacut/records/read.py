@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.records.cosmos import is_cosmos, read_cosmos
 from alphacut.records.csv_record import read_csv_record
 from alphacut.records.esm import is_esm, read_esm
@@ -33,6 +34,16 @@ def read_recording(path: Path, channel: str = "") -> Recording:
         RefusedError: The file cannot be read, is of another format, or its head and its samples
             do not fit; the message names the line.
     """
+    try:
+        return _read(path, channel)
+    except RefusedError:
+        raise
+    except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
+        raise RefusedError(path.name, str(error), "numbers of a recording") from None
+
+
+def _read(path: Path, channel: str) -> Recording:
+    """Recording of a file by its format."""
     if path.suffix.lower() in ENDINGS:
         return read_uff_record(path, channel)
     file = TextFile.read(path)

@@ -21,6 +21,8 @@ GRAVITY_UNIT = re.compile(r"g(?:'s|s)?", re.IGNORECASE)
 PER_SECOND_SQUARED = re.compile(
     r"(cm|m)\s*/\s*(?:s(?:ec)?\s*/\s*s(?:ec)?|s(?:ec)?\s*(?:\^|\*\*)?\s*(?:2|²))", re.IGNORECASE
 )
+LONGEST_LINE = 10_000
+"""Letters of a line; formats have about 80, and searches of a line take their square."""
 ACCELERATION_UNITS = "g, gal, cm/s^2 or m/s^2"
 
 
@@ -41,7 +43,8 @@ class TextFile:
         """The lines of a file in UTF-8 or Latin-1.
 
         Raises:
-            RefusedError: The file cannot be read, or holds bytes that no text has.
+            RefusedError: The file cannot be read, holds bytes that no text has, or a line of more
+                than `LONGEST_LINE` letters.
         """
         try:
             content = path.read_bytes()
@@ -54,7 +57,13 @@ class TextFile:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
             text = content.decode("latin-1")
-        return cls(path.name, tuple(re.split(r"\r\n|\r|\n", text)))
+        file = cls(path.name, tuple(re.split(r"\r\n|\r|\n", text)))
+        lengths = [len(line) for line in file.lines]
+        longest = lengths.index(max(lengths))
+        if lengths[longest] > LONGEST_LINE:
+            allowed = f"lines of up to {LONGEST_LINE:,} letters"
+            raise file.refusal(longest, f"{lengths[longest]:,} letters long", allowed)
+        return file
 
     def refusal(self, line: int, value: object, allowed: str, cure: str = "") -> RefusedError:
         """Error about a line, counted from 0."""

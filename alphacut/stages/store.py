@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
@@ -141,8 +142,10 @@ class StageStore:
         with showing(self.shown) as tick:
             for done, future in enumerate(as_completed(under_way), start=1):
                 stage = under_way[future]
+                with named_worker(stage):
+                    result = future.result()
                 with TemporaryDirectory() as scratch:
-                    results[stage.name] = self._put(stage, future.result(), Path(scratch))
+                    results[stage.name] = self._put(stage, result, Path(scratch))
                 if tick:
                     tick(done / len(under_way))
         return results
@@ -179,7 +182,7 @@ class StageStore:
         self.folder.require_free(f"{stage.name}.nc")
         samples = self._samples(self.folder) if stage.has_samples else None
         with TemporaryDirectory() as scratch:
-            with showing(self.shown) as tick:
+            with showing(self.shown) as tick, named_worker(stage):
                 result = stage.compute(Work(Path(scratch), samples, self.workers, tick))
             return self._put(stage, result, Path(scratch))
 
@@ -215,6 +218,20 @@ class StageStore:
         """Writes a text file of the run itself, such as summary.json."""
         if self.folder is not None and rank() == 0:
             put_text(self.folder, name, text)
+
+
+@contextmanager
+def named_worker(stage: Stage) -> Iterator[None]:
+    """Names the stage where a process dies that computes for it.
+
+    Raises:
+        FailedError: One died.
+    """
+    try:
+        yield
+    except BrokenExecutor as error:
+        cure = "out of memory, or a crash in compiled code; the stages that are done stay"
+        raise FailedError(f"a worker process died in stage {stage.name}", cure) from error
 
 
 def put_text(folder: ResultsFolder, name: str, text: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, variables
 from alphacut.frame.structures.quantities import Parameter
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError, require
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +62,16 @@ class Accelerogram:
     acceleration: Array = field(repr=False)
 
     def __post_init__(self) -> None:
-        samples = np.asarray(self.acceleration, float)
-        several = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
-        what = f"{samples.size} samples every {self.step:g} s"
         allowed = "two or more finite samples, a positive step"
-        require(several and 0 < self.step < np.inf, "accelerogram", what, allowed)
+        try:
+            samples, step = np.asarray(self.acceleration, float), float(self.step)
+        except (TypeError, ValueError):
+            what = f"{self.acceleration!r} every {self.step!r} s"
+            raise RefusedError("accelerogram", what, allowed) from None
+        several = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
+        what = f"{samples.size} samples every {step:g} s"
+        require(several and 0 < step < np.inf, "accelerogram", what, allowed)
+        object.__setattr__(self, "step", step)
         object.__setattr__(self, "acceleration", samples)
 
     @property
@@ -74,6 +79,16 @@ class Accelerogram:
         """Largest magnitude (m/s²), slope between samples (m/s³) and jump at the end (m/s²)."""
         size, slope = np.abs(self.acceleration), np.abs(np.diff(self.acceleration))
         return float(size.max()), float(slope.max()) / self.step, float(size[-1])
+
+
+def require_ground(ground: object) -> None:
+    """Refuses a base excitation that is no record.
+
+    Raises:
+        RefusedError: It is none.
+    """
+    is_record = ground is None or isinstance(ground, Accelerogram)
+    require(is_record, "ground", type(ground).__name__, "an Accelerogram, or None")
 
 
 class LinearSystem(Protocol):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
-from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.linear import Accelerogram, Matrices, require_ground
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Rows
@@ -71,6 +71,7 @@ class MatrixStructure:
             real(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
             require(bool(getattr(self, kind)), kind, None, "one entry at least")
+        require_ground(self.ground)
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))

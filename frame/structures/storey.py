@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
-from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.linear import Accelerogram, Matrices, require_ground
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
@@ -92,6 +92,7 @@ class StoreyFrame:
     def __post_init__(self) -> None:
         self._require_values()
         self._require_springs()
+        require_ground(self.ground)
         n = len(self.masses)
         filled: dict[str, Sequence[float]] = {
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
@@ -105,6 +106,8 @@ class StoreyFrame:
         object.__setattr__(self, "outputs", tuple(Output(str(name)) for name in names))
         for output in self.outputs:
             self.quantity(output)
+        once = len(set(self.outputs)) == len(self.outputs)
+        require(once, "output", ", ".join(self.outputs), "each output once")
         self.require_standing({})
 
     def _require_values(self) -> None:

@@ -12,6 +12,8 @@ from itertools import islice
 from time import perf_counter, sleep
 from typing import ParamSpec, TypeVar
 
+import numpy as np
+
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Outcome
 from alphacut.fuzzy.refused import FailedError, real
@@ -117,12 +119,20 @@ def completed(
                 return
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 batch = waiting.pop(future)
-                outcomes, seconds = _result(future)
+                outcomes, seconds = _result(future, f" at or near {_sample_words(call, batch)}")
                 size = int(min(max(_ENOUGH * len(batch) / max(seconds, 1e-9), 1), _LARGEST))
                 yield from ((rows, one) for (rows, _), one in zip(batch, outcomes, strict=True))
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _sample_words(call: Call, batch: list[Task]) -> str:
+    """The first sample of a batch by its number and inputs, for messages."""
+    rows, points = batch[0]
+    first = np.atleast_2d(points)[0]
+    values = ", ".join(f"{x} = {y:.6g}" for x, y in zip(call.names, first, strict=False))
+    return f"sample {rows[0] + 1} ({values})"
 
 
 def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
@@ -131,15 +141,20 @@ def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
     return [call(points) for points in batch], perf_counter() - start
 
 
-def _result(future: Future[T]) -> T:
-    """Result of a batch; its calls raise nothing themselves."""
+def _result(future: Future[T], at: str = "") -> T:
+    """Result of a batch; its calls raise nothing themselves.
+
+    Args:
+        future: The batch.
+        at: Words on the samples that it computes, for the message.
+    """
     try:
         return future.result()
     except Exception as error:
         what = f"the function or its outputs cannot be sent between processes: {error}"
         cure = "take workers=1, or out of it what cannot be copied"
         if isinstance(error, BrokenExecutor):
-            what = "a worker process died"
+            what = f"a worker process died{at}"
             cure = "out of memory, or a crash in compiled code; what a store holds stays"
         raise FailedError(what, cure) from error
 

@@ -101,6 +101,7 @@ def mean_cuts(data: Observations) -> Stepwise:
     sums = [np.append(0.0, np.cumsum(row)) / data.count for row in (data.lower, data.upper)]
     lower = low * band + np.interp(1 - band, count, sums[0])
     upper = high * band + sums[1][-1] - np.interp(band, count, sums[1])
+    lower, upper = np.maximum(lower, low), np.minimum(upper, high)  # but for round-off they are
     least, most = np.maximum.accumulate(lower), np.minimum.accumulate(upper)
     return Stepwise((0.0, *LEVELS), (low, *least), (high, *most))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -78,11 +79,18 @@ def _limits(bounds: Limits | None) -> tuple[float, float]:
     return low, high
 
 
+def _is_number(value: object) -> bool:
+    """True for a number that a float can hold; truth values are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        return False
+    return not isinstance(value, int) or abs(value) < sys.float_info.max
+
+
 def _pair(number: int, value: object) -> tuple[float, float]:
     """Lower and upper end of one value."""
     ends = np.atleast_1d(np.asarray(value, object))
     plain = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
-    if plain and all(isinstance(end, int | float | np.number) for end in ends):
+    if plain and all(_is_number(end) for end in ends):
         low, high = float(ends[0]), float(ends[-1])
         if low <= high and low < np.inf and high > -np.inf and np.isfinite((low, high)).any():
             return low, high

@@ -79,9 +79,21 @@ class PrismForm:
         """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
 
         Raises:
-            FoldedMeshError: An element is inverted.
-            RefusedError: The density of θ is not positive at a quadrature point.
+            FoldedMeshError: An element is inverted; the form then stays where it was.
+            RefusedError: The density of θ is not positive at a quadrature point, likewise.
         """
+        names = ("_levels", "_law", "areas")
+        nodes = self.mesh.geometry.x.copy()
+        state = {name: getattr(self, name) for name in names if hasattr(self, name)}
+        try:
+            self._move(radius)
+        except (FoldedMeshError, RefusedError):
+            self.mesh.geometry.x[:] = nodes
+            self.__dict__.update(state)
+            raise
+
+    def _move(self, radius: RadiusMap) -> None:
+        """Moves the nodes, and marks the particle where they are sound."""
         positions, geometry = self.grid.positions(radius), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.levels(radius.distribution)

@@ -18,6 +18,8 @@ METRES |= {"micron": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254, "ft": 0.304
 DIAMETERS, RADII = ("d", "diameter", "size"), ("r", "radius")
 HEADER = r"\s*(\w+)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?\s*"
 """Name of a column, and its unit in brackets."""
+LONGEST = 100
+"""Characters of a number; a longer field is none."""
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
@@ -55,7 +57,20 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
         allowed = "a header with units, and rows of numbers below it"
         raise RefusedError(path.name, f"{len(lines)} lines", allowed)
     separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    return [(row, next(csv.reader([line], delimiter=separator))) for row, line in lines]
+    return [(row, cells_of(path.name, row, line, separator)) for row, line in lines]
+
+
+def cells_of(name: str, row: int, line: str, separator: str) -> list[str]:
+    """Fields of a line of a file.
+
+    Raises:
+        RefusedError: A field is longer than Python's reader takes.
+    """
+    try:
+        return next(csv.reader([line], delimiter=separator))
+    except csv.Error:
+        what, allowed = f"{len(line):,} letters", f"fields up to {csv.field_size_limit():,} letters"
+        raise RefusedError(f"{name}, row {row}", what, allowed) from None
 
 
 def text_of(path: Path) -> str:
@@ -78,7 +93,7 @@ def number(path: Path, row: int, cells: Sequence[str], place: int) -> float:
         RefusedError: The field is missing or holds no number.
     """
     text = cells[place].strip() if place < len(cells) else ""
-    if not NUMBER.fullmatch(text) or not isfinite(float(text)):
+    if len(text) > LONGEST or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
         raise RefusedError(f"{path.name}, row {row}, column {place + 1}", repr(text[:40]), allowed)
     return float(text)

@@ -38,7 +38,8 @@ def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
     centre = n == 0  # one solution each, radial: 1 outside, 3 inside
     singular[centre, :, 1], singular[centre, 1, :] = 0.0, 0.0
     singular[centre, 1, 1], regular[centre, 1, :] = 1.0, 0.0
-    torsion = (n - 1) * (soft - stiff) / ((n + 2) * soft + (n - 1) * stiff)
+    balance = np.where(centre, 1.0, (n + 2) * soft + (n - 1) * stiff)  # degree 0 has no torsion
+    torsion = np.where(centre, 0.0, (n - 1) * (soft - stiff) / balance)
     return np.asarray(np.linalg.solve(singular, regular)), np.asarray(torsion)
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from concurrent.futures import BrokenExecutor
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ import alphacut
 from alphacut.case.content import Content
 from alphacut.case.load import Case, load
 from alphacut.entry import main
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary, require_same_run
 from alphacut.stages import envelope, modulus
@@ -84,6 +85,15 @@ def test_fingerprints_do_not_depend_on_where_functions_lie_in_memory():
     models = [content.pendulum.structure(None) for _ in range(2)]
     assert models[0].model.lagrangian is not models[1].model.lagrangian
     assert len({envelope.stage(model, task).key for model in models}) == 1
+
+
+def test_a_worker_that_dies_names_its_stage(tmp_path):
+    def compute(work):
+        raise BrokenExecutor("killed")
+
+    stage = Stage("thing", 1, ("fuzzy",), compute)
+    with pytest.raises(FailedError, match="a worker process died in stage thing; out of memory"):
+        store_in(tmp_path).take(stage)
 
 
 def test_fingerprints_see_every_input(tmp_path):

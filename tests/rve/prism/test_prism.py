@@ -231,6 +231,18 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
     assert solve(bent, mesh_size=0.4, layers=8).modulus > 20e9
 
 
+def test_a_map_that_folds_the_mesh_leaves_the_model_as_it_was(monkeypatch):
+    problem = PrismModel(0.4, 2).problem(HermiteMap(0.3, 0, 0.5, 0))
+    form = problem.form
+    before = form.mesh.geometry.x.copy(), form.areas.copy(), form.slices()[0].copy()
+    mirrored = form.grid.positions(HermiteMap(0.2, 0, 0.6, 0)) * [-1, 1, 1]
+    monkeypatch.setattr(type(form.grid), "positions", lambda grid, radius: mirrored)
+    with pytest.raises(FoldedMeshError):
+        form.place(HermiteMap(0.2, 0, 0.6, 0))
+    after = form.mesh.geometry.x, form.areas, form.slices()[0]
+    assert all(np.array_equal(x, y) for x, y in zip(before, after, strict=True))
+
+
 @pytest.mark.parametrize(
     ("petsc", "error", "message"),
     [

@@ -1,0 +1,90 @@
+"""Messages: one line of at most 300 characters, the cure whole; odd values name what is allowed."""
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
+from alphacut.fuzzy import Crisp, FailedError, RefusedError, Triangular, propagate
+from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo
+from alphacut.fuzzy.refused import real
+from alphacut.io.problem import Problem
+from tests.alphacut.small import FRAME, written
+
+CURE = "take it from the head of the file"
+
+
+def test_value_and_allowed_are_cut_and_never_the_cure():
+    for value, allowed in (("v" * 9000, "a number"), ("v", "a" * 9000), ("v" * 9000, "a" * 9000)):
+        error = RefusedError("key", value, allowed, CURE)
+        for message in (str(error), str(Problem.of(error))):
+            assert len(message) <= 300
+            assert message.endswith(CURE)
+            assert message.startswith("key is v")
+            assert "; allowed: a" in message
+    failed = FailedError("w" * 9000, CURE)
+    assert len(str(failed)) <= 300
+    assert str(failed).endswith(CURE)
+
+
+@pytest.mark.parametrize("digits", ["9" * 6000, "0x" + "f" * 6000])
+def test_an_integer_of_thousands_of_digits_is_one_line(tmp_path, capfd, digits):
+    case = written(tmp_path, FRAME.replace('"10 mm"', digits))
+    assert main(["check", str(case)]) == 2
+    err = capfd.readouterr().err
+    assert len(err.splitlines()) == 1
+    assert len(err) < 320
+    assert "case.toml:11: " in err
+    assert main(["check", str(written(tmp_path)), "--set", f"envelope.gain={digits}"]) == 2
+    assert "envelope.gain" in capfd.readouterr().err
+    with pytest.raises(RefusedError, match="thousands of digits"):
+        real("x", int(digits, 16))
+
+
+@pytest.mark.parametrize("head", ["time [s],acceleration [m/s^2]", "x [mm],y [mm],r [mm]"])
+def test_a_field_of_200_kb_is_one_line(tmp_path, capfd, head):
+    (tmp_path / "a.csv").write_text(f"{head}\n0,0,1\n0.1,{'1' * 200_000},1\n")
+    text = FRAME.replace('displacements = "10 mm"', 'accelerogram = "a.csv"')
+    if "r [mm]" in head:
+        from alphacut.stochastic.particles.csv_columns import length_columns
+
+        with pytest.raises(RefusedError, match=r"a.csv, row 3.* 200,006 letters"):
+            length_columns(tmp_path / "a.csv", ("x", "y", "r"))
+        return
+    assert main(["check", str(written(tmp_path, text))]) == 2
+    assert "letters" in capfd.readouterr().err
+
+
+FLOOR = StoreyFrame((1e4,), (3.0,), 2e10, (1e-5,), dampers=(50.0,), q0=(0.01,))
+TIMES = {"duration": 0.1, "step": 0.02, "progress": False}
+MISUSES = {
+    "a class as method": lambda: envelope(FLOOR, {"E": Crisp(2e10)}, method=Proof, **TIMES),
+    "a number as method": lambda: envelope(FLOOR, {"E": Crisp(2e10)}, method=3, **TIMES),
+    "a record of text": lambda: Accelerogram(0.01, ["a", "b"]),
+    "a step of text": lambda: Accelerogram("a", np.ones(3)),
+    "ground that is no record": lambda: StoreyFrame(
+        (1e4,), (3.0,), 2e10, (1e-5,), dampers=(50.0,), ground=np.ones(5)
+    ),
+    "ground of matrices that is no record": lambda: MatrixStructure(
+        {"k": 1.0}, [(1.0, np.eye(1))], [("k", np.eye(1))], {"x": np.ones(1)}, ground=[1.0, 2.0]
+    ),
+    "an output twice": lambda: StoreyFrame(
+        (1e4,), (3.0,), 2e10, (1e-5,), q0=(0.01,), outputs=("q1", "q1")
+    ),
+    "no output": lambda: MatrixStructure({"k": 1.0}, [(1.0, np.eye(1))], [("k", np.eye(1))], {}),
+    "random inputs in propagate": lambda: propagate(
+        lambda a: {"y": a}, {"a": Triangular(0, 1, 2)}, IntervalQuasiMonteCarlo(), progress=False
+    ),
+    "no random inputs": lambda: IntervalQuasiMonteCarlo().run(
+        lambda a: {"y": a}, {}, {"a": Triangular(0, 1, 2)}, alpha=[0.0]
+    ),
+}
+
+
+@pytest.mark.parametrize("misuse", MISUSES.values(), ids=MISUSES)
+def test_a_misuse_in_python_is_refused_by_name(misuse):
+    with pytest.raises(RefusedError) as refused:
+        misuse()
+    assert refused.value.key
+    assert refused.value.allowed
+    assert len(str(refused.value)) <= 300
