@@ -96,7 +96,7 @@ def measured(duration: float, step: float, wide: float) -> Iterator[dict[str, An
         name: Interval(middle + wide * (low - middle), middle + wide * (high - middle))
         for name, (middle, low, high) in ends.items()
     }
-    motion: dict[str, Any] = {"duration": duration, "step": step, "alpha": (0,)}
+    motion: dict[str, Any] = {"duration": duration, "step": step, "alpha": (0,), "relative": False}
     truth = envelope(FRAME, inputs, method=Proof(1e-6), **motion)
     for method in METHODS:
         begun = time.perf_counter()
