@@ -1,4 +1,4 @@
-"""Expansions, eigenpairs and tables hold their bounds, and half of a bound would not do."""
+"""Taylor models, eigenpairs and tables hold their bounds; half of a bound would not do."""
 
 from dataclasses import replace
 
