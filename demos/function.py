@@ -45,10 +45,10 @@ plt.show()
 # cut are enough, and the bounds are guaranteed.
 
 # %%
-from alphacut.fuzzy import Known, Signed
+from alphacut.fuzzy import Knowledge, Signed
 
-known = Known(signs={"load": 1, "length": 1, "stiffness": -1})
-print(propagate(deflection, inputs, Signed(), known=known, progress=False))
+knowledge = Knowledge(signs={"load": 1, "length": 1, "stiffness": -1})
+print(propagate(deflection, inputs, Signed(), knowledge=knowledge, progress=False))
 
 # %% [markdown]
 # ## Dear functions

@@ -61,11 +61,11 @@ METHODS: dict[str, type[Any]] = {
 def envelope(
     model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber | float],
+    method: Method | str | None = None,
     *,
     duration: float,
     step: float,
     alpha: Sequence[float] = ALPHA,
-    method: Method | str | None = None,
     integrator: str | Integrator | None = None,
     relative: bool = True,
     store: Path | str | None = None,
@@ -78,11 +78,11 @@ def envelope(
     Args:
         model: A linear structure or a general Lagrangian system.
         inputs: Fuzzy parameters by name, in SI units; a plain number is a crisp one.
+        method: A method such as `Proof()`, or its name, see `METHODS`; unless given `Auto()` for
+            linear structures, and `ImprovedFollower()` for others.
         duration: Length of the simulation, in s.
         step: Distance of the nodes and step of the integrator, in s.
         alpha: Levels, rising within [0, 1].
-        method: A method such as `Proof()`, or its name, see `METHODS`; unless given `Auto()` for
-            linear structures, and `ImprovedFollower()` for others.
         integrator: Time stepping of linear structures, an integrator or its name: exact (of auto,
             proof and search unless given), midpoint (of all others), rk4. Of general Lagrangian
             systems it is midpoint.

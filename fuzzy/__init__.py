@@ -3,7 +3,7 @@
 from alphacut.fuzzy.campaign.store import Store
 from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
-from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
@@ -24,7 +24,7 @@ from alphacut.fuzzy.sets.numbers import (
 
 __all__ = [
     "Automatic", "Bounds", "Crisp", "Ellipsoidal", "Extended", "FailedError", "FuzzyNumber",
-    "General", "Interval", "IntervalQuasiMonteCarlo", "Known", "Linear", "Nature",
+    "General", "Interval", "IntervalQuasiMonteCarlo", "Knowledge", "Linear", "Nature",
     "Optimisation", "PiecewiseLinear", "RandomInput", "Reduced", "RefusedError",
     "Signed", "Store", "Trapezoidal", "Triangular", "from_data", "jointly", "levels",
     "propagate", "width_shares",

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from time import monotonic
 
 Progress = Callable[[float], None]
-_WAIT = 1.0  # seconds before a bar appears
-_EVERY = 0.2  # seconds between its moves
-_LINES = 10.0  # seconds between lines where there is no terminal
-_WIDTH = 30
+_BAR_DELAY = 1.0  # seconds before a bar appears
+_BAR_PERIOD = 0.2  # seconds between its updates
+_LINE_PERIOD = 10.0  # seconds between lines where there is no terminal
+_WIDTH = 30  # letters of the bar
 
 
 def share(progress: Progress | None, first: float, last: float) -> Progress:
-    """Progress of a part of a task, from `first` to `last` of the whole."""
+    """Progress of a part of a task: from the share `first` of the task to `last`."""
     if progress is None:
         return lambda done: None
     return lambda done: progress(first + (last - first) * done)
@@ -23,7 +23,7 @@ def share(progress: Progress | None, first: float, last: float) -> Progress:
 
 @contextmanager
 def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """Function that the share done goes to.
+    """Function that takes the share done.
 
     Args:
         progress: The caller's function; None (or True) for a bar on a terminal, and a line now and
@@ -40,14 +40,14 @@ def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
 
 
 class _Bar:
-    """A bar that appears if it is still wanted after a second, and leaves nothing behind."""
+    """Progress bar on a terminal; it appears after a second and is removed in the end."""
 
     def __init__(self) -> None:
         self.begun, self.moved = monotonic(), 0.0
 
     def __call__(self, share: float) -> None:
         now = monotonic()
-        if now - self.begun >= _WAIT and now - self.moved >= _EVERY:
+        if now - self.begun >= _BAR_DELAY and now - self.moved >= _BAR_PERIOD:
             self.moved, full = now, round(_WIDTH * share)
             bar = "█" * full + "░" * (_WIDTH - full)
             _on_terminal(f"{bar} {share:4.0%} {now - self.begun:.0f} s")
@@ -59,21 +59,21 @@ class _Bar:
 
 
 class _Lines:
-    """A line every ten seconds, with the end that is foreseen, for a file or a pipe."""
+    """Progress as a line every ten seconds, with the time left, for a file or a pipe."""
 
     def __init__(self) -> None:
         self.begun = self.written = monotonic()
 
     def __call__(self, share: float) -> None:
         now = monotonic()
-        if now - self.written >= _LINES:
-            self.written, spent = now, now - self.begun
-            left = f", some {spent / share - spent:.0f} s left" if share > 0 else ""
-            sys.stderr.write(f"{share:4.0%} after {spent:.0f} s{left}\n")
+        if now - self.written >= _LINE_PERIOD:
+            self.written, elapsed = now, now - self.begun
+            left = f", some {elapsed / share - elapsed:.0f} s left" if share > 0 else ""
+            sys.stderr.write(f"{share:4.0%} after {elapsed:.0f} s{left}\n")
             sys.stderr.flush()
 
     def close(self) -> None:
-        """Nothing is left behind."""
+        """Does nothing: lines stay."""
 
 
 def _on_terminal(text: str) -> None:

@@ -1,4 +1,4 @@
-"""From a function and its fuzzy inputs to its fuzzy outputs, and what drives their width."""
+"""Propagation of fuzzy inputs through a function, and shares of the inputs in a width."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.campaign.store import Identity, Store, model_key
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.knowledge.joint import joined_inputs
-from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
-from alphacut.fuzzy.plans.design import Method
+from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import chosen, require
 from alphacut.fuzzy.result import Bounds, Nature
@@ -36,11 +36,11 @@ BUDGET = 10_000
 def propagate(
     function: Function,
     inputs: Mapping[str, FuzzyNumber | float],
-    method: Method | None = None,
+    method: Plan | None = None,
     *,
     alpha: Sequence[float] | None = None,
     interactions: Sequence[Interaction] = (),
-    known: Known | None = None,
+    knowledge: Knowledge | None = None,
     budget: int = BUDGET,
     units: Mapping[str, str] | None = None,
     on_failure: Literal["raise", "skip"] = "raise",
@@ -64,7 +64,7 @@ def propagate(
         method: Search of the boxes, such as ``General()``; `Automatic` if not given.
         alpha: Rising levels; 0, ¼, ½, ¾, 1 if not given.
         interactions: Constraints between the inputs; methods that cannot respect them refuse.
-        known: Facts on which guaranteed bounds rest, such as the signs of the inputs' effects.
+        knowledge: Facts on which guaranteed bounds rest, such as the signs of the inputs' effects.
         budget: Evaluations that the call may take, stored ones among them. Methods that know their
             samples beforehand refuse to begin; a search ends, and says so.
         units: Unit of each output by name, for texts, tables and drawings.
@@ -99,12 +99,12 @@ def propagate(
     call = Call(function, domain.names, tuple(shared), vectorised)
     key = b"" if store is None else model_key(identity or {})
     with (
-        showing(progress) as tell,
-        nullcontext(executor) if executor else pool(workers) as each,
-        nullcontext(store) if isinstance(store, Store | None) else Store(store) as shelf,
+        showing(progress) as report,
+        nullcontext(executor) if executor else pool(workers) as workers_pool,
+        nullcontext(store) if isinstance(store, Store | None) else Store(store) as file,
     ):
-        skip = on_failure == "skip"
-        campaign = Campaign(call, known or Known(), budget, each, tell, shelf, key, skip)
+        facts, skip = knowledge or Knowledge(), on_failure == "skip"
+        campaign = Campaign(call, facts, budget, workers_pool, report, file, key, skip)
         bounds = _without_failed(method.run(campaign, domain), campaign.failed)
         campaign.report(1.0)
     return replace(
@@ -117,8 +117,8 @@ def propagate(
     )
 
 
-def _checked(method: Method, on_failure: str) -> Method:
-    """The method, which must be an object that runs."""
+def _checked(method: Plan, on_failure: str) -> Plan:
+    """The method, which must have a method `run`."""
     runs = hasattr(method, "run") and not isinstance(method, type)
     runs = runs and len(signature(method.run).parameters) == 2  # campaign and domain
     cure = "IntervalQuasiMonteCarlo().run(…) takes random inputs besides"
@@ -128,7 +128,7 @@ def _checked(method: Method, on_failure: str) -> Method:
 
 
 def _without_failed(bounds: Bounds, failed: int) -> Bounds:
-    """The bounds as attained ones where samples were left out."""
+    """The bounds, attained only where samples were left out."""
     if not failed:
         return bounds
     note = f"{failed} samples failed and were left out: the true range may reach further there"
@@ -148,8 +148,9 @@ def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
     names = {name.partition("[")[0] for name in outputs}.union(outputs)
     for name in units:
         chosen("unit of", name, sorted(names))
-    own = tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
-    return own if units else ()
+    if not units:
+        return ()
+    return tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,23 +160,23 @@ class Shares:
     Args:
         names: Inputs or groups.
         width: Width with all inputs fuzzy, shape (…, outputs).
-        lost: Width lost when one is fixed, shape (names, …, outputs). What is lost to all need not
-            add up to the width: effects overlap.
+        reduction: Reduction of the width when an input is fixed, shape (names, …, outputs).
+            Reductions need not add up to the width: effects overlap.
     """
 
     names: tuple[str, ...]
     width: Array
-    lost: Array
+    reduction: Array
 
     @property
     def share(self) -> Array:
-        """Width lost over width, shape (names, …, outputs); 0 where there is no width.
+        """Reduction over width, shape (names, …, outputs); 0 where there is no width.
 
         A negative share says that the bounds are wrong by that much at least: a narrower input
         cannot widen the true answer.
         """
-        share: Array = np.zeros_like(self.lost)
-        return np.divide(self.lost, self.width, out=share, where=self.width > 0)
+        share: Array = np.zeros_like(self.reduction)
+        return np.divide(self.reduction, self.width, out=share, where=self.width > 0)
 
 
 def width_shares(
@@ -184,7 +185,7 @@ def width_shares(
     *,
     groups: Mapping[str, Sequence[str]] | None = None,
 ) -> Shares:
-    """Run a propagation with all inputs fuzzy and again with each fixed.
+    """Shares of the inputs in the width of a fuzzy result: each is fixed in turn.
 
     Args:
         propagation: From fuzzy inputs to bounds, as `lambda inputs: propagate(function, inputs)`,
@@ -202,6 +203,6 @@ def width_shares(
         chosen("input of a group", name, numbers)
     fixed = [{x: Crisp(numbers[x].modal) for x in group} for group in members.values()]
     runs = [propagation({**numbers, **crisp}) for crisp in ({}, *fixed)]
-    ends = [(one.lower, one.upper) if isinstance(one, Bounds) else one for one in runs]
-    whole, *narrower = (np.asarray(upper) - lower for lower, upper in ends)
-    return Shares(tuple(members), whole, np.array([whole - width for width in narrower]))
+    ends = [(run.lower, run.upper) if isinstance(run, Bounds) else run for run in runs]
+    width, *narrower = (np.asarray(upper) - lower for lower, upper in ends)
+    return Shares(tuple(members), width, np.array([width - reduced for reduced in narrower]))

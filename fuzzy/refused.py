@@ -43,13 +43,13 @@ def fitted(value: str, allowed: str, line: Callable[[str, str], str], cure: str 
 
 
 class RefusedError(ValueError):
-    """A value that has no meaning where it stands.
+    """A value that is not allowed for this argument or key.
 
     Args:
         key: Name of the argument or of the case key, such as "mesh.size".
         value: The value as the caller wrote it; None where it is missing.
-        allowed: The values that have a meaning, such as "values in (0, 1]".
-        cure: What to do where that is not obvious from `allowed`.
+        allowed: The allowed values, such as "values in (0, 1]".
+        cure: What to do, where `allowed` does not say it.
     """
 
     def __init__(self, key: str, value: object, allowed: str, cure: str = "") -> None:
@@ -84,18 +84,18 @@ def real(
     least: float = -inf,
     most: float = inf,
 ) -> float:
-    """A finite number; True and False are none.
+    """The value as a finite number; True and False are refused.
 
     Args:
         key: Name of the argument.
-        value: What stands for it.
+        value: The value as the caller gave it.
         positive: Whether it must be greater than 0.
-        whole: Whether it must be a whole number, 0 or more.
-        least: Least one that has a meaning.
-        most: Greatest one.
+        whole: Whether it must be an integer, 0 or more.
+        least: Least allowed number.
+        most: Greatest allowed number.
 
     Raises:
-        RefusedError: It is none.
+        RefusedError: It is not such a number.
     """
     least, kind = (max(least, 0), Integral) if whole else (least, Real)
     truth = type(value).__name__ in ("bool", "bool_")
@@ -113,10 +113,10 @@ def real(
 
 
 def require_numbers(name: str, values: object) -> None:
-    """Refuse what is no sequence of real and finite numbers.
+    """Refuse values that are not a sequence of finite real numbers.
 
     Raises:
-        RefusedError: It is a text or a single number, or holds something else.
+        RefusedError: They are a text or a single number, or contain something else.
     """
     listed = isinstance(values, Collection) and not isinstance(values, str)
     require(listed, name, repr(values), "a list of numbers")
@@ -125,20 +125,20 @@ def require_numbers(name: str, values: object) -> None:
 
 
 def chosen(key: str, value: object, names: Iterable[str]) -> None:
-    """Refuse a word that is none of those.
+    """Refuse a value that is not among the names.
 
     Raises:
-        RefusedError: It is none.
+        RefusedError: It is not.
     """
-    known = tuple(names)
-    require(value in known, key, value, ", ".join(known))
+    allowed = tuple(names)
+    require(value in allowed, key, value, ", ".join(allowed))
 
 
 def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure: str = "") -> None:
-    """Refuse a value unless something holds; the other arguments are those of `RefusedError`.
+    """Refuse a value unless a condition holds; the other arguments are those of `RefusedError`.
 
     Raises:
-        RefusedError: It does not hold.
+        RefusedError: The condition does not hold.
     """
     if not holds:
         raise RefusedError(key, value, allowed, cure)

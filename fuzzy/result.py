@@ -1,4 +1,4 @@
-"""Bounds: the result of every method of fuzzy analysis, for numbers and for motions over time."""
+"""Bounds: the result of all methods of fuzzy analysis, for numbers and for motions over time."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 
 ROUND_OFF = 1e-9
 """Share of an output's size by which bounds may miss each other for reasons of rounding."""
-_ROWS = 25
-"""Levels of all outputs that a text has at most."""
+_MAX_LINES = 25
+"""Lines of a text, one for each level of an output."""
 
 
 class Nature(StrEnum):
-    """Worth of bounds, from the weakest on."""
+    """What bounds promise, from the weakest to the strongest."""
 
     ATTAINED = "attained"
     ESTIMATED = "estimated"
@@ -38,16 +38,16 @@ class Nature(StrEnum):
 
     @property
     def sentence(self) -> str:
-        """Promise of the nature."""
+        """The promise in one sentence."""
         return {
             "attained": "Some inputs reach these bounds; the true range may be wider.",
-            "estimated": "The true bounds lie within the error, as an independent pass tells.",
+            "estimated": "The true bounds lie within the error, as an independent check tells.",
             "guaranteed": "No value in the α-cut lies outside these bounds; this is proved.",
         }[self]
 
     @staticmethod
     def weakest(natures: Iterable[Nature]) -> Nature:
-        """The weakest of some, one or more."""
+        """The weakest of one or more natures."""
         return min(natures, key=list(Nature).index)
 
 
@@ -80,8 +80,8 @@ class Bounds:
 
     - attained: `lower_at` and `upper_at` are inputs that reach them. The true range may be wider.
       Values of a scheme, such as time steps, hold to its `error`.
-    - estimated: each true end lies within `error` of the one stated, as far as an independent pass
-      can tell. Nothing is proved.
+    - estimated: each true end lies within `error` of the stated one, as far as samples, descents or
+      an independent search can tell. Nothing is proved.
     - guaranteed: the true range is proved to lie inside, from what `basis` names. `error` is the
       gap to what is attained, inside the ends; NaN where that is not known.
 
@@ -103,11 +103,11 @@ class Bounds:
         natures: Nature of each output; empty where all are `nature`.
         basis: Knowledge that a guarantee or an estimate rests on.
         time: Nodes, shape (T,), in s; None where there is no time.
-        inner: Attained ends inside guaranteed ones, less the scheme's error; None for none.
-        outer: Proved ends outside others; None for none.
+        inner: Attained ends inside guaranteed ones, less the scheme's error, if known.
+        outer: Proved ends outside attained or estimated ones, if known.
         notes: Remarks of the method, one sentence each.
         budget: Evaluations that were allowed; 0 for no limit.
-        samples: Points and values that the bounds were taken from; None where none are kept.
+        samples: Points and values from which the bounds were taken, if stored.
 
     Raises:
         RefusedError: Levels do not rise within [0, 1], shapes differ, an end is not finite or an
@@ -148,14 +148,14 @@ class Bounds:
         shape = (len(self.alpha), *middle, len(self.outputs))
         places = (*shape, len(self.inputs))
         ends = [end for pair in (self.inner, self.outer) for end in pair or ()]
-        each = [words for words in (self.natures, self.units) if words]
-        for name, own, expected in (
+        by_output = [words for words in (self.natures, self.units) if words]
+        for name, found, expected in (
             *((name, getattr(self, name).shape, shape) for name in ("lower", "upper", "error")),
             *((name, getattr(self, name).shape, places) for name in ("lower_at", "upper_at")),
             *(("inner and outer", end.shape, shape) for end in ends),
-            *(("natures, units", (len(words),), shape[-1:]) for words in each),
+            *(("natures, units", (len(words),), shape[-1:]) for words in by_output),
         ):
-            require(own == expected, f"shape of {name}", own, str(expected))
+            require(found == expected, f"shape of {name}", found, str(expected))
 
     def _check_values(self) -> None:
         finite = np.isfinite(self.lower) & np.isfinite(self.upper)
@@ -164,26 +164,26 @@ class Bounds:
         require(plain.all(), "lower, upper and error", "not finite, or negative", allowed)
 
     def _check_proof(self) -> None:
-        """Refuse bounds that contradict each other by more than their error and rounding."""
+        """Raise if bounds contradict each other by more than their error and rounding."""
         near = self._near
         estimated = np.where(self._guaranteed, 0.0, np.nan_to_num(self.error))
         wide = near + np.nan_to_num(self.error)
-        both = (wide[1:] + wide[:-1])[: len(wide) - 1]
+        neighbours = (wide[1:] + wide[:-1])[: len(wide) - 1]
         inner, outer = self.attained, self.proved
-        for what, beyond in (
+        for what, excess in (
             ("lower bounds lie above upper ones", self.lower - self.upper - near - estimated),
-            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - both),
-            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - both),
+            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - neighbours),
+            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - neighbours),
             ("attained bounds lie outside the proved ones", outer.lower - inner.lower - near),
             ("attained bounds lie outside the proved ones", inner.upper - outer.upper - near),
         ):
-            if (beyond > 0).any():
-                worst = self.outputs[int(np.nanargmax(beyond) % len(self.outputs))]
-                raise FailedError(f"{what}: of {worst}, by up to {np.nanmax(beyond):.3g}")
+            if (excess > 0).any():
+                worst = self.outputs[int(np.nanargmax(excess) % len(self.outputs))]
+                raise FailedError(f"{what}: of {worst}, by up to {np.nanmax(excess):.3g}")
 
     @property
     def _near(self) -> Array:
-        """Difference that rounding explains, shape (m,)."""
+        """Differences due to rounding, shape (m,)."""
         axes = tuple(range(self.lower.ndim - 1))
         size = np.maximum(np.abs(self.lower), np.abs(self.upper)).max(axis=axes)
         return np.asarray(ROUND_OFF * size)
@@ -215,7 +215,7 @@ class Bounds:
     @property
     def claim(self) -> JointClaim:
         """Claim of the cuts, and which inputs are opinions."""
-        return JointClaim.of(self.inputs, self.nature)
+        return JointClaim.from_inputs(self.inputs, self.nature)
 
     def number(self, output: str = "y") -> Stepwise | Claimed:
         """One output as a fuzzy number: between two levels the wider α-cut holds.
@@ -226,8 +226,8 @@ class Bounds:
         steps = outer_steps(self.alpha, *self.bounds(output))
         if (claim := self.claim.claim) is not None:
             return Claimed(steps, claim, float(self.alpha[0]))
-        whole = (self.alpha[0], self.alpha[-1]) == (0, 1)
-        require(whole, "alpha", self.alpha.tolist(), "levels from 0 to 1: alpha=levels(4)")
+        complete = (self.alpha[0], self.alpha[-1]) == (0, 1)
+        require(complete, "alpha", self.alpha.tolist(), "levels from 0 to 1: alpha=levels(4)")
         return steps
 
     def column(self, output: str = "y") -> int:
@@ -251,7 +251,7 @@ class Bounds:
 
     def __str__(self) -> str:
         """Nature and cost; bounds of the first outputs, a line for each level; notes."""
-        count = max(1, _ROWS // len(self.alpha))
+        count = max(1, _MAX_LINES // len(self.alpha))
         shown = range(len(self.outputs))[:count]
         lines = [line for column in shown for line in self._lines(column)]
         hidden = len(self.outputs) - count
@@ -285,8 +285,9 @@ class Bounds:
         differs = f", {nature}" if nature != self.nature else ""
         words = "gap to attained" if nature is Nature.GUARANTEED else "error"
         for alpha, least, most, miss in zip(self.alpha, low, high, error, strict=True):
-            both = rounded(least, "lower", nature, 6), rounded(most, "upper", nature, 6)
-            ends = both if both[0] <= both[1] else (least, most)  # attained, nearly one number
+            pair = rounded(least, "lower", nature, 6), rounded(most, "upper", nature, 6)
+            # attained ends of nearly one value, rounded inwards, may cross
+            ends = pair if pair[0] <= pair[1] else (least, most)
             head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
             yield f"{head}, {words} {_digits(miss)}{differs}"
 

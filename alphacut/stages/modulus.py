@@ -10,9 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell
-from alphacut.fuzzy import Crisp, Extended, FuzzyNumber, General, Known, Reduced, Signed, propagate
+from alphacut.fuzzy import (
+    Crisp,
+    Extended,
+    FuzzyNumber,
+    General,
+    Knowledge,
+    Reduced,
+    Signed,
+    propagate,
+)
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.plans.design import Method as Plan
+from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds as Cuts
 from alphacut.fuzzy.sets.numbers import outer_steps
@@ -169,14 +178,14 @@ class Campaign:
             PLANS[self.modulus.plan],
             workers=work.workers,
             progress=work.tick or False,
-            known=self.known,
+            knowledge=self.knowledge,
             store=work.samples,
             identity=self.identity if work.samples else None,
         )
         return stage_result(result, self)
 
     @property
-    def known(self) -> Known:
+    def knowledge(self) -> Knowledge:
         """Signs of the inputs' effects on E, where mechanics proves them.
 
         Where both phases have the same Poisson's ratio ν >= 0, more stiff material can only
@@ -185,19 +194,19 @@ class Campaign:
         with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12).
         """
         if not self.cell.square or self.modulus.method == "prism":
-            return Known()
+            return Knowledge()
         of = {name: number.support for name, number in self.cell.phases.items()}
         matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]
         poisson = of["matrix_poisson"]
         stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
         same = poisson == of["inclusion_poisson"] and not poisson.width and poisson.lower >= 0
         if not same or not (stiffer or softer):
-            return Known()
+            return Knowledge()
         way = 1 if stiffer else -1
         signs = {"a1": way, "a2": way, "a3": way, "a4": -way, "fraction": way}
         signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
-        return Known(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
+        return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
     def errors(self, result: Cuts) -> dict[str, float]:
         """Relative error of E by source: the largest of all samples, or that of the modal one."""

@@ -27,13 +27,13 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.plans.design import Method
+from alphacut.fuzzy.plans.design import Plan
 from benchmarks.rows import write
 
 _GRID = 1e-4  # share of the widest cut that the grid of the true bounds may miss
 RESULTS = Path(__file__).parents[1] / "results"
 SEARCHES = [Optimisation(starts=k, look=4 * k) for k in (1, 2, 3, 6)]
-METHODS: dict[str, list[Method]] = {
+METHODS: dict[str, list[Plan]] = {
     "reduced": [Reduced()],
     "general": [General()],
     "extended": [Extended()],

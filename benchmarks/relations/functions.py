@@ -10,13 +10,13 @@ from typing import Self
 
 import numpy as np
 
-from alphacut.fuzzy import Automatic, General, Known, Signed, Triangular, propagate
+from alphacut.fuzzy import Automatic, General, Knowledge, Signed, Triangular, propagate
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.plans.design import Method
+from alphacut.fuzzy.plans.design import Plan
 from benchmarks.relations.relation import ROUNDED, Chance, Relation
 from benchmarks.relations.stated import Stated
 
-PLANS: dict[str, Method | None] = {"none": None, "automatic": Automatic(), "general": General()}
+PLANS: dict[str, Plan | None] = {"none": None, "automatic": Automatic(), "general": General()}
 PLANS["signed"] = Signed(outputs=("rising",))
 
 
@@ -85,8 +85,8 @@ class Propagation:
         }
         signs = {name: {"rising": 1} for name in numbers}
         more = {} if self.crisp is None else {"crisp": self.crisp}
-        known = Known(signs) if self.plan == "signed" else Known()
-        given = {"alpha": self.alpha, "known": known, "progress": False}
+        knowledge = Knowledge(signs) if self.plan == "signed" else Knowledge()
+        given = {"alpha": self.alpha, "knowledge": knowledge, "progress": False}
         inputs, plan = {**more, **numbers}, PLANS[self.plan]
         if self.executor is None:
             result = propagate(self.waves, inputs, plan, **given)  # type: ignore[arg-type]

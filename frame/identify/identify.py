@@ -120,7 +120,7 @@ class Identified:
     @property
     def claim(self) -> JointClaim:
         """Coverage of the boxes: the claims, and the conditions under which they hold."""
-        joint = JointClaim.of(self.evidence.numbers)
+        joint = JointClaim.from_inputs(self.evidence.numbers)
         model = ("the structure is such a storey frame",)
         return JointClaim(self.evidence.joint, (*joint.conditions, *model), joint.opinions)
 

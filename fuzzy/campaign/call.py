@@ -1,4 +1,4 @@
-"""Calls of a user's function, in the workers, and the named outputs that they give."""
+"""Calls of a user's function in the workers, and their named outputs."""
 
 from __future__ import annotations
 
@@ -46,16 +46,16 @@ class Values:
         names, shapes = zip(*self.layout, strict=True)
         chosen("output", name, names)
         ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
-        place = names.index(name)
-        return np.split(self.array, ends, axis=1)[place].reshape(-1, *shapes[place])
+        index = names.index(name)
+        return np.split(self.array, ends, axis=1)[index].reshape(-1, *shapes[index])
 
     def column(self, name: str) -> int:
         """Index of a column."""
-        chosen("output", name, self._places)
-        return self._places[name]
+        chosen("output", name, self._column_of)
+        return self._column_of[name]
 
     @cached_property
-    def _places(self) -> dict[str, int]:
+    def _column_of(self) -> dict[str, int]:
         return {name: column for column, name in enumerate(self.columns)}
 
 
@@ -84,7 +84,7 @@ class Sample(NamedTuple):
 
 
 class Failure(NamedTuple):
-    """Why a point has no outputs."""
+    """Error message of a point without outputs."""
 
     error: str
 
@@ -94,7 +94,7 @@ Outcome = Sample | Failure
 
 @dataclass(frozen=True)
 class Call:
-    """A function of named inputs with the way it is called.
+    """A function of named inputs, called point by point, in groups, or with arrays.
 
     Args:
         function: See `shared` and `vectorised`; without either it gets the inputs of one point by
@@ -106,7 +106,8 @@ class Call:
             axis is n.
 
     Raises:
-        RefusedError: It cannot be called, both ways are asked for, or a shared name is no input.
+        RefusedError: It cannot be called, it is both shared and vectorised, or a shared name is no
+            input.
     """
 
     function: Function
@@ -117,8 +118,8 @@ class Call:
     def __post_init__(self) -> None:
         shown = repr(self.function)
         require(callable(self.function), "function", shown, "what can be called")
-        one = not (self.shared and self.vectorised)
-        require(one, "shared", self.shared, "none where the function is vectorised")
+        single = not (self.shared and self.vectorised)
+        require(single, "shared", self.shared, "none where the function is vectorised")
         for name in self.shared:
             chosen("shared input", name, self.names)
 
@@ -190,8 +191,8 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     arrays = {str(name): _numbers(str(name), value) for name, value in named.items()}
     layout = tuple((name, array.shape) for name, array in arrays.items())
     columns = Values(layout, np.zeros((0, 0))).columns
-    apart = bool(columns) and len(set(columns)) == len(columns)
-    require(apart, "outputs", columns, "one number or more, each with a name of its own")
+    distinct = bool(columns) and len(set(columns)) == len(columns)
+    require(distinct, "outputs", columns, "one number or more, all of different names")
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
 
 

@@ -23,13 +23,13 @@ from alphacut.fuzzy.campaign.call import (
 )
 from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import Task, completed
-from alphacut.fuzzy.knowledge.known import Known
+from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.refused import FailedError, real
 
-_SHOWN = 3  # failed samples that a message quotes
-_LONG = 300  # letters of an error that a message quotes
-_PAUSE = 0.05  # seconds between two transactions at least
-_SHARE = 10  # a transaction that took t is not followed by another within 10 t
+_MAX_QUOTED = 3  # failed samples that a message quotes
+_MAX_LETTERS = 300  # letters of an error that a message quotes
+_MIN_PAUSE = 0.05  # seconds between two transactions at least
+_MIN_PAUSE_RATIO = 10  # a transaction that took t is not followed by another within 10 t
 
 
 class CampaignError(FailedError):
@@ -42,28 +42,30 @@ class CampaignError(FailedError):
 
     def __init__(self, failures: list[tuple[dict[str, float], str]], total: int) -> None:
         self.failures, self.total = failures, total
-        lines = [f"at {_place(point)}: {_brief(error)}" for point, error in failures[:_SHOWN]]
-        more = f"; and {len(failures) - _SHOWN} more" if len(failures) > _SHOWN else ""
+        lines = [
+            f"at {_named_values(point)}: {_brief(error)}" for point, error in failures[:_MAX_QUOTED]
+        ]
+        more = f"; and {len(failures) - _MAX_QUOTED} more" if len(failures) > _MAX_QUOTED else ""
         what = f"{len(failures)} of {total} samples failed, the others are done: "
         super().__init__(what + "; ".join(lines) + more, 'on_failure="skip" leaves them out')
 
 
-def _place(point: dict[str, float]) -> str:
+def _named_values(point: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.6g}" for name, value in point.items())
 
 
 def _brief(error: str) -> str:
     first = error.strip().partition("\n")[0]
-    return first if len(first) <= _LONG else f"{first[:_LONG]} …"
+    return first if len(first) <= _MAX_LETTERS else f"{first[:_MAX_LETTERS]} …"
 
 
 @dataclass
 class Campaign:
-    """Evaluates points of a model through workers and keeps every sample: what methods get.
+    """Samples of a model, evaluated by workers; every plan evaluates its points by one.
 
     Args:
-        call: The function with the way it is called.
-        known: What the caller knows about the model.
+        call: The function.
+        knowledge: What the caller knows about the model.
         budget: Evaluations that are allowed.
         executor: Any `concurrent.futures` executor; None runs in this process.
         progress: Called with the share done, 0 … 1.
@@ -80,7 +82,7 @@ class Campaign:
     """
 
     call: Call
-    known: Known = field(default_factory=Known)
+    knowledge: Knowledge = field(default_factory=Knowledge)
     budget: int = 10_000
     executor: Executor | None = None
     progress: Callable[[float], None] | None = None
@@ -94,7 +96,7 @@ class Campaign:
     _share: float = 0.0
 
     def __post_init__(self) -> None:
-        self.known.check_inputs(self.call.names)
+        self.knowledge.check_inputs(self.call.names)
         real("budget", self.budget, positive=True, whole=True)
 
     def __len__(self) -> int:
@@ -140,7 +142,9 @@ class Campaign:
         batch = _Batch(self, points)
         batch.run()
         failures = {
-            row: one.error for row, one in batch.outcomes.items() if isinstance(one, Failure)
+            row: outcome.error
+            for row, outcome in batch.outcomes.items()
+            if isinstance(outcome, Failure)
         }
         if failures and (not self.skip or (len(failures) == len(points) and not self._rows)):
             names = self.call.names
@@ -167,7 +171,7 @@ class Campaign:
             return outcome
         if not self.layout:
             self.layout = outcome.layout
-            self.known.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
+            self.knowledge.check_outputs(Values(outcome.layout, outcome.row[None]).columns)
             return outcome
         if sorted(outcome.layout) != sorted(self.layout):
             return Failure(f"outputs are {outcome.layout} where others have {self.layout}")
@@ -183,7 +187,7 @@ class Campaign:
 
 
 class _Batch:
-    """New points on their way through the workers and the store."""
+    """Evaluation of new points by the workers, with those that the store has."""
 
     def __init__(self, campaign: Campaign, points: Array) -> None:
         self.campaign, self.points = campaign, points
@@ -193,7 +197,7 @@ class _Batch:
         self._written, self._cost = perf_counter(), 0.0
 
     def run(self) -> None:
-        """Take what is stored, run the rest, and keep it whatever happens."""
+        """Read stored samples, evaluate the others, and store those even if one fails."""
         campaign, count = self.campaign, len(self.points)
         self._take_stored()
         try:
@@ -219,7 +223,7 @@ class _Batch:
                 self._keep(row, sample)
 
     def _tasks(self) -> Iterator[Task]:
-        """Calls to be made, without samples that are stored."""
+        """Calls of the points that are not stored."""
         for group in self.campaign.call.tasks(self.points):
             if rows := [row for row in group if row not in self.outcomes]:
                 yield rows, self.points[rows]
@@ -235,9 +239,9 @@ class _Batch:
             self._gathered[self._key(row)] = outcome
 
     def _write(self, *, now: bool = False) -> None:
-        """Write what is gathered: now, or when the last write is long enough ago to cost little."""
+        """Write gathered samples: now, or if writing takes less than a tenth of the time."""
         start, store = perf_counter(), self.campaign.store
-        due = start - self._written > max(_PAUSE, _SHARE * self._cost)
+        due = start - self._written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * self._cost)
         if store and self._gathered and (now or due):
             store.put(self.campaign.model, self._gathered)
             self._gathered = {}

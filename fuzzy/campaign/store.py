@@ -1,11 +1,11 @@
 """A durable store of samples: an SQLite file that campaigns resume from.
 
-Samples are keyed by what they depend on: the identity of the model (case, mesh options, versions:
-whatever the caller names) and the values of all inputs. Each row carries a checksum over all of it,
-and a batch is one transaction: a killed process or a power cut loses what was not yet written.
-Opening a store reads and checks every row. Of a damaged file the whole rows go into a new one, and
-a warning says so in one line; what is lost is computed anew. A store is told by the application id
-of SQLite. Links, devices, pipes and data bases of other programs are refused untouched.
+The key of a sample is the identity of the model (case, mesh options, versions: whatever the caller
+names) and the values of all inputs. Each row has a checksum over all its columns, and a batch is
+one transaction: a killed process or a power cut loses only samples that were not yet written.
+Opening a store reads and checks all rows. The intact rows of a damaged file are copied into a new
+file, and one line warns of it; other samples are computed anew. SQLite's application id tells that
+a file is a store. Links, devices, pipes and data bases of other programs are refused, unchanged.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from alphacut.fuzzy.campaign.call import Layout, Sample
 from alphacut.fuzzy.refused import FailedError, require
 
 Identity = Mapping[str, object]
-_PATIENCE = 60.0  # seconds to wait for another campaign's write
+_WRITE_TIMEOUT = 60.0  # seconds to wait for another campaign's write
 _APPLICATION = 0x616C7068
 """Application id in the head of each store: "alph" in ASCII."""
 _TABLE = """CREATE TABLE sample
@@ -36,7 +36,7 @@ _TABLE = """CREATE TABLE sample
 _SCHEMA = "select sql from sqlite_master where sql is not null"
 _HEAD = 72
 """Bytes of the head of an SQLite file that end with its application id."""
-_TROUBLE = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
+_ACCESS_ERRORS = ("BUSY", "LOCKED", "FULL", "READONLY", "CANTOPEN", "PERM", "NOMEM")
 _COLUMNS = "model, point, layout, outputs, checksum"
 
 
@@ -58,15 +58,15 @@ class Row(NamedTuple):
     checksum: bytes
 
     @classmethod
-    def of(cls, model: bytes, point: str, sample: Sample) -> Row:
-        """A sample with its checksum."""
+    def from_sample(cls, model: bytes, point: str, sample: Sample) -> Row:
+        """Row of a sample, with its checksum."""
         layout = json.dumps(sample.layout)
         outputs = sample.row.astype("<f8").tobytes()
         return cls(model, point, layout, outputs, _checksum(model, point, layout, outputs))
 
     @property
-    def whole(self) -> bool:
-        """True if the row is what was written."""
+    def is_intact(self) -> bool:
+        """Whether the checksum is that of the other columns."""
         with suppress(TypeError, AttributeError):
             return _checksum(*self[:4]) == self.checksum
         return False
@@ -88,10 +88,10 @@ class Store:
     """Samples of all models in one file.
 
     Args:
-        path: The file; made if there is none.
+        path: The file; created if there is none.
 
     Raises:
-        RefusedError: There is another file, or it cannot be opened or made.
+        RefusedError: The file is not a store, or it cannot be opened or created.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -107,11 +107,11 @@ class Store:
         except OSError as error:
             is_store, cure = False, str(error)
         require(is_store, "store", self.path, allowed, cure)
-        self._connection = self._opened()
+        self._connection = self._open()
 
-    def _opened(self) -> sqlite3.Connection:
-        """The file with its rows read, mended if it is damaged."""
-        connection = self._connected(self.path)
+    def _open(self) -> sqlite3.Connection:
+        """Open the file and read its rows; of a damaged file copy the intact rows."""
+        connection = self._connect(self.path)
         with self.reported():
             try:
                 _prepare(connection)
@@ -119,27 +119,29 @@ class Store:
                 damaged |= connection.execute(_SCHEMA).fetchall() != [(_TABLE,)]
             except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
                 name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
-                if any(word in name for word in _TROUBLE):  # locks, space or rights: no damage
+                if any(
+                    word in name for word in _ACCESS_ERRORS
+                ):  # locks, space or rights: no damage
                     raise
                 damaged = True
         damaged |= not self._read(connection, "asc")
-        return self._mended(connection) if damaged else connection
+        return self._with_intact_rows(connection) if damaged else connection
 
     def _read(self, connection: sqlite3.Connection, order: str) -> bool:
-        """Keep the rows that are whole; whether all are."""
-        whole = True
+        """Read the intact rows; whether all rows are intact."""
+        intact = True
         try:
             for row in connection.execute(f"select {_COLUMNS} from sample order by rowid {order}"):
-                one = Row(*row)
-                whole &= one.whole
-                if one.whole:
-                    self._rows[one.model, one.point] = one
+                stored = Row(*row)
+                intact &= stored.is_intact
+                if stored.is_intact:
+                    self._rows[stored.model, stored.point] = stored
         except (sqlite3.DatabaseError, UnicodeDecodeError):
             return False
-        return whole
+        return intact
 
-    def _mended(self, connection: sqlite3.Connection) -> sqlite3.Connection:
-        """A new file with the rows that are whole; the damaged one stays beside it if it can."""
+    def _with_intact_rows(self, connection: sqlite3.Connection) -> sqlite3.Connection:
+        """Open a new file with the intact rows; the damaged one is renamed if its name is free."""
         self._read(connection, "desc")  # up to the damage from its other side
         connection.close()
         aside = self.path.with_name(f"{self.path.name}.damaged")
@@ -149,17 +151,17 @@ class Store:
             os.remove(self.path)
         else:
             os.rename(self.path, aside)
-        fresh = self._connected(self.path)
+        fresh = self._connect(self.path)
         with self.reported():
             _prepare(fresh)
         self._write(fresh, self._rows.values())
-        said = f"{len(self._rows)} samples are whole, the others are run anew"
+        said = f"{len(self._rows)} samples are intact, the others are evaluated anew"
         warnings.warn(f"the store {self.path} was damaged: {said}", stacklevel=2)
         return fresh
 
-    def _connected(self, path: Path) -> sqlite3.Connection:
+    def _connect(self, path: Path) -> sqlite3.Connection:
         with self.reported():
-            return sqlite3.connect(path, timeout=_PATIENCE)
+            return sqlite3.connect(path, timeout=_WRITE_TIMEOUT)
 
     def get(self, model: bytes, point: str) -> Sample | None:
         """The sample of a model at a point; None where there is none."""
@@ -168,7 +170,7 @@ class Store:
 
     def put(self, model: bytes, samples: Mapping[str, Sample]) -> None:
         """Write samples in one transaction: all or none."""
-        rows = [Row.of(model, point, sample) for point, sample in samples.items()]
+        rows = [Row.from_sample(model, point, sample) for point, sample in samples.items()]
         self._write(self._connection, rows)
         self._rows |= {(row.model, row.point): row for row in rows}
 
@@ -179,7 +181,7 @@ class Store:
 
     @contextmanager
     def reported(self) -> Iterator[None]:
-        """Raise what goes wrong with the file in one line."""
+        """Raise errors of the file in one line."""
         try:
             yield
         except sqlite3.Error as error:
@@ -213,7 +215,7 @@ def _is_store(path: Path) -> bool:
         OSError: The file cannot be read.
     """
     beside = (path.with_name(f"{path.name}{end}") for end in ("-journal", "-wal", "-shm"))
-    if not all(_is_regular(one, missing=True) for one in (path, *beside)):
+    if not all(_is_regular(file, missing=True) for file in (path, *beside)):
         return False
     if not os.path.lexists(path):
         return True
@@ -243,7 +245,7 @@ def _is_older(path: Path) -> bool:
 
 
 def model_key(identity: Identity) -> bytes:
-    """Bytes that tell the samples of a model from those of others.
+    """Key of a model's samples: a hash of its identity.
 
     Raises:
         RefusedError: The identity is empty, or holds something that JSON does not.
@@ -259,6 +261,6 @@ def model_key(identity: Identity) -> bytes:
 
 
 def point_key(names: tuple[str, ...], point: Array) -> str:
-    """A point as text, exact to the last bit and the same whatever the order of the inputs."""
+    """Key of a point: its inputs as JSON, exact to the last bit, in the order of their names."""
     values = {name: float(x) + 0.0 for name, x in zip(names, point, strict=True)}
     return json.dumps(values, sort_keys=True, separators=(",", ":"))

@@ -21,15 +21,15 @@ from alphacut.fuzzy.refused import FailedError, real
 P = ParamSpec("P")
 T = TypeVar("T")
 Task = tuple[list[int], Array]  # rows of the design, and their points
-_WATCH = 0.2  # seconds between looks at the parent
-_ENOUGH = 0.1  # seconds of work in a batch of quick calls
-_LARGEST = 1024  # calls in a batch
-_GROUP = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
+_PARENT_PERIOD = 0.2  # seconds between two checks that the parent process runs
+_BATCH_SECONDS = 0.1  # of work in a batch of quick calls: less, and sending them costs more
+_MAX_BATCH = 1024  # calls in a batch
+_GROUP_SIGNALS = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
 
 
 @contextmanager
 def pool(workers: int) -> Iterator[Executor | None]:
-    """A pool of `workers` processes, or None where one process does everything.
+    """Pool of `workers` processes; None for one, which is this process.
 
     Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
     says. Functions go to the processes by value where they cannot be imported.
@@ -52,31 +52,34 @@ def pool(workers: int) -> Iterator[Executor | None]:
 
 
 def _processes(workers: int) -> Executor:
-    """Processes of this machine that end with this one."""
+    """Pool of processes of this machine that end when this process ends."""
     from joblib.externals.loky import ProcessPoolExecutor
 
     # loky's tracker of semaphores begins here and inherits what is blocked: it must outlive this
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP) if _GROUP else None
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP_SIGNALS) if _GROUP_SIGNALS else None
     try:
-        made: Executor = ProcessPoolExecutor(
+        executor: Executor = ProcessPoolExecutor(
             workers, initializer=_end_with_parent, initargs=(os.getpid(),)
         )
     finally:
         if mask is not None:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-    return made
+    return executor
 
 
 def _end_with_parent(parent: int) -> None:
-    """Leave when the process that started this one is gone: a killed campaign leaves no orphans."""
+    """End this process when its parent has ended: a killed campaign leaves no orphans."""
     from threading import Thread
 
-    for number in (signal.SIGINT, *_GROUP):  # which reach the whole group; the parent decides
+    for number in (
+        signal.SIGINT,
+        *_GROUP_SIGNALS,
+    ):  # which reach the whole group; the parent decides
         signal.signal(number, signal.SIG_IGN)
 
     def watch() -> None:
         while os.getppid() == parent:
-            sleep(_WATCH)
+            sleep(_PARENT_PERIOD)
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
@@ -85,7 +88,7 @@ def _end_with_parent(parent: int) -> None:
 def submitted(
     executor: Executor | None, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
 ) -> Future[T]:
-    """A call in one of the executor's processes, or done here and now where there is none."""
+    """Future of a call by the executor; without one the call is made at once."""
     if executor is not None:
         return executor.submit(function, *args, **kwargs)
     done: Future[T] = Future()
@@ -96,7 +99,9 @@ def submitted(
 def completed(
     call: Call, tasks: Iterable[Task], executor: Executor | None
 ) -> Iterator[tuple[list[int], list[Outcome]]]:
-    """Run the tasks and yield each as it ends, with no more at the executor than keep it busy.
+    """Rows and outcomes of the tasks in the order in which they end.
+
+    At most two batches for each slot of the executor are submitted at a time.
 
     Args:
         call: The function with the way it is called.
@@ -120,8 +125,11 @@ def completed(
             for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                 batch = waiting.pop(future)
                 outcomes, seconds = _result(future, f" at or near {_sample_words(call, batch)}")
-                size = int(min(max(_ENOUGH * len(batch) / max(seconds, 1e-9), 1), _LARGEST))
-                yield from ((rows, one) for (rows, _), one in zip(batch, outcomes, strict=True))
+                size = int(
+                    min(max(_BATCH_SECONDS * len(batch) / max(seconds, 1e-9), 1), _MAX_BATCH)
+                )
+                pairs = zip(batch, outcomes, strict=True)
+                yield from ((rows, results) for (rows, _), results in pairs)
     finally:
         for future in waiting:
             future.cancel()
@@ -152,7 +160,7 @@ def _result(future: Future[T], at: str = "") -> T:
         return future.result()
     except Exception as error:
         what = f"the function or its outputs cannot be sent between processes: {error}"
-        cure = "take workers=1, or out of it what cannot be copied"
+        cure = "take workers=1, or a function that can be pickled"
         if isinstance(error, BrokenExecutor):
             what = f"a worker process died{at}"
             cure = "out of memory, or a crash in compiled code; what a store holds stays"
@@ -160,7 +168,7 @@ def _result(future: Future[T], at: str = "") -> T:
 
 
 def slots(executor: Executor) -> int:
-    """Number of calls that an executor runs at once as far as it says, else the cores here."""
+    """Calls that an executor runs at once; the number of cores where it does not say."""
     client = getattr(executor, "_client", None)  # dask
     if client is not None and (threads := sum(client.nthreads().values())):
         return int(threads)

@@ -1,4 +1,4 @@
-"""From measured values to a fuzzy number whose cuts hold what is claimed as often as they say."""
+"""Fuzzy numbers from measured values, with a claim how often their cuts contain a quantity."""
 
 from __future__ import annotations
 
@@ -30,24 +30,27 @@ def from_data(
 
     The probability is over repeated samples.
 
-    For the next value, the median and a quantile this holds for every law, with ties and steps, at
-    any number of values. Values are taken as drawn independently, or at least exchangeably, from
-    one law. What n values decide without bounds: the next value from α = 2/(n + 1) on, the median
-    from 2^(1 − n), quantile q from qⁿ + (1 − q)ⁿ.
+    For the next value, the median and a quantile this holds for any law, also with ties and steps,
+    and any number of values. The values must be drawn independently, or at least exchangeably, from
+    one law. Without bounds n values decide the cuts of the next value from α = 2/(n + 1) on, of the
+    median from 2^(1 − n), of the quantile q from qⁿ + (1 − q)ⁿ.
 
-    Where the law is continuous the cuts hold more than 1 − α by one step of the ranks at most: by
+    Where the law is continuous the coverage exceeds 1 − α by one step of the ranks at most: by
     1/(n + 1) for the next value, by one binomial probability for a quantile (five values, median:
     up to 0.31).
 
     Args:
-        values: Numbers, or pairs (lower, upper) of what each value is known to lie between; an
-            infinite end means censored on that side. Of rounded values they are half a step away.
+        values: Numbers, or pairs (lower, upper) between which each value is known to lie; an
+            infinite end means censored on that side. Ends of rounded values are half a step away.
         claim: "next value", "mean", "median" or "quantile 0.95". A mean needs a law or both bounds.
-        bounds: Physically possible values (lower, upper), None where there is no bound. They fill
-            in what the values do not decide: without them the number has no cut at low α, and none
-            at 0.
-        law: "normal" or, but for the mean, "log-normal", where that is known: narrower cuts, which
-            rest on it.
+        bounds: Physically possible values (lower, upper), None where there is no bound. They are
+            the ends of cuts that the values do not decide: without them the number has no cut at
+            low α.
+        law: "normal" or, except for the mean, "log-normal", where the law is known: narrower cuts,
+            which rest on it.
+
+    Returns:
+        The number, which prints with its claim.
 
     Raises:
         RefusedError: An argument is wrong, or the values decide nothing.
@@ -55,7 +58,7 @@ def from_data(
     quantile = _quantile(claim)
     if law is not None:
         chosen("law", law, ("normal",) if claim == "mean" else get_args(Law))
-    data = Observations.of(values, bounds)
+    data = Observations.from_values(values, bounds)
     if law is not None:
         number, decided = law_cuts(data, law, quantile, mean=claim == "mean")
     elif claim == "mean":
@@ -75,7 +78,7 @@ def _quantile(claim: str) -> float | None:
 
 
 def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> tuple[str, ...]:
-    """Conditions of the claim."""
+    """Conditions of the claim, in words."""
     low, high = data.bounds
     drawn = f"{data.count} values drawn alike and independently"
     drawn += f" from a {law} law" if law else ""
@@ -83,12 +86,13 @@ def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> t
 
 
 def mean_cuts(data: Observations) -> Stepwise:
-    """Cuts of the mean of a law within physical bounds, without which none hold for all laws.
+    """Cuts of the mean of any law within physical bounds.
 
-    A rare, far value moves the mean and is not seen (Bahadur and Savage, Annals of Mathematical
-    Statistics 27, 1956, 1115-1122). With bounds, the distribution function lies within a band
-    around that of the values (Smirnov, exact for n values), and the mean between the means of the
-    band's edges (Anderson, Bulletin of the International Statistical Institute 43, 1969, 249-251).
+    Without bounds no cuts hold for all laws: a rare, far value moves the mean and is not seen
+    (Bahadur and Savage, Annals of Mathematical Statistics 27, 1956, 1115-1122). With bounds, the
+    distribution function lies within a band around that of the values (Smirnov, exact for n
+    values), and the mean between the means of the band's edges (Anderson, Bulletin of the
+    International Statistical Institute 43, 1969, 249-251).
 
     Raises:
         RefusedError: A bound is missing.
@@ -108,7 +112,7 @@ def mean_cuts(data: Observations) -> Stepwise:
 
 @lru_cache(maxsize=64)
 def _band(n: int) -> Array:
-    """Half width of the band that each side leaves with half the probability of each level."""
+    """Half width of Smirnov's band: each side is left with half the probability of each level."""
     from scipy.stats import ksone
 
     band: Array = ksone.isf(LEVELS / 2, n)

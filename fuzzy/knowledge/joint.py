@@ -1,8 +1,8 @@
-"""Joint claims: cuts of several claimed inputs that all hold together as often as one says.
+"""Joint claims: cuts of several inputs that contain all their quantities with P >= 1 − α.
 
-With m claims, the joint cut at α is the box of their cuts at β: of independent sources 1 − (1 −
-β)^m = α, of unknown dependence m β = α (Bonferroni). The box at β = α, the minimum of the
-memberships, holds all of them less often than 1 − α.
+With m claims, the joint cut at α is the box of their cuts at β with 1 − (1 − β)^m = α for
+independent sources and m β = α for unknown dependence (Bonferroni). The box at β = α, the minimum
+of the memberships, contains all quantities less often than with 1 − α.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise
 def jointly(
     inputs: Mapping[str, FuzzyNumber | float], *, independent: bool = False, means: str = ""
 ) -> dict[str, FuzzyNumber | float]:
-    """The inputs, claimed ones widened so that their box at α holds all with P >= 1 − α.
+    """The inputs, claimed ones widened so that their box at α contains all with P >= 1 − α.
 
     Args:
         inputs: Fuzzy numbers by name; plain numbers are crisp.
         independent: Whether the samples behind different inputs are independent of each other;
             unknown dependence if not stated.
-        means: What the joint claim means; needed where the claims are of different kinds.
+        means: Quantity of the joint claim; required where the claims are of different kinds.
 
     Raises:
         RefusedError: Claims of different kinds are joined without a meaning, or one number stands
@@ -39,7 +39,7 @@ def jointly(
         return dict(inputs)
     rule = Joint(tuple(claimed), independent, means or _common(claimed), named=bool(means))
     if independent:
-        _require_apart(claimed)
+        _require_different_values(claimed)
     return {
         name: _widened(number, rule) if isinstance(number, Claimed) else number
         for name, number in inputs.items()
@@ -47,15 +47,15 @@ def jointly(
 
 
 def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """The inputs, plain numbers as crisp ones, with claims joined unless they are so already.
+    """The inputs, plain numbers as crisp ones, with claims joined unless they are joined already.
 
     Raises:
         RefusedError: As `fuzzy_inputs` and `jointly`.
     """
     numbers = fuzzy_inputs(inputs)
     rules = {number.joint for number in numbers.values() if isinstance(number, Claimed)}
-    whole = len(rules) == 1 and None not in rules
-    return numbers if whole else fuzzy_inputs(jointly(numbers))
+    joined = len(rules) == 1 and None not in rules
+    return numbers if joined else fuzzy_inputs(jointly(numbers))
 
 
 def _common(claimed: Mapping[str, Claimed]) -> str:
@@ -65,14 +65,14 @@ def _common(claimed: Mapping[str, Claimed]) -> str:
     return kinds.pop()
 
 
-def _require_apart(claimed: Mapping[str, Claimed]) -> None:
-    for (name, one), (other, two) in combinations(claimed.items(), 2):
-        cure = f"{name} and {other} rest on the same values"
-        require(one.number != two.number, "independent", True, "False", cure)
+def _require_different_values(claimed: Mapping[str, Claimed]) -> None:
+    for (first, number), (second, partner) in combinations(claimed.items(), 2):
+        cure = f"{first} and {second} rest on the same values"
+        require(number.number != partner.number, "independent", True, "False", cure)
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:
-    """The number with its cuts at their joint levels."""
+    """The number with each cut at its joint level."""
     steps = number.number
     level = rule.joined(np.asarray(steps.alpha))
     last = np.append(np.diff(level) > 0, True) & (level <= 1)  # of equal levels the last cut
@@ -88,7 +88,7 @@ class JointClaim:
 
     Args:
         rule: How the claims were joined; None where no input has one.
-        conditions: Of all claims.
+        conditions: Conditions of all claims.
         opinions: Fuzzy inputs without a claim.
     """
 
@@ -97,8 +97,10 @@ class JointClaim:
     opinions: tuple[str, ...]
 
     @classmethod
-    def of(cls, inputs: Mapping[str, FuzzyNumber], nature: str = "guaranteed") -> JointClaim:
-        """The claim of a result by its inputs and the nature of its bounds."""
+    def from_inputs(
+        cls, inputs: Mapping[str, FuzzyNumber], nature: str = "guaranteed"
+    ) -> JointClaim:
+        """Claim of a result with these inputs and bounds of this nature."""
         claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
         opinions = tuple(
             name
@@ -112,11 +114,13 @@ class JointClaim:
         conditions = [f"{', '.join(names)}: {words}" for words, names in alike.items()]
         rules = (x.joint or Joint((name,), False, x.claim.about) for name, x in claimed.items())
         rule, where = next(rules, None), "their cuts" if len(opinions) > 1 else "its cut"
-        held = [f"{', '.join(opinions)} in {where} at α (opinions)"] if opinions else []
+        assumptions = [f"{', '.join(opinions)} in {where} at α (opinions)"] if opinions else []
         words = [rule.words] if rule and rule.words else []
         if rule and nature != "guaranteed":
-            held.append(f"if the true range stays inside the {nature} bounds, which is not proved")
-        return cls(rule, (*conditions, *words, *held), opinions)
+            assumptions.append(
+                f"if the true range stays inside the {nature} bounds, which is not proved"
+            )
+        return cls(rule, (*conditions, *words, *assumptions), opinions)
 
     @property
     def claim(self) -> Claim | None:

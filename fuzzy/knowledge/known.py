@@ -1,4 +1,4 @@
-"""Facts about a model that its caller states, and samples that contradict them."""
+"""Knowledge about a model, stated by its caller, and samples that contradict it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from alphacut.fuzzy.refused import chosen, real, require
 
 Signs = NDArray[np.int8]
 ROUND_OFF = 1e-11
-"""Of the range and of the largest value: smaller differences contradict nothing."""
-_COMPARED = 400  # samples of an output that are compared pair by pair at most
+"""Share of the range and of the largest value: smaller differences contradict nothing."""
+_MAX_COMPARED = 400  # samples of an output whose pairs are compared: 160,000 pairs
 
 
 @dataclass(frozen=True)
-class Known:
-    """Facts about a model over the supports of its inputs, taken as proved.
+class Knowledge:
+    """Facts about a model over the supports of its inputs, which proofs take as given.
 
     Args:
-        signs: +1 for an input with which every output rises, −1 where every output falls; or such a
-            mapping by output, `{"load": {"deflection": 1}}`.
-        monotone: Inputs in which every output is monotone while the others are fixed, in whatever
+        signs: +1 for an input with which all outputs rise, −1 where all fall; or such a mapping by
+            output, `{"load": {"deflection": 1}}`.
+        monotone: Inputs in which all outputs are monotone while the others are fixed, in either
             direction; inputs with a sign need not be named again.
-        source: Where the facts come from, named beside every guarantee that rests on them.
+        source: Where the facts come from, named beside the guarantees that rest on them.
         tests: Points of each cut at which a guarantee is tested, as far as the budget goes.
 
     Raises:
@@ -46,7 +46,7 @@ class Known:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Facts that proofs take as given, one sentence each."""
+        """The facts, one sentence each."""
         facts = {
             f"the signs of {', '.join(self.signs)} hold": self.signs,
             f"the outputs are monotone in {', '.join(self.monotone)}": self.monotone,
@@ -56,13 +56,13 @@ class Known:
     def check_inputs(self, inputs: Iterable[str]) -> None:
         """Refuse names that are no input."""
         for name in (*self.signs, *self.monotone):
-            chosen("known input", name, inputs)
+            chosen("input of knowledge", name, inputs)
 
     def check_outputs(self, outputs: Iterable[str]) -> None:
         """Refuse names that are no output."""
         for sign in self.signs.values():
             for name in sign if isinstance(sign, Mapping) else ():
-                chosen("known output", name, outputs)
+                chosen("output of knowledge", name, outputs)
 
     def stated(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
         """Stated signs, 0 where none is, shape (outputs, inputs)."""
@@ -80,7 +80,7 @@ class Known:
 
 
 def negligible(values: Array) -> Array:
-    """Differences of outputs, shape (outputs,), that round-off explains."""
+    """Largest differences due to rounding, shape (outputs,), from values (n, outputs)."""
     size = np.nanmax(np.abs(values), axis=0)
     return np.asarray(ROUND_OFF * (np.nanmax(values, axis=0) - np.nanmin(values, axis=0) + size))
 
@@ -89,7 +89,7 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
     """The two samples that contradict the signs of one output the most, if any do.
 
     Args:
-        points: Samples, shape (n, inputs); of more than 400 some spread over the values are taken.
+        points: Samples, shape (n, inputs); of more than 400 a choice spread over the values.
         values: Output at the samples, shape (n,).
         signs: +1, −1, or 0 where nothing is stated, shape (inputs,); inputs without a sign must be
             equal in both samples.
@@ -98,11 +98,11 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
         Two points; the second should have the larger output and has not.
     """
     rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _COMPARED)).astype(int))]
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MAX_COMPARED)).astype(int))]
     step = (points[rows][None] - points[rows][:, None]) * np.where(signs, signs, 1)
     ordered = ((step >= 0) & ((signs != 0) | (step == 0))).all(axis=2)
     fall = np.where(ordered, values[rows][:, None] - values[rows][None], 0.0)
-    one, other = np.unravel_index(fall.argmax(), fall.shape)
-    if fall[one, other] <= negligible(values[:, None])[0]:
+    first, second = np.unravel_index(fall.argmax(), fall.shape)
+    if fall[first, second] <= negligible(values[:, None])[0]:
         return None
-    return points[rows[one]], points[rows[other]]
+    return points[rows[first]], points[rows[second]]

@@ -1,8 +1,7 @@
 """Exact cuts under a named law: normal, or log-normal through the logarithms of the values.
 
-Next value and mean by Student's t, quantiles by the non-central t.
-
-Source: Hahn and Meeker, Statistical Intervals, chapters 4 and 14.
+Next value and mean by Student's t, quantiles by the non-central t (Hahn and Meeker, Statistical
+Intervals, 1991, chapters 4 and 14).
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ def law_cuts(
 
 
 def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
-    """Ends mean + factor · scatter over the levels, worst over the values' intervals."""
+    """Ends of the cuts at all levels: mean + factor · deviation, widest over values' intervals."""
     below, above = _factors(data.count, quantile)
     least, most = _scatter(data)
     lower = data.lower.mean() + below * np.where(below < 0, most, least)
@@ -91,17 +90,17 @@ def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
 
 
 def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
-    """Steps from 0 to 1 within the bounds, and the least level at which they are finite."""
+    """Cuts clipped to the bounds, and the least level at which they are finite without them."""
     low, high = bounds
     upper = np.minimum.accumulate(np.clip(upper, low, high))
     # at α = 1 both are one point, to round-off
     lower = np.minimum(np.maximum.accumulate(np.clip(lower, low, high)), upper[-1])
     first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
-    whole = bool(np.isfinite(bounds).all())
-    least, most = (low, high) if whole else (lower[first], upper[first])
+    bounded = bool(np.isfinite(bounds).all())
+    least, most = (low, high) if bounded else (lower[first], upper[first])
     lower[:first], upper[:first] = lower[first], upper[first]
     steps = Stepwise((0.0, *LEVELS), (least, *lower), (most, *upper))
-    return steps, 0.0 if whole else float(LEVELS[first])
+    return steps, 0.0 if bounded else float(LEVELS[first])
 
 
 def from_scatter(mean: float, deviation: float, count: int) -> Claimed:

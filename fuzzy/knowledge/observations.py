@@ -31,8 +31,8 @@ class Observations:
     bounds: tuple[float, float]
 
     @classmethod
-    def of(cls, values: Values, bounds: Limits | None = None) -> Observations:
-        """Values as they were measured.
+    def from_values(cls, values: Values, bounds: Limits | None = None) -> Observations:
+        """Observations from values as they were measured.
 
         Args:
             values: Numbers, shape (n,), or pairs of a lower and an upper end, shape (n, 2),
@@ -40,8 +40,8 @@ class Observations:
             bounds: Physically possible values; None where there is no bound.
 
         Raises:
-            RefusedError: There is no value, one is no number, a pair is not in order, or a value
-                lies outside the bounds.
+            RefusedError: There is no value, a value is not a number, a pair is not in order, or a
+                value lies outside the bounds.
         """
         low, high = _limits(bounds)
         ends = np.array([_pair(number, value) for number, value in enumerate(values, 1)])
@@ -64,7 +64,7 @@ class Observations:
         return bool((self.lower == self.upper).all())
 
     def mapped(self, function: np.ufunc) -> Observations:
-        """The observations through a rising function, as a logarithm."""
+        """Observations of a rising function of the values, such as the logarithm."""
         with np.errstate(divide="ignore"):
             low, high = (float(function(end)) for end in self.bounds)
             return Observations(function(self.lower), function(self.upper), (low, high))

@@ -2,8 +2,9 @@
 
 Between n values in rising order, with the physical bounds at both ends, there are n + 1 gaps. The
 probability that the quantity lies in gap k does not depend on the law: 1/(n + 1) for the next value
-(conformal prediction), binomial for a quantile. Gaps are taken away from the ends; the cut is what
-is left, and its level the probability taken away. Ties and discrete laws only add coverage.
+(conformal prediction), binomial for a quantile. Gaps are removed from the ends; the cut consists of
+the remaining gaps, and its level is the probability of the removed ones. Ties and discrete laws add
+coverage.
 
 Sources: Wilks, Annals of Mathematical Statistics 12 (1941), 91-96; David and Nagaraja, Order
 Statistics, section 7.1; Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, chapter
@@ -25,7 +26,7 @@ from alphacut.fuzzy.sets.numbers import Stepwise
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Nested rows of gaps with the level from which each is the cut.
+    """Nested ranges of gaps, and the level from which each of them is the cut.
 
     Args:
         level: Probability outside, rising from 0, shape (k,).
@@ -45,13 +46,13 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
     Args:
         n: Number of values.
         quantile: Probability of the quantile in (0, 1); None for the next value.
-        open_ends: Ends without a physical bound: their gaps go first.
+        open_ends: Ends without a physical bound: their gaps are removed first.
     """
     inside, below, above = _gaps(n, quantile)
     low, high = 0, n
     rows = [(0.0, low, high)]
     while low < high:
-        if _takes_lower((inside, below, above), low, high, open_ends):
+        if _removes_lowest((inside, below, above), low, high, open_ends):
             low += 1
         else:
             high -= 1
@@ -73,12 +74,13 @@ def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
     return law.pmf(gaps), law.cdf(gaps - 1), law.sf(gaps)
 
 
-def _takes_lower(
+def _removes_lowest(
     gaps: tuple[Array, Array, Array], low: int, high: int, open_ends: tuple[bool, bool]
 ) -> bool:
-    """True if the next gap goes from below.
+    """Whether the next gap to remove is the lowest one, not the highest.
 
-    An open end goes first, then the less probable gap, then the end with less taken away.
+    A gap at an open end is removed first, then the less probable one, then the one at the end from
+    which less was removed.
     """
     inside, below, above = gaps
     left, right = open_ends[0] and low == 0, open_ends[1] and high == len(inside) - 1
@@ -97,7 +99,7 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
         quantile: Probability of the quantile; None for the next value.
 
     Raises:
-        RefusedError: They decide no cut at all.
+        RefusedError: The values decide no cut at all.
     """
     low, high = data.bounds
     rows = windows(data.count, quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
@@ -117,7 +119,7 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
 
 
 def _centre(data: Observations, quantile: float) -> float:
-    """Point that stays at α = 1: the sample's quantile."""
+    """Cut at α = 1: the quantile of the sample."""
     rows = (row[np.isfinite(row)] for row in (data.lower, data.upper))
     ends = [np.quantile(row, quantile) for row in rows if len(row)]
     return float(np.mean(ends)) if ends else np.nan

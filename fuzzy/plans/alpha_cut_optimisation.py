@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import Bound, Cut, attained, cuts_with_width
+from alphacut.fuzzy.plans.cut import Bound, CutSearch, attained, cuts_with_width
 from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
@@ -18,7 +18,6 @@ from alphacut.fuzzy.sets.boxes import Domain
 # least distance of two starts, as a share of the width of the cut: they should lie in different
 # valleys
 _START_DISTANCE = 0.25
-_MAX_CORNER_INPUTS = 6  # inputs up to which all corners are evaluated first
 
 
 @dataclass(frozen=True)
@@ -56,10 +55,10 @@ class Optimisation:
             return attained(campaign, domain, self.name, spent=True)
         return attained(campaign, domain, self.name, spent=False)
 
-    def _search(self, cut: Cut, outputs: tuple[str, ...]) -> None:
+    def _search(self, cut: CutSearch, outputs: tuple[str, ...]) -> None:
         """Run the first points of a cut and the descents of all bounds."""
-        points = _first_points(len(cut.moving), self.look, cut.level)
-        allowed = points[cut.slack(points) >= 0]
+        points = _spread(len(cut.moving), self.look, cut.level)
+        allowed = np.concatenate([cut.corners, points[cut.slack(points) >= 0]])
         if len(allowed):
             cut.campaign(cut.points(allowed))
         for output, sign in product(outputs, (1.0, -1.0)):
@@ -67,17 +66,15 @@ class Optimisation:
                 cut.descend(start, Bound(output, sign))
 
 
-def _first_points(inputs: int, look: int, level: int) -> Array:
-    """Corners of the unit cube, and `look` Halton points for each input."""
+def _spread(inputs: int, look: int, level: int) -> Array:
+    """`look` Halton points of the unit cube for each input."""
     from scipy.stats import qmc
 
-    spread: Array = qmc.Halton(inputs, rng=np.random.default_rng([0, level])).random(look * inputs)
-    if inputs > _MAX_CORNER_INPUTS:
-        return spread
-    return np.concatenate([np.array(list(product((0.0, 1.0), repeat=inputs))), spread])
+    rng = np.random.default_rng([0, level])
+    return np.asarray(qmc.Halton(inputs, rng=rng).random(look * inputs))
 
 
-def _best(cut: Cut, bound: Bound, count: int) -> Array:
+def _best(cut: CutSearch, bound: Bound, count: int) -> Array:
     """The best few samples in the cut that lie in different parts of it, in unit coordinates."""
     samples = cut.campaign.samples
     inside = cut.contains(samples.points)

@@ -25,8 +25,8 @@ _MAX_SEARCHED = 12  # outputs of which each bound is searched; of more each boun
 class Automatic:
     """Corners where they suffice, else multi-level single linkage.
 
-    Corners are guaranteed to suffice where what is known of the model says so. They are estimated
-    to where the differences of every input keep their sign at 24 points of the widest cut. Other
+    Corners are guaranteed to suffice where the knowledge about the model says so. They are estimated
+    to suffice where the differences of every input keep their sign at 24 points of the widest cut. Other
     outputs are searched (Rinnooy Kan, Timmer 1987) until the share of each cut that is not yet
     covered is small (Boender, Rinnooy Kan 1987): the bounds are then estimated, to 1e-5 of the
     range. They are attained where the budget ends the search, or where a bound lies at a kink or a
@@ -52,7 +52,7 @@ class Automatic:
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Bounds of every output."""
         outputs = campaign(domain.modal[None]).columns
-        monotone = campaign.known.monotone_in(domain.names, outputs)
+        monotone = campaign.knowledge.monotone_in(domain.names, outputs)
         if not domain.interactions and corners_suffice(domain, monotone).all():
             return replace(Reduced().run(campaign, domain), method=self.name)
         return _Search(campaign, domain, outputs, self).run()

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.design import of_samples
+from alphacut.fuzzy.plans.design import bounds_of_samples
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.interaction import pulled
@@ -22,6 +23,7 @@ _LARGE_DIFFERENCE = 1e-4
 _MAX_SLOPE = 0.01  # ranges of the output over the width of a cut: at a kink or jump it is larger
 _FACE = 1e-9  # of the width: a point this close to a face of the cut lies on it
 _STEEPNESS = 4.0  # of the objective's unit: so first steps of L-BFGS-B mostly reach a face at once
+_MAX_CORNER_INPUTS = 6  # inputs up to which all corners are evaluated, 64 at most
 _FAILED = 1e6  # ranges of the output that stand for a sample without a value
 
 
@@ -38,7 +40,7 @@ class Bound:
     sign: float
 
 
-class Cut:
+class CutSearch:
     """One α-cut under search, in unit coordinates of the inputs that have a width."""
 
     def __init__(self, campaign: Campaign, domain: Domain, level: int) -> None:
@@ -47,6 +49,15 @@ class Cut:
         self.lower, self.upper = (ends[level] for ends in domain.boxes)
         self.near = _FACE * (self.upper - self.lower)
         self.moving = np.flatnonzero(self.upper > self.lower)
+
+    @cached_property
+    def corners(self) -> Array:
+        """Allowed corners of the unit cube, shape (n, moving); none of more than six inputs."""
+        inputs = len(self.moving)
+        if inputs > _MAX_CORNER_INPUTS:
+            return np.empty((0, inputs))
+        corners = np.array(list(product((0.0, 1.0), repeat=inputs)))
+        return np.asarray(corners[self.slack(corners) >= 0])
 
     def points(self, unit: Array) -> Array:
         """Inputs of points (n, moving) of the unit cube, shape (n, inputs)."""
@@ -128,10 +139,10 @@ class Cut:
             return Optimum(self, bound, self.points(end.x[None])[0], value, slope)
         room = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
         end = minimize(objective, start, method="SLSQP", constraints=[room], **settings)
-        both = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
-        values = self.values(both, bound)
+        candidates = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
+        values = self.values(candidates, bound)
         best = int(values.argmin())
-        return Optimum(self, bound, self.points(both)[best], float(values[best]), np.inf)
+        return Optimum(self, bound, self.points(candidates)[best], float(values[best]), np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +158,7 @@ class Optimum:
             width of the cut; infinite where it was not computed.
     """
 
-    cut: Cut
+    cut: CutSearch
     bound: Bound
     point: Array
     value: float
@@ -166,7 +177,7 @@ class Optimum:
         except SpentError:
             return False
 
-    def holds_in(self, cut: Cut) -> bool:
+    def holds_in(self, cut: CutSearch) -> bool:
         """Whether it is an optimum of another cut, too.
 
         It is one of a narrower cut that it lies in, and of a wider one unless a face of its own cut
@@ -185,16 +196,16 @@ def _free_slope(unit: Array, gradient: Array) -> float:
     return float(np.abs(np.where(stopped, 0.0, gradient)).max(initial=0.0))
 
 
-def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[Cut]:
+def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[CutSearch]:
     """Cuts that have a width, from the narrowest on."""
     for level in reversed(range(len(domain.alpha))):
-        cut = Cut(campaign, domain, level)
+        cut = CutSearch(campaign, domain, level)
         if len(cut.moving):
             yield cut
 
 
 def attained(campaign: Campaign, domain: Domain, method: str, *, spent: bool) -> Bounds:
     """Bounds from all samples of a search, with a note where the budget ended it."""
-    bounds = of_samples(domain, campaign.samples, method)
+    bounds = bounds_of_samples(domain, campaign.samples, method)
     note = "the budget ended the search: a larger one may find more"
     return replace(bounds, notes=(note,)) if spent else bounds

@@ -18,8 +18,8 @@ from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.low_discrepancy import low_discrepancy
 
 
-class Method(Protocol):
-    """A way to search the boxes of the inputs for the extremes of a model: a frozen dataclass."""
+class Plan(Protocol):
+    """Plan of the evaluations that bound a model over the boxes of its inputs: a dataclass."""
 
     @property
     def name(self) -> str:
@@ -31,7 +31,7 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Design:
-    """Distinct samples, and which of them each level uses.
+    """Distinct samples, and the rows of those that each level uses.
 
     Args:
         domain: Inputs and levels.
@@ -45,13 +45,13 @@ class Design:
 
     @classmethod
     def from_levels(cls, domain: Domain, points: Sequence[Array]) -> Design:
-        """Gather the points of each level, shape (n_level, inputs), listed once."""
+        """Design from the points of each level, shape (n_level, inputs)."""
         distinct, inverse = np.unique(np.concatenate(points), axis=0, return_inverse=True)
         ends = np.cumsum([len(rows) for rows in points])[:-1]
         return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
 
     def bounds(self, values: Values, method: str) -> Bounds:
-        """Retransformation: attained extremes of each level's samples and of every level above.
+        """Retransformation: attained extremes of the samples of each level and of those above it.
 
         Args:
             values: Outputs at `points`; NaN where a sample failed and was skipped.
@@ -78,30 +78,30 @@ class Design:
         usable = np.where(np.isnan(values), np.inf, values)
         best: list[Rows] = []
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
-            both = [*([rows[usable[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
-            if not both:
+            candidates = [*([rows[usable[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
+            if not candidates:
                 what = f"no sample of the cut at α = {alpha:g} fulfils its interactions"
                 raise FailedError(what, "widen them, or take fewer")
-            if np.isinf(usable[both[0], columns]).any():
+            if np.isinf(usable[candidates[0], columns]).any():
                 raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
-            least = np.array(both)
+            least = np.array(candidates)
             best.append(least[usable[least, columns].argmin(axis=0), columns])
         return np.array(best[::-1])
 
 
-def of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
-    """Bounds in which every level uses all samples that lie in its cut."""
+def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
+    """Bounds in which each level uses all samples that lie in its cut."""
     levels = tuple(np.flatnonzero(inside) for inside in domain.inside(samples.points))
     return Design(domain, samples.points, levels).bounds(samples.values, method)
 
 
-def proving(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """Bounds of the outputs that corners prove as guaranteed ones.
+def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
+    """The bounds, guaranteed for the outputs whose corners the knowledge proves to suffice.
 
     Args:
-        bounds: Attained at the corners that the knowledge names.
-        campaign: All samples of the model, and what is known of it.
-        proved: Outputs that the knowledge covers on every level, shape (outputs,).
+        bounds: Bounds attained at the corners that the knowledge names.
+        campaign: All samples of the model, and the knowledge about it.
+        proved: Outputs that the knowledge covers on all levels, shape (outputs,).
 
     Raises:
         RefusedError: A sample contradicts the knowledge.
@@ -109,22 +109,22 @@ def proving(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
     if not proved.any():
         return bounds
     campaign(_test_points(Domain(bounds.inputs, tuple(bounds.alpha)), campaign))
-    samples, known = campaign.samples, campaign.known
-    signs = known.stated(tuple(bounds.inputs), bounds.outputs)
-    beyond = _beyond(bounds, samples)
-    words, allowed = "; ".join(known.words), "facts that hold over the whole supports"
+    samples, knowledge = campaign.samples, campaign.knowledge
+    signs = knowledge.stated(tuple(bounds.inputs), bounds.outputs)
+    refuted = _refuted(bounds, samples)
+    words, allowed = "; ".join(knowledge.words), "facts that hold over the whole supports"
     for column in np.flatnonzero(proved):
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
-        holds = pair is None and not beyond[column]
+        holds = pair is None and not refuted[column]
         cure = f"samples contradict it{_between(bounds, pair)}"
-        require(holds, f"known of {bounds.outputs[column]}", repr(words), allowed, cure)
-    natures = tuple(Nature.GUARANTEED if own else Nature.ATTAINED for own in proved)
+        require(holds, f"knowledge of {bounds.outputs[column]}", repr(words), allowed, cure)
+    natures = tuple(Nature.GUARANTEED if holds else Nature.ATTAINED for holds in proved)
     agree = f"which {len(samples.points):,} samples do not contradict"
     return replace(
         bounds,
         natures=natures,
         nature=Nature.weakest(natures),
-        basis=tuple(f"{fact}, {agree}" for fact in known.words),
+        basis=tuple(f"{fact}, {agree}" for fact in knowledge.words),
         inner=Ends(bounds.lower, bounds.upper),
     )
 
@@ -136,7 +136,7 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
     a narrower cut tests a wider one, too.
     """
     lower, upper = domain.boxes
-    widths, tests, points = upper - lower, campaign.known.tests, list[Array]()
+    widths, tests, points = upper - lower, campaign.knowledge.tests, list[Array]()
     shares = low_discrepancy(len(domain.names))
     ends = np.hstack([lower, upper])
     is_new = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
@@ -146,11 +146,11 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
     return np.array(points[: campaign.left]).reshape(-1, len(domain.names))
 
 
-def _beyond(bounds: Bounds, samples: Samples) -> Mask:
-    """Outputs of which a sample lies beyond the corners of its cut."""
-    every = of_samples(Domain(bounds.inputs, tuple(bounds.alpha)), samples, "")
+def _refuted(bounds: Bounds, samples: Samples) -> Mask:
+    """Outputs of which a sample exceeds the values at the corners of its cut."""
+    sampled = bounds_of_samples(Domain(bounds.inputs, tuple(bounds.alpha)), samples, "")
     small = negligible(samples.values.array)
-    low, high = every.lower < bounds.lower - small, every.upper > bounds.upper + small
+    low, high = sampled.lower < bounds.lower - small, sampled.upper > bounds.upper + small
     return np.asarray((low | high).any(axis=0))
 
 

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Function
-from alphacut.fuzzy.knowledge.known import Known
-from alphacut.fuzzy.plans.design import Method
+from alphacut.fuzzy.knowledge.known import Knowledge
+from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.propagation import propagate
 from alphacut.fuzzy.refused import real, require
@@ -152,7 +152,7 @@ class IntervalQuasiMonteCarlo:
 
     points: int = 256
     seed: int = 0
-    method: Method = field(default_factory=Reduced)
+    method: Plan = field(default_factory=Reduced)
 
     def __post_init__(self) -> None:
         real("points", self.points, positive=True, whole=True)
@@ -167,7 +167,7 @@ class IntervalQuasiMonteCarlo:
         inputs: Mapping[str, FuzzyNumber | float],
         *,
         alpha: Sequence[float],
-        known: Known | None = None,
+        knowledge: Knowledge | None = None,
     ) -> IntervalResponse:
         """Bound the response at every point and level.
 
@@ -176,7 +176,7 @@ class IntervalQuasiMonteCarlo:
             random: The random inputs.
             inputs: The fuzzy inputs, which may be none; a plain number is crisp.
             alpha: Rising levels within 0 to 1.
-            known: Facts about the function.
+            knowledge: Facts about the function.
 
         Raises:
             RefusedError: There is no random input, or an input is named twice.
@@ -195,7 +195,7 @@ class IntervalQuasiMonteCarlo:
                     {**drawn, **inputs},
                     self.method,
                     alpha=alpha,
-                    known=known,
+                    knowledge=knowledge,
                     progress=False,
                 )
             )

@@ -50,7 +50,7 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
     """Find the sign of every effect on every level, from the widest box up.
 
     Args:
-        campaign: The model with what is known of it.
+        campaign: The model with the knowledge about it.
         domain: Inputs and levels.
         outputs: Outputs that matter; all if none is named.
     """
@@ -58,7 +58,7 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
     for name in outputs:
         chosen("output", name, columns)
     outputs = outputs or columns
-    signs = campaign.known.stated(domain.names, outputs)
+    signs = campaign.knowledge.stated(domain.names, outputs)
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(signs.any(axis=0)):
         campaign(_changed(domain.modal, signs, lowers[0], uppers[0], int(column)))

@@ -2,8 +2,9 @@
 
 At 24 points of the widest cut each input is changed alone: at 20 along a walk whose coordinates
 form a Latin hypercube, and at the two corners that the signs seen there name, by a small and by a
-large step. Where the differences of every input keep their sign, and no two samples contradict it
-anywhere, the two corners of each cut bound the output. This is evidence, not proof.
+large step. Where the differences of every input keep their sign, and no two samples contradict it,
+all corners of the cuts among them, two corners of each cut bound the output. This is evidence, not
+proof.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs, contradiction, negligible
-from alphacut.fuzzy.plans.cut import Cut, cuts_with_width
+from alphacut.fuzzy.plans.cut import CutSearch, cuts_with_width
 
 POINTS = 24
 """Points of the widest cut at which each input is changed alone."""
@@ -34,7 +35,7 @@ class SignWalk:
             coordinates, shape (21, moving): uniform samples of the cut.
     """
 
-    def __init__(self, campaign: Campaign, cut: Cut, seed: int) -> None:
+    def __init__(self, campaign: Campaign, cut: CutSearch, seed: int) -> None:
         from scipy.stats import qmc
 
         self.campaign, self.cut = campaign, cut
@@ -76,13 +77,13 @@ class SignWalk:
         return np.where(mixed, 0, np.where(falls, -1, 1)).astype(np.int8).T
 
     def _run_corners(self, signs: Signs) -> None:
-        """Run both corners of each cut, and steps from those of the widest along each input."""
+        """Run the corners of each cut, and steps from two of the widest cut along each input."""
         highest = (signs > 0).astype(float)
-        both = np.stack([highest, 1 - highest])
-        steps = np.eye(len(signs)) * (1 - 2 * both[:, None])  # inwards from each of both
+        corners = np.stack([highest, 1 - highest])
+        steps = np.eye(len(signs)) * (1 - 2 * corners[:, None])  # inwards
         large = self.base[:2, None] * steps
-        around = both[:, None] + np.concatenate([_SMALL_STEP * steps, large], axis=1)
+        around = corners[:, None] + np.concatenate([_SMALL_STEP * steps, large], axis=1)
         self.campaign(self.cut.points(around.reshape(-1, len(signs))))
         for cut in cuts_with_width(self.campaign, self.cut.domain):
-            shared = both[:, np.isin(self.cut.moving, cut.moving)]
-            self.campaign(cut.points(shared))
+            named = corners[:, np.isin(self.cut.moving, cut.moving)]
+            self.campaign(cut.points(np.concatenate([named, cut.corners])))

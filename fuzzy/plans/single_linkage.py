@@ -10,7 +10,7 @@ the rule of Boender and Rinnooy Kan (1987): with W different optima, the basins 
 W (W + 1) / (N (N − 1)) of the cut, as Bayes' rule tells from a uniform prior.
 
 Samples of a cut that lie in a narrower one are uniform there too and count for it. Optima of other
-cuts raise W and the bound, but not N.
+cuts, and descents from corners, raise W and the bound, but not N.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import Bound, Cut, Optimum, cuts_with_width
+from alphacut.fuzzy.plans.cut import Bound, CutSearch, Optimum, cuts_with_width
 from alphacut.fuzzy.sets.boxes import Domain
 
 MIN_SAMPLES = 100
@@ -66,7 +66,7 @@ class BoundSearch:
     """State of the search of one bound in one cut.
 
     Args:
-        started: Rows of the samples from which a descent has started.
+        started: Rows of the samples from which a descent has started; negative for corners.
         samples: N, samples all of whose descents are done.
         optima: W different results of descents, in any cut, that are optima of this cut.
     """
@@ -188,7 +188,7 @@ class SingleLinkage:
         for cut in self.cuts:
             self._fill(cut, MIN_SAMPLES, 0)
 
-    def _open(self, cut: Cut) -> list[Bound]:
+    def _open(self, cut: CutSearch) -> list[Bound]:
         """Bounds of a cut that do not meet the rule; descents from better values come first."""
         for bound in self.bounds:
             self._descend_from_better(cut, bound)
@@ -197,7 +197,7 @@ class SingleLinkage:
         states = [(bound, self.states[cut.level, bound]) for bound in self.bounds]
         return [bound for bound, state in states if state.is_open(self.uncovered)]
 
-    def _descend_from_better(self, cut: Cut, bound: Bound) -> None:
+    def _descend_from_better(self, cut: CutSearch, bound: Bound) -> None:
         """Descend from the best sample of any search if it is better than all optima."""
         state, samples = self.states[cut.level, bound], self.campaign.samples
         if not state.optima:
@@ -220,14 +220,14 @@ class SingleLinkage:
             elif optimum.value < optima[number].value:
                 optima[number] = optimum
 
-    def _number(self, cut: Cut, optimum: Optimum) -> int:
+    def _number(self, cut: CutSearch, optimum: Optimum) -> int:
         """Index of the same optimum among those of a cut; their count if it is a new one.
 
         Optima of nearly one value are the same if they are close, or if no value between them is
         larger: a valley is where many descents end, and symmetric hills are several.
         """
         optima, near = self.states[cut.level, optimum.bound].optima, self._near(optimum.bound)
-        alike = [k for k, other in enumerate(optima) if abs(other.value - optimum.value) <= near]
+        alike = [k for k, rival in enumerate(optima) if abs(rival.value - optimum.value) <= near]
         unit = cut.unit(np.stack([optimum.point, *(optima[k].point for k in alike)]))
         steps = unit[1:] - unit[0]
         for number, step in zip(alike, steps, strict=True):
@@ -245,33 +245,35 @@ class SingleLinkage:
         span = VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max()
         return float(span)
 
-    def _fill(self, cut: Cut, asked: int, rounds: int) -> None:
+    def _fill(self, cut: CutSearch, asked: int, rounds: int) -> None:
         """Run the model at new uniform samples of a cut until there are as many as asked."""
         missing = asked - len(self._rows(cut))
         if missing > 0:
             rng = np.random.default_rng([self.seed, 1 + cut.level, rounds])
             self._add(cut, self._draw(cut, missing, rng))
 
-    def _descend(self, cut: Cut, bounds: list[Bound]) -> None:
-        """Run the descents that the samples of a cut start."""
+    def _descend(self, cut: CutSearch, bounds: list[Bound]) -> None:
+        """Run the descents that the samples and the corners of a cut start."""
         rows = self._rows(cut)
         if len(rows) < 2:  # the interactions leave next to nothing
             return
-        unit = cut.unit(self._points[rows])
+        unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
+        names = [*rows.tolist(), *range(-len(cut.corners), 0)]  # of corners, which N does not count
         distance = critical_distance(len(rows), len(cut.moving), self._volumes[cut.level])
         for bound in bounds:
             state = self.states[cut.level, bound]
-            for start in linkage_starts(unit, self._values[bound][rows], distance):
-                if rows[start] not in state.started:
-                    state.started.add(int(rows[start]))
+            values = np.append(self._values[bound][rows], cut.values(cut.corners, bound))
+            for start in linkage_starts(unit, values, distance):
+                if names[start] not in state.started:
+                    state.started.add(names[start])
                     self._keep(cut.descend(unit[start], bound))
             state.samples = len(rows)
 
-    def _rows(self, cut: Cut) -> Rows:
+    def _rows(self, cut: CutSearch) -> Rows:
         """Rows of the samples that are uniform in a cut: its own, and those of wider ones."""
         return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
 
-    def _draw(self, cut: Cut, count: int, rng: np.random.Generator) -> Array:
+    def _draw(self, cut: CutSearch, count: int, rng: np.random.Generator) -> Array:
         """Uniform points of a cut that the interactions allow, in unit coordinates.
 
         There may be fewer than `count` where the interactions allow next to nothing.
@@ -286,7 +288,7 @@ class SingleLinkage:
             self._exhausted.add(cut.level)
         return allowed[:count]
 
-    def _add(self, cut: Cut, unit: Array) -> None:
+    def _add(self, cut: CutSearch, unit: Array) -> None:
         """Run the model at uniform samples of a cut."""
         if len(unit):
             points = cut.points(unit)

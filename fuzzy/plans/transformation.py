@@ -20,16 +20,15 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
-from alphacut.fuzzy.plans.design import Design, of_samples, proving
+from alphacut.fuzzy.plans.design import Design, bounds_of_samples, guaranteed_bounds
 from alphacut.fuzzy.plans.monotonicity import Effects, verify
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds, Ends
 from alphacut.fuzzy.sets.boxes import Domain
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
-# of the support: points of different levels closer than this differ by round-off only, and are one
-# point
-_SAME = 1e-13
+# share of the support: points of two levels closer than this differ by round-off only
+_ROUND_OFF = 1e-13
 
 
 def hanss_points(
@@ -40,13 +39,13 @@ def hanss_points(
     Args:
         number: A fuzzy number or interval.
         alpha: Rising levels.
-        inner: Whether there are points between the ends of a cut.
+        inner: Whether to add points between the ends of a cut.
 
     Returns:
         For each level, from the lowest, its points in rising order: n at the top (one where the cut
         is a single value, otherwise its two ends), n + 1 at the next level down, and so on.
     """
-    known: list[float] = []  # in rising order
+    points: list[float] = []  # of all levels so far, in rising order
     rows: list[list[float]] = []
     for level in reversed(alpha):
         lower, upper = number.cut(level)
@@ -55,19 +54,19 @@ def hanss_points(
         )
         rows.append(
             [
-                _settled(x, known, number.support.width)
+                _merged(x, points, number.support.width)
                 for x in ([lower, *between, upper] if lower < upper else [lower])
             ]
         )
     return rows[::-1]
 
 
-def _settled(x: float, known: list[float], width: float) -> float:
-    """The known point that differs from x by round-off only, otherwise x."""
-    place = bisect_left(known, x - _SAME * width)
-    if place < len(known) and known[place] - x <= _SAME * width:
-        return known[place]
-    known.insert(place, x)
+def _merged(x: float, points: list[float], width: float) -> float:
+    """The listed point that differs from x by round-off only, otherwise x, which is then listed."""
+    index = bisect_left(points, x - _ROUND_OFF * width)
+    if index < len(points) and points[index] - x <= _ROUND_OFF * width:
+        return points[index]
+    points.insert(index, x)
     return x
 
 
@@ -81,25 +80,25 @@ def grids(domain: Domain, refined: Collection[str]) -> list[list[list[float]]]:
 
 
 def _combined(campaign: Campaign, domain: Domain, refined: Collection[str], method: str) -> Design:
-    """All combinations of the points of each level, if the budget carries them."""
-    each = grids(domain, refined)
-    afford(sum(prod(map(len, grid)) for grid in each), campaign, method)
-    return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in each])
+    """Design of all combinations of the points of each level."""
+    levels = grids(domain, refined)
+    require_budget(sum(prod(map(len, grid)) for grid in levels), campaign, method)
+    return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in levels])
 
 
 def _transformed(
     campaign: Campaign, domain: Domain, refined: Collection[str], method: str
 ) -> Bounds:
-    """Bounds from all combinations, proved where corners suffice."""
+    """Bounds from all combinations, guaranteed where corners suffice."""
     domain.require_free(method)
     design = _combined(campaign, domain, refined, method)
     bounds = design.bounds(campaign(design.points), method)
-    monotone = campaign.known.monotone_in(domain.names, bounds.outputs)
-    return proving(bounds, campaign, corners_suffice(domain, monotone))
+    monotone = campaign.knowledge.monotone_in(domain.names, bounds.outputs)
+    return guaranteed_bounds(bounds, campaign, corners_suffice(domain, monotone))
 
 
 def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
-    """Outputs that are monotone in every input that has a width, shape (outputs,).
+    """Outputs that are monotone in all inputs that have a width, shape (outputs,).
 
     Args:
         domain: Inputs and levels.
@@ -109,10 +108,10 @@ def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
     return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
 
 
-def afford(samples: float, campaign: Campaign, method: str) -> None:
-    """Refuse a design that the budget does not carry, before any sample is run."""
+def require_budget(samples: float, campaign: Campaign, method: str) -> None:
+    """Refuse a design that needs more evaluations than the budget, before any is made."""
     cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
-    cure += " fewer levels, state signs (Known) for Signed, or take Automatic"
+    cure += " fewer levels, state signs (Knowledge) for Signed, or take Automatic"
     left, allowed = f"{campaign.left:,} evaluations", f"{samples:,.0f} or more"
     require(samples <= campaign.left, "budget", left, allowed, cure)
 
@@ -143,7 +142,7 @@ class Reduced:
 class Extended:
     """Extended transformation method: ends of monotone inputs, all points of the others.
 
-    Monotone are those that the caller names (`Known`), and others of which probes show it.
+    Monotone are those that the caller names (`Knowledge`), and others of which probes show it.
 
     Args:
         outputs: Outputs whose bounds matter; all if none is named.
@@ -157,8 +156,8 @@ class Extended:
         """Find the monotone inputs, evaluate the samples, rearrange them into α-cuts."""
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
-        known = campaign.known.monotone_in(domain.names, effects.outputs)
-        monotone = ((effects.signs[0] != 0) | known).all(axis=0)
+        stated = campaign.knowledge.monotone_in(domain.names, effects.outputs)
+        monotone = ((effects.signs[0] != 0) | stated).all(axis=0)
         refined = {name for name, ends in zip(domain.names, monotone, strict=True) if not ends}
         design = _combined(campaign, domain, refined, self.name)
         return _verified(design, campaign, effects, self.name)
@@ -168,7 +167,7 @@ class Extended:
 class Signed:
     """Two corners per level where all effects have a sign, else the general method's points.
 
-    Signs are stated by the caller (`Known.signs`) or seen at probes. Where all are stated, the
+    Signs are stated by the caller (`Knowledge.signs`) or seen at probes. Where all are stated, the
     bounds are guaranteed, else attained.
 
     Args:
@@ -184,31 +183,31 @@ class Signed:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
-        afford(_size(effects, domain), campaign, self.name)
-        each = zip(effects.signs, grids(domain, domain.names), strict=True)
-        points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in each]
+        require_budget(_size(effects, domain), campaign, self.name)
+        levels = zip(effects.signs, grids(domain, domain.names), strict=True)
+        points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in levels]
         return _verified(Design.from_levels(domain, points), campaign, effects, self.name)
 
 
 def _verified(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
-    """Bounds from the samples of a design, proved where all signs are stated."""
+    """Bounds from the samples of a design, guaranteed where all signs are stated."""
     corners = design.bounds(campaign(design.points), method)
-    stated = campaign.known.stated(design.domain.names, corners.outputs) != 0
+    stated = campaign.knowledge.stated(design.domain.names, corners.outputs) != 0
     proved = corners_suffice(design.domain, stated) & np.isin(corners.outputs, effects.outputs)
-    judged = proving(corners, campaign, proved)
-    bounds = of_samples(design.domain, campaign.samples, method)
+    verdict = guaranteed_bounds(corners, campaign, proved)
+    bounds = bounds_of_samples(design.domain, campaign.samples, method)
     return replace(
         bounds,
-        nature=judged.nature,
-        natures=judged.natures,
-        basis=judged.basis,
+        nature=verdict.nature,
+        natures=verdict.natures,
+        basis=verdict.basis,
         inner=Ends(bounds.lower, bounds.upper),
         notes=effects.notes(design.domain),
     )
 
 
 def _size(effects: Effects, domain: Domain) -> float:
-    """Samples of the plan, counted without listing them."""
+    """Number of samples of the signed plan; there may be too many to list."""
     total = 0.0
     for signs, grid in zip(effects.signs, grids(domain, domain.names), strict=True):
         counts = np.array([len(points) for points in grid], float)

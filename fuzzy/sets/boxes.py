@@ -26,8 +26,8 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
     """The inputs by name, a plain number as a crisp one.
 
     Raises:
-        RefusedError: The inputs are no mapping, there is none, or a value is neither a fuzzy number
-            nor a number.
+        RefusedError: The inputs are not a mapping or empty, or a value is not a number, fuzzy or
+            plain.
     """
     named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
     require(bool(named), "inputs", inputs, "a mapping, as {'E': Triangular(24, 25, 26)}")
@@ -48,8 +48,8 @@ class Domain:
         interactions: Constraints between the inputs.
 
     Raises:
-        RefusedError: There is no input, the levels are none, do not rise, or leave [0, 1], an
-            interaction names no input, or the values behind a number do not decide its cuts.
+        RefusedError: There is no input or level, the levels do not rise within [0, 1], an
+            interaction names an unknown input, or values do not decide the cuts of a number.
     """
 
     inputs: Mapping[str, FuzzyNumber]
@@ -98,11 +98,11 @@ class Domain:
 
     def slack(self, points: Array, alpha: float) -> Array:
         """Least room that the interactions leave at points (n, inputs), shape (n,)."""
-        rooms = [one.slack(points, self.inputs, alpha) for one in self.interactions]
+        rooms = [interaction.slack(points, self.inputs, alpha) for interaction in self.interactions]
         return np.asarray(np.min([np.full(len(points), np.inf), *rooms], axis=0))
 
     def require_free(self, method: str) -> None:
-        """Refuse interactions, which the named method cannot respect."""
+        """Refuse interactions for a method that cannot take them into account."""
         kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
         cure = "take Automatic or Optimisation"
         require(not kinds, "interactions", kinds, f"none with the method {method}", cure)

@@ -1,4 +1,4 @@
-"""Fuzzy numbers that claim how often their cuts hold the true value, and on what that rests."""
+"""Fuzzy numbers with a claim: how often their cuts contain a quantity, under which conditions."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class Joint:
     @property
     def words(self) -> str:
         """The rule in words."""
-        of = "independent sources" if self.independent else "sources of unknown dependence"
-        return f"{len(self.names)} {of}" if len(self.names) > 1 else ""
+        sources = "independent sources" if self.independent else "sources of unknown dependence"
+        return f"{len(self.names)} {sources}" if len(self.names) > 1 else ""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Claimed(FuzzyNumber):
 
     Args:
         number: The cuts; below `decided` they repeat the first one that the values decide.
-        claim: What the cuts hold, how often, and given what.
+        claim: Which quantity the cuts contain, how often, and under which conditions.
         decided: Least α at which the values decide both ends of the cut; 0 where they do
             everywhere, or physical bounds fill in.
         joint: Rule by which its cuts were widened to hold together with others; None where they

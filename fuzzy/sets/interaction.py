@@ -1,4 +1,4 @@
-"""Interaction between fuzzy inputs: constraints on their box."""
+"""Interaction between fuzzy inputs: constraints on the box of their cuts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Interaction(Protocol):
         """The inputs that it touches."""
 
     def slack(self, points: Array, inputs: Mapping[str, FuzzyNumber], alpha: float) -> Array:
-        """Room at points (n, inputs) on a level, shape (n,); never falls with α."""
+        """Distance to the constraint at points (n, inputs), shape (n,); it does not rise with α."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ class Ellipsoidal:
     def _matrix(self) -> Array:
         """R, in the order of `names`."""
         matrix = np.eye(len(self.names))
-        for (one, other), value in self.correlation.items():
-            i, j = self.names.index(one), self.names.index(other)
+        for (first, second), value in self.correlation.items():
+            i, j = self.names.index(first), self.names.index(second)
             matrix[i, j] = matrix[j, i] = value
         return matrix
 

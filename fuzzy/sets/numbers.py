@@ -62,7 +62,7 @@ class FuzzyNumber(ABC):
         return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
 
     def membership(self, x: ArrayLike) -> Array:
-        """Grade of membership μ in [0, 1] at `x`, any shape; not a number where `x` is none."""
+        """Grade of membership μ in [0, 1] at `x`, any shape; NaN where `x` is NaN."""
         levels, lower, upper = map(np.asarray, self.cuts)
         x = np.asarray(x, float)
         grade = np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
@@ -70,7 +70,7 @@ class FuzzyNumber(ABC):
 
 
 def level(alpha: float) -> float:
-    """An α-level.
+    """The level as a float.
 
     Raises:
         RefusedError: It lies outside [0, 1].
@@ -79,10 +79,10 @@ def level(alpha: float) -> float:
 
 
 def rising(alpha: Iterable[float]) -> tuple[float, ...]:
-    """α-levels in rising order.
+    """The levels, which must rise within [0, 1], as a tuple.
 
     Raises:
-        RefusedError: There is none, they do not rise, or one lies outside [0, 1].
+        RefusedError: There is no level, they do not rise, or one lies outside [0, 1].
     """
     levels = tuple(map(level, alpha))
     ordered = bool(levels) and (np.diff(levels) > 0).all()
@@ -119,7 +119,7 @@ class _Corners(FuzzyNumber):
     word: ClassVar[str]
 
     def __post_init__(self) -> None:
-        names = [one.name for one in fields(self)]
+        names = [corner.name for corner in fields(self)]
         corners = [real(self.word, getattr(self, name)) for name in names]
         order = " <= ".join(names)
         require((np.diff(corners) >= 0).all(), self.word, corners, order)
@@ -127,7 +127,7 @@ class _Corners(FuzzyNumber):
     @cached_property
     def cuts(self) -> Cuts:
         """Support and modal interval."""
-        corners = [getattr(self, one.name) for one in fields(self)]
+        corners = [getattr(self, corner.name) for corner in fields(self)]
         left, right = corners[(len(corners) - 1) // 2], corners[len(corners) // 2]
         return Cuts((0.0, 1.0), (corners[0], left), (corners[-1], right))
 
@@ -210,10 +210,10 @@ class _Nested(FuzzyNumber):
     def __post_init__(self) -> None:
         levels = rising(self.alpha)
         low, high = (tuple(map(float, row)) for row in (self.lower, self.upper))
-        whole = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
+        complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
         alike = len(levels) == len(low) == len(high)
         allowed = f"levels that rise from 0 {'to' if self.to_one else 'up to'} 1, one for each end"
-        require(whole and alike, "alpha", (levels, len(low), len(high)), allowed)
+        require(complete and alike, "alpha", (levels, len(low), len(high)), allowed)
         ends = np.array([*low, *high[::-1]])
         ordered = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
         require(ordered, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from alphacut.fuzzy import Interval, Known, Signed, propagate
+from alphacut.fuzzy import Interval, Knowledge, Signed, propagate
 from benchmarks.relations import cases, frames, functions
 from benchmarks.relations.__main__ import KINDS
 from benchmarks.relations.relation import checked
@@ -95,7 +95,7 @@ def test_summaries_differ_by_a_bit_or_an_order_but_not_by_times():
 def ends(low, high, inner):
     """Statements of guaranteed bounds that are attained up to a share."""
     inputs = {"x": Interval(low, high)}
-    made = propagate(lambda x: x, inputs, Signed(), known=Known({"x": 1}), progress=False)
+    made = propagate(lambda x: x, inputs, Signed(), knowledge=Knowledge({"x": 1}), progress=False)
     return Stated.of_bounds(made).data.assign(attained=lambda x: inner * x.bound)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from alphacut.fuzzy import (
     Automatic,
-    Known,
+    Knowledge,
     Nature,
     Reduced,
     RefusedError,
@@ -117,12 +117,12 @@ def test_no_value_leaves_the_guaranteed_bounds(plan):
         rng = np.random.default_rng([seed, number])
         function, signs = functions.monotone(rng, n := int(rng.integers(1, 4)))
         inputs = functions.numbers(rng, n)
-        result = bounded(function, inputs, plan, known=Known(signs))
+        result = bounded(function, inputs, plan, knowledge=Knowledge(signs))
         assert result.nature is Nature.GUARANTEED
         ends = [functions.true_ends(function, inputs, alpha) for alpha in ALPHA]
         size = np.abs(ends).max()
         table.guaranteed("ends", result.bounds(), np.array(ends).T, size=size, case=number)
         wrong = signs | {f"x{k}": -signs[f"x{k}"] for k in [int(rng.integers(n))]}
         with pytest.raises(RefusedError):
-            bounded(function, inputs, plan, known=Known(wrong))
+            bounded(function, inputs, plan, knowledge=Knowledge(wrong))
     table.judge()

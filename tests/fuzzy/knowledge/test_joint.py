@@ -6,7 +6,7 @@ import pytest
 from alphacut.fuzzy import (
     Automatic,
     Crisp,
-    Known,
+    Knowledge,
     RefusedError,
     Signed,
     Triangular,
@@ -22,7 +22,7 @@ BOUNDS = (0, 100)
 FIRST = from_data(np.arange(1.0, 20.0), "next value", bounds=BOUNDS)
 SECOND = from_data(np.arange(2.0, 41.0), "next value", bounds=BOUNDS)
 MEAN = from_data(np.arange(1.0, 20.0), "mean", bounds=BOUNDS)
-RISING = Known({"x": 1, "y": 1})
+RISING = Knowledge({"x": 1, "y": 1})
 
 
 def total(x, y):
@@ -39,7 +39,7 @@ def test_joint_cuts_are_those_of_the_lower_levels(alpha):
 
 def test_joining_twice_changes_nothing_and_new_claims_are_joined_again():
     once = jointly({"x": FIRST, "y": SECOND}, independent=True)
-    result = propagate(total, once, Signed(), known=RISING, alpha=[0.1, 0.5])
+    result = propagate(total, once, Signed(), knowledge=RISING, alpha=[0.1, 0.5])
     assert result.bounds().lower[1] == once["x"].cut(0.5).lower + once["y"].cut(0.5).lower
     three = joined_inputs({**once, "z": FIRST})
     assert three["z"].joint.words == "3 sources of unknown dependence"
@@ -55,14 +55,14 @@ def test_propagation_joins_and_prints_the_claim_with_its_conditions():
     assert "2 sources of unknown dependence; z in its cut at α (opinions)" in text
     assert text.endswith(f"inside the {result.nature} bounds, which is not proved")
     assert result.claim.opinions == ("z",)
-    proved = propagate(total, {"x": FIRST, "y": 2}, Signed(), known=RISING)
+    proved = propagate(total, {"x": FIRST, "y": 2}, Signed(), knowledge=RISING)
     assert "if the true range" not in str(proved)
 
 
 def test_opinions_are_said_to_be_opinions():
     claim = propagate(total, {"x": Triangular(0, 1, 2), "y": 1}, Signed()).claim
     assert str(claim) == "x: opinions, so that no level has a probability"
-    assert not JointClaim.of({"x": Crisp(1.0)}).opinions
+    assert not JointClaim.from_inputs({"x": Crisp(1.0)}).opinions
 
 
 def test_a_result_hands_its_claim_on_in_steps():

@@ -11,7 +11,7 @@ from alphacut.fuzzy import (
     General,
     Interval,
     IntervalQuasiMonteCarlo,
-    Known,
+    Knowledge,
     Nature,
     Optimisation,
     RandomInput,
@@ -108,12 +108,12 @@ def test_the_unit_of_an_output_does_not_matter(method, scale):
 
 def test_eight_inputs_that_are_stated_to_be_monotone_are_proved_by_their_corners():
     inputs = {f"x{i}": Triangular(0.5, 1.0, 2.0) for i in range(8)}
-    known = Known(monotone=tuple(inputs), source="a product of positive factors")
+    knowledge = Knowledge(monotone=tuple(inputs), source="a product of positive factors")
 
     def product(**x):
         return np.prod(list(x.values()), axis=0)
 
-    result = propagate(product, inputs, Reduced(), vectorised=True, known=known)
+    result = propagate(product, inputs, Reduced(), vectorised=True, knowledge=knowledge)
     cuts = np.array([inputs["x0"].cut(level) for level in levels(4)])
     np.testing.assert_allclose(result.bounds(), cuts.T**8, rtol=1e-12)
     tests = 16 + 3 * 4  # points of the narrowest cut that has a width, and of three wider ones
@@ -121,7 +121,7 @@ def test_eight_inputs_that_are_stated_to_be_monotone_are_proved_by_their_corners
     assert result.nature is Nature.GUARANTEED
     assert "a product of positive factors" in result.basis[0]
     assert (result.attained.upper == result.upper).all()
-    alone = propagate(product, inputs, known=known)
+    alone = propagate(product, inputs, knowledge=knowledge)
     assert (alone.nature, alone.evaluations) == (Nature.GUARANTEED, 4 * 256 + 1 + tests)
 
 
@@ -133,7 +133,7 @@ INPUTS = {"a": Triangular(-1.0, 0.1, 1.0), "b": Triangular(0.0, 0.5, 1.0)}
 
 
 def test_only_outputs_whose_signs_are_stated_are_guaranteed():
-    stated = propagate(curved, INPUTS, Signed(), known=Known({"a": {"up": 1}, "b": 1}))
+    stated = propagate(curved, INPUTS, Signed(), knowledge=Knowledge({"a": {"up": 1}, "b": 1}))
     assert stated.natures == (Nature.GUARANTEED, Nature.ATTAINED)
     assert stated.nature is Nature.ATTAINED
     assert any("turns is not monotone in input a" in note for note in stated.notes)
@@ -174,8 +174,10 @@ def test_wrong_signs_are_contradicted_by_the_samples(method, wrong, small):
     large = next(name for name in wrong if wrong[name] == {"a": 1, "b": -1}[name])
     sizes = {name: 1.0 if name == large else small for name in wrong}
     with pytest.raises(RefusedError, match="larger than at") as refused:
-        propagate(lambda a, b: sizes["a"] * a - sizes["b"] * b, INPUTS, method, known=Known(wrong))
-    assert refused.value.key == "known of y"
+        propagate(
+            lambda a, b: sizes["a"] * a - sizes["b"] * b, INPUTS, method, knowledge=Knowledge(wrong)
+        )
+    assert refused.value.key == "knowledge of y"
     assert "signs of a, b" in refused.value.value
 
 
@@ -183,16 +185,16 @@ def test_a_wrong_sign_of_one_output_is_refused_by_its_name():
     def outputs(a, b):
         return {"first": a + b, "second": a - 1e-9 * b}
 
-    known = Known({"a": 1, "b": {"first": 1, "second": 1}})
+    knowledge = Knowledge({"a": 1, "b": {"first": 1, "second": 1}})
     with pytest.raises(RefusedError) as refused:
-        propagate(outputs, INPUTS, Signed(), known=known)
-    assert refused.value.key == "known of second"
+        propagate(outputs, INPUTS, Signed(), knowledge=knowledge)
+    assert refused.value.key == "knowledge of second"
 
 
 def test_a_sample_beyond_the_corners_refutes_them():
     inputs = {"x": Triangular(-1.0, 0.1, 1.0)}
     with pytest.raises(RefusedError, match="samples contradict it"):
-        propagate(lambda x: x**2, inputs, General(), known=Known(monotone=("x",)))
+        propagate(lambda x: x**2, inputs, General(), knowledge=Knowledge(monotone=("x",)))
 
 
 @pytest.mark.parametrize("method", [Automatic(), Optimisation()])
@@ -226,7 +228,9 @@ def test_samples_that_fail_end_the_call_or_are_left_out():
     with pytest.raises(FailedError, match=r"2 of \d+ samples failed.*no convergence"):
         propagate(broken, INPUTS, Reduced(), alpha=[0.05, 0.9])
     for method in (Automatic(), General(), Signed()):
-        result = propagate(broken, INPUTS, method, on_failure="skip", known=Known({"a": 1, "b": 1}))
+        result = propagate(
+            broken, INPUTS, method, on_failure="skip", knowledge=Knowledge({"a": 1, "b": 1})
+        )
         assert result.nature is Nature.ATTAINED
         assert "failed and were left out" in result.notes[-1]
         assert result.lower[0, 0] == -1
@@ -262,7 +266,7 @@ def test_shares_of_width():
     np.testing.assert_allclose(shares.share[:, :-1, 0], expected, atol=1e-12)
     assert (shares.share[:, -1] == 0).all()
     grouped = width_shares(run, inputs, groups={"both": ("a", "b")})
-    np.testing.assert_allclose(grouped.lost[0], grouped.width)
+    np.testing.assert_allclose(grouped.reduction[0], grouped.width)
 
 
 def quantiles(u, m, s):
@@ -273,9 +277,9 @@ def test_interval_quasi_monte_carlo_holds_the_fuzzy_mean_and_quantiles():
     mean, spread = Triangular(9.0, 10.0, 12.0), Interval(1.0, 2.0)
     random = {"r": RandomInput(quantiles, {"m": mean, "s": spread})}
     method = IntervalQuasiMonteCarlo(128)
-    known = Known({"r": 1, "x": 1})
+    knowledge = Knowledge({"r": 1, "x": 1})
     response = method.run(
-        lambda r, x: r + x, random, {"x": Interval(0, 1)}, alpha=levels(2), known=known
+        lambda r, x: r + x, random, {"x": Interval(0, 1)}, alpha=levels(2), knowledge=knowledge
     )
     assert response.nature is Nature.GUARANTEED
     assert response.evaluations > 128
@@ -317,7 +321,9 @@ def test_modal_intervals_are_searched_too(number):
 @pytest.mark.parametrize("method", [Signed(), Reduced(), None])
 def test_a_stated_sign_that_fails_between_the_corners_is_refused(method):
     """The corners alone see nothing: the hump lies inside all cuts."""
-    known = Known(signs={"x": 1, "y": 1})
+    knowledge = Knowledge(signs={"x": 1, "y": 1})
     inputs = {"x": Interval(0.0, 1.0), "y": Triangular(0, 1, 2)}
     with pytest.raises(RefusedError, match="samples contradict it"):
-        propagate(lambda x, y: x * (1 - x) + 1e-3 * x + 1e-3 * y, inputs, method, known=known)
+        propagate(
+            lambda x, y: x * (1 - x) + 1e-3 * x + 1e-3 * y, inputs, method, knowledge=knowledge
+        )
