@@ -4,9 +4,9 @@ This differs from the paper in: 1. The supports of a2 and a4 are derived: they s
 least area that contains the sample's distribution save for its own bootstrap band. 2. The bound of
 r_n for non-overlapping discs is √(4/π) for any cell and 1 for the square one, not √(π/4). 3. a1 and
 a3 are the limits themselves, not the middles of the outer two of 100 bins between them (0.13 +
-0.0037 and 0.87 − 0.0037 in the paper). 4. Spheres in power cells take the same way, r_n weighted by
-volume. Cells tighter than a cubic one holds are cut off with their spheres; the spheres are packed
-more densely, by as much as keeps the volume fraction of the map.
+0.0037 and 0.87 − 0.0037 in the paper). 4. Spheres have power cells, and r_n is weighted by volume.
+Cells tighter than a cubic cell can be are cut off with their spheres; the packing is made denser
+until the map has the volume fraction of the case.
 """
 
 from __future__ import annotations
@@ -24,27 +24,28 @@ from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
-from alphacut.stochastic.sections import Section, Simulated, reduced_radii, section_of
+from alphacut.stochastic.sections import Section, Simulated, reduced_radii, with_cells
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
-SHARE = 0.9927  # of the area that the limits keep where none are set (Fig. 12)
+SHARE_WITHIN = 0.9927  # share of the area between the limits where none are set (Fig. 12)
 CONFIDENCE = 0.99  # of both bootstrap bands
 RESAMPLES = 500
-MOST_CAPPED = 0.15  # share of the area that may lie in cells tighter than `Shape.reach`
-SAME = 1e-6  # differences of r_n up to which it is one value, but for round-off
-ROUNDS, NEAR = 6, 5e-3  # packings of spheres, and relative difference of fractions that ends them
-STEEPER = 1.5  # the limit cuts off more than in proportion
+MAX_CAPPED = 0.15  # share of the area that may lie in cells tighter than `Shape.reach`
+MIN_RANGE = 1e-6  # of r_n: a smaller one is round-off
+MAX_PACKINGS = 6  # of spheres, to find the fraction at which the map has that of the case
+FRACTION_TOLERANCE = 5e-3  # relative difference of the fractions that ends the search
+FRACTION_EXPONENT = 1.5  # above 1, since the limit cuts off more than in proportion
 
 
 @dataclass(frozen=True)
 class Study:
-    """Settings of the way from a microstructure to a radius map.
+    """Settings of a study: from a microstructure to a radius map.
 
     Args:
         source: Source of the discs or spheres.
         limits: Lower and upper limit of r_n; None for those that cut off equal shares of area at
-            both ends and keep `SHARE` of it, up to `Shape.reach`.
-        seed: Seed of everything that is left to chance.
+            both ends and keep `SHARE_WITHIN` of it, up to `Shape.reach`.
+        seed: Seed of all random numbers.
     """
 
     source: Simulated | CircleFile | SectionImage
@@ -58,7 +59,7 @@ class Study:
 
     def limits_of(self, sample: AreaWeighted) -> tuple[float, float]:
         """Limits of r_n of a sample."""
-        lower, upper = self.limits or sample.limits(SHARE)
+        lower, upper = self.limits or sample.limits(SHARE_WITHIN)
         return lower, upper if self.limits else min(upper, self.shape.reach)
 
     def used(self, sample: AreaWeighted) -> AreaWeighted:
@@ -67,15 +68,15 @@ class Study:
         Cells of spheres that are tighter are cut off by the limits.
 
         Raises:
-            RefusedError: More than `MOST_CAPPED` of the area or volume lies in cells tighter than
+            RefusedError: More than `MAX_CAPPED` of the area or volume lies in cells tighter than
                 that.
         """
         if self.limits:
             return sample
         shape, share = self.shape, 1 - float(sample.cdf(self.shape.reach))
         value = f"{share:.1%} of the {shape.cells} in cells tighter than r_n = {shape.reach:g}"
-        allowed = f"shares up to {MOST_CAPPED:.0%}, since particles touch at r_n = 1"
-        require(share <= MOST_CAPPED, "particles", value, allowed, self._cure)
+        allowed = f"shares up to {MAX_CAPPED:.0%}, since particles touch at r_n = 1"
+        require(share <= MAX_CAPPED, "particles", value, allowed, self._cure)
         return sample if shape == SPHERES else sample.capped(shape.reach)
 
     @property
@@ -95,10 +96,10 @@ class Microstructure:
     """Fuzzy radius map of particles, with the statistics that it rests on.
 
     Args:
-        study: Settings that it was made by.
+        study: Settings of the study.
         sections: Particles and cells.
         sample: r_n of all whole cells, weighted by area or volume.
-        kept: The part of it within the limits.
+        truncated: The part of it within the limits.
         pbox: Fuzzy radius map.
         slopes: Bootstrap band of the fitted slopes.
         band: Half width of the simultaneous bootstrap band of the distribution function, in
@@ -108,7 +109,7 @@ class Microstructure:
     study: Study
     sections: list[Section]
     sample: AreaWeighted
-    kept: AreaWeighted
+    truncated: AreaWeighted
     pbox: PBox
     slopes: SlopeBand
     band: float
@@ -119,13 +120,13 @@ class Microstructure:
         return self.pbox.fit.a1, self.pbox.fit.a3
 
     @property
-    def share_kept(self) -> float:
-        """Share of area or volume within the limits, cells of `share_capped` among it."""
+    def share_within(self) -> float:
+        """Share of area or volume within the limits, capped cells among it."""
         return self.study.used(self.sample).share_within(*self.limits)
 
     @property
-    def share_beyond(self) -> float:
-        """Share of area or volume in cells tighter than `Shape.reach`: counted as that, or lost."""
+    def share_capped(self) -> float:
+        """Share of area or volume in cells tighter than `Shape.reach`, which are capped."""
         return 0.0 if self.study.limits else 1 - float(self.sample.cdf(self.study.shape.reach))
 
     @property
@@ -146,7 +147,7 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Microstructure:
-    """All of it: cells, distribution, limits, fit, p-box.
+    """Fuzzy radius map of a microstructure: cells, distribution, limits, fit, p-box.
 
     Args:
         case: The settings.
@@ -154,37 +155,37 @@ def study(
         progress: Receives the share done, 0 to 1.
 
     Raises:
-        RefusedError: Measured data have no meaning, or cells are too tight.
-        FailedError: Particles find no place, or no p-box contains the sample.
+        RefusedError: Measured data are not allowed, or cells are too tight.
+        FailedError: The packing is too dense, or no p-box contains the sample.
     """
     tick = progress or (lambda share: None)
     sections = _sections(case, executor, lambda share: tick(0.7 * share))
     sample = reduced_radii(sections)
-    made = Microstructure(case, sections, sample, *fitted_map(case, sample))
+    result = Microstructure(case, sections, sample, *fitted_map(case, sample))
     tick(1.0)
-    return made
+    return result
 
 
 def _sections(
     case: Study, executor: Executor | None, progress: Callable[[float], None]
 ) -> list[Section]:
-    """Sections of the source; spheres as dense as makes the map's volume fraction the one set."""
+    """Sections of the source; packings of spheres are made denser until the map's fraction fits."""
     source = case.source
     if not isinstance(source, Simulated):
-        return [section_of(source.read())]
+        return [with_cells(source.read())]
     if case.shape != SPHERES:
         return source.sections(case.seed, executor=executor, progress=progress)
     goal = source.packing.fraction
-    best, off, fraction = [], np.inf, goal
-    for number in range(ROUNDS):
+    best, error, fraction = [], np.inf, goal
+    for number in range(MAX_PACKINGS):
         packing = replace(source.packing, fraction=fraction)
         sections = replace(source, packing=packing).sections(case.seed, executor=executor)
         mapped = _mapped_fraction(case, reduced_radii(sections))
-        if abs(mapped / goal - 1) < off:
-            best, off = sections, abs(mapped / goal - 1)
-        progress((number + 1) / ROUNDS)
-        fraction = min(fraction * (goal / mapped) ** STEEPER, case.shape.densest)
-        if off < NEAR or fraction == packing.fraction:
+        if abs(mapped / goal - 1) < error:
+            best, error = sections, abs(mapped / goal - 1)
+        progress((number + 1) / MAX_PACKINGS)
+        fraction = min(fraction * (goal / mapped) ** FRACTION_EXPONENT, case.shape.densest)
+        if error < FRACTION_TOLERANCE or fraction == packing.fraction:
             break
     return best
 
@@ -201,18 +202,18 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
     lower, upper = case.limits_of(used)
     cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
     value = f"{upper:.10g} in all cells"
-    require(upper - lower >= SAME, "r_n", value, "cells of unequal r_n", cure)
-    kept, fit = used.truncated(lower, upper), HermiteFit(lower, upper)
-    band = kept.band(CONFIDENCE, RESAMPLES, np.random.default_rng(streams[0]))
+    require(upper - lower >= MIN_RANGE, "r_n", value, "cells of unequal r_n", cure)
+    truncated, fit = used.truncated(lower, upper), HermiteFit(lower, upper)
+    band = truncated.band(CONFIDENCE, RESAMPLES, np.random.default_rng(streams[0]))
     slopes = slope_band(
         fit,
-        kept,
+        truncated,
         level=CONFIDENCE,
         resamples=RESAMPLES,
         generator=np.random.default_rng(streams[1]),
     )
-    pbox = least_pbox(fit, kept, band, hold=slopes if case.shape == DISCS else None)
-    return kept, pbox, slopes, band
+    pbox = least_pbox(fit, truncated, band, required=slopes if case.shape == DISCS else None)
+    return truncated, pbox, slopes, band
 
 
 def _mapped_fraction(case: Study, sample: AreaWeighted) -> float:

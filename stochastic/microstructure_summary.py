@@ -13,26 +13,26 @@ from alphacut.stochastic.tessellation.delaunay import neighbouring_values, neigh
 if TYPE_CHECKING:
     import xarray
 
-CRISP = 1e-6  # of a3 − a1: nearer to the fitted slope, an end is round-off of the fit
+CRISP_TOLERANCE = 1e-6  # of a3 − a1: an end nearer to the fitted slope differs by round-off
 
 
 def summary(result: Microstructure) -> dict[str, object]:
-    """Every number of the study, lengths in m."""
+    """All numbers of the study, lengths in m."""
     particles = [section.particles for section in result.sections]
-    radii = np.concatenate([one.radii for one in particles])
+    radii = np.concatenate([packing.radii for packing in particles])
     shape, map_ = result.study.shape, result.fraction_of_map
     cells = float(result.sample.weights @ shape.shares(result.sample.values))  # eq. 10
     numbers: dict[str, object] = {
         "particles": shape.particles,
         "packings": len(particles),
         shape.particles: len(radii),
-        f"{shape.cells}_fraction": float(np.mean([one.fraction for one in particles])),
+        f"{shape.cells}_fraction": float(np.mean([packing.fraction for packing in particles])),
         f"{shape.cells}_fraction_of_cells": cells,
         f"mean_{shape.cells}_fraction_of_map": map_,
         "fraction_of_case": result.stated_fraction,
         "smallest_radius": float(radii.min()),
         "largest_radius": float(radii.max()),
-        "share_capped": result.share_beyond,
+        "share_capped": result.share_capped,
     }
     return numbers | _of_discs(result) | _of_map(result) | {"radius": radius_section(result)}
 
@@ -42,10 +42,10 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
     diagrams = [section.diagram for section in result.sections if section.diagram]
     if not diagrams:
         return {}
-    direct = [neighbours(one.discs) for one in diagrams]
-    number = np.concatenate([one.number for one in direct])
-    distance = np.concatenate([one.distances for one in direct])
-    sharing = [neighbouring_values(one, one.reduced_radii) for one in diagrams]
+    direct = [neighbours(diagram.discs) for diagram in diagrams]
+    number = np.concatenate([found.number for found in direct])
+    distance = np.concatenate([found.distances for found in direct])
+    sharing = [neighbouring_values(diagram, diagram.reduced_radii) for diagram in diagrams]
     return {
         "neighbours": {
             "counted": len(number),
@@ -64,7 +64,7 @@ def _of_map(result: Microstructure) -> dict[str, object]:
         "mean_r_n": sample.mean,
         "largest_r_n": float(sample.values[-1]),
         "limits": list(result.limits),
-        "share_kept": result.share_kept,
+        "share_kept": result.share_within,
         "a1": box.fit.a1,
         "a2": list(box.a2),
         "a3": box.fit.a3,
@@ -73,8 +73,8 @@ def _of_map(result: Microstructure) -> dict[str, object]:
         "a4_band": list(result.slopes.a4),
         "band": result.band,
         "pbox_area": box.area,
-        "pbox_breach": box.excess(result.kept),
-        "misfit": box.fit.misfit(result.kept, (box.a2[1], box.a4[1])),
+        "pbox_breach": box.excess(result.truncated),
+        "misfit": box.fit.misfit(result.truncated, (box.a2[1], box.a4[1])),
         "seed": result.study.seed,
     }
 
@@ -82,7 +82,7 @@ def _of_map(result: Microstructure) -> dict[str, object]:
 def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
     """The section [radius] of a case, with as many digits as the fit has."""
     box, law = result.pbox, result.pbox.fit.distribution
-    near = CRISP * (box.fit.a3 - box.fit.a1)
+    near = CRISP_TOLERANCE * (box.fit.a3 - box.fit.a1)
 
     def triangle(ends: tuple[float, float, float]) -> list[float]:
         near_ends = (ends[1] if abs(end - ends[1]) <= near else end for end in ends)
@@ -129,7 +129,7 @@ def to_dataset(result: Microstructure) -> xarray.Dataset:
     low, high = box.bounds(theta)
     share = fit.distribution.cdf(theta)
     columns = {
-        "cdf": result.kept.cdf(radius),
+        "cdf": result.truncated.cdf(radius),
         "pbox_lower": np.interp(radius, high, share),
         "pbox_upper": np.interp(radius, low, share),
         "fitted": np.interp(radius, fit.map((box.a2[1], box.a4[1]))(theta), share),

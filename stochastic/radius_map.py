@@ -48,8 +48,8 @@ def require_map(radius_map: RadiusMap) -> None:
     alike = radii.shape == theta.shape
     require(alike, "shape of the radii", radii.shape, f"the shape of θ, {theta.shape}")
     inside = (radii > 0) & (radii < 1)
-    place = int(np.argmin(inside))
-    require(inside.all(), f"r at θ = {theta[place]:.4g}", f"{radii[place]:.4g}", RADII)
+    row = int(np.argmin(inside))
+    require(inside.all(), f"r at θ = {theta[row]:.4g}", f"{radii[row]:.4g}", RADII)
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from alphacut.fuzzy.refused import require
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, Particles
-from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, whole_cells
+from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius, counted_cells
 from alphacut.stochastic.tessellation.power_cells import cell_volumes
 
-PATCHES = 5  # a single section is cut into 5 × 5 patches, drawn as wholes in the bootstrap
+PATCHES = 5  # a single section is cut into 5 × 5 patches, which the bootstrap draws
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,33 +25,33 @@ class Section:
 
     Args:
         particles: All particles.
-        whole: Indices of those whose cells count, shape (k,).
+        counted: Indices of the particles whose cells count, shape (k,).
         cells: Area in m² or volume in m³ of these cells, shape (k,).
         weight: Cells that each stands for, shape (k,); 1 in a periodic box.
         diagram: Apollonius cells of discs; None of spheres.
     """
 
     particles: Particles
-    whole: Rows
+    counted: Rows
     cells: Array
     weight: Array
     diagram: Apollonius | None = None
 
     @property
     def reduced_radii(self) -> Array:
-        """r_n = r/a of the whole cells, 2a the side of a square or cube as large (section 4.1)."""
+        """Values r_n = r/a of the counted cells, 2a the side of a square or cube as large."""
         sides = self.cells ** (1 / self.particles.shape.dimensions)
-        return np.asarray(2 * self.particles.radii[self.whole] / sides)
+        return np.asarray(2 * self.particles.radii[self.counted] / sides)
 
 
-def section_of(particles: Particles) -> Section:
+def with_cells(particles: Particles) -> Section:
     """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
     if particles.shape != DISCS:
-        every = np.arange(len(particles), dtype=np.intp)
-        return Section(particles, every, cell_volumes(particles), np.ones(len(particles)))
+        indices = np.arange(len(particles), dtype=np.intp)
+        return Section(particles, indices, cell_volumes(particles), np.ones(len(particles)))
     diagram = apollonius(particles)
-    whole, weight = whole_cells(diagram)
-    return Section(particles, whole, diagram.areas[whole], weight, diagram)
+    counted, weight = counted_cells(diagram)
+    return Section(particles, counted, diagram.areas[counted], weight, diagram)
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Simulated:
 
     Args:
         packing: Specification of each.
-        packings: Their number; the bootstrap draws them as wholes.
+        packings: Their number; the bootstrap draws packings.
     """
 
     packing: Packing
@@ -73,20 +73,20 @@ class Simulated:
         executor: Executor | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> list[Section]:
-        """Every packing with its cells; the k-th depends on `seed` and k only."""
+        """All packings with their cells; the k-th depends on `seed` and k only."""
         seeds = np.random.SeedSequence(seed).spawn(self.packings)
-        made: list[Section] = []
+        sections: list[Section] = []
         for section in (executor.map if executor else map)(
-            _packed, [self.packing] * self.packings, seeds
+            _packing_with_cells, [self.packing] * self.packings, seeds
         ):
-            made.append(section)
+            sections.append(section)
             if progress:
-                progress(len(made) / self.packings)
-        return made
+                progress(len(sections) / self.packings)
+        return sections
 
 
 def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
-    """r_n of all whole cells, weighted by area or volume, grouped by section or patch.
+    """r_n of all counted cells, weighted by area or volume, grouped by section or patch.
 
     Raises:
         RefusedError: A cell is smaller than its particle, so that particles overlap.
@@ -96,8 +96,8 @@ def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
         values.append(section.reduced_radii)
         weights.append(section.cells * section.weight)
         single = len(sections) == 1
-        groups.append(_patches(section) if single else np.full(len(section.whole), number))
-    sample = AreaWeighted.of(
+        groups.append(_patches(section) if single else np.full(len(section.counted), number))
+    sample = AreaWeighted.from_values(
         np.concatenate(values), np.concatenate(weights), np.concatenate(groups)
     )
     largest, most = sections[0].particles.shape.largest, sample.values[-1]
@@ -106,14 +106,14 @@ def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
     return sample
 
 
-def _packed(packing: Packing, seed: np.random.SeedSequence) -> Section:
-    """One packing with its cells."""
-    return section_of(packing.make(np.random.default_rng(seed)))
+def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> Section:
+    """Random packing with its cells."""
+    return with_cells(packing.make(np.random.default_rng(seed)))
 
 
 def _patches(section: Section) -> Rows:
-    """Numbers of the patches in which the whole cells lie, shape (k,)."""
+    """Numbers of the patches in which the counted cells lie, shape (k,)."""
     particles = section.particles
-    patch = (PATCHES * particles.centres[section.whole] / particles.size).astype(int)
+    patch = (PATCHES * particles.centres[section.counted] / particles.size).astype(int)
     base = PATCHES ** np.arange(len(particles.size))[::-1]
     return np.asarray(np.minimum(patch, PATCHES - 1) @ base)

@@ -1,4 +1,4 @@
-"""Judgement of a segmentation: how far noise and uneven light leave it open.
+"""Segmentation of a grey image, and the pixels whose class noise and uneven light leave open.
 
 A pixel's grey value is modelled as the level of its class, plus a light that changes slowly over
 the image (a polynomial of degree two), plus noise. The model is fitted to the segmented image and
@@ -28,18 +28,18 @@ from alphacut.fuzzy.refused import RefusedError, require
 
 CONFIDENT = 3.0  # deviations of the noise
 MOST_OPEN = 0.15  # area that may be open, over that of the smallest class
-_TURNS = 20
+_MAX_ITERATIONS = 20
 _OF_NORMAL = 1.4826  # deviation of a normal law over the median of its magnitude
 _NEAR = 3.0  # deviations within which a pixel helps to fit levels and light
 _BORDER = 3  # pixels from a border that do not help, if
 _ENOUGH = 0.1  # of each class is farther from it
-_MOST = 0.9  # of the pixels, whose rest is noise: of rounded grey values half may have none
+_NOISE_QUANTILE = 0.9  # of the residuals; rounding makes up to half of them zero
 _EXACT = 1e-9  # of the grey values: noise that is rounding
 _LEAST_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
 _FLAT = 0.95  # of a class at one value; where particles meet, a blurred image has others
-_FEWEST = 50  # pixels of a class that tell
+_MIN_PIXELS = 50  # of a class whose grey values are checked for clipping
 _PATCH, _REACH = 5, 7  # pixels of a neighbourhood, and to those that it is compared with
-_AGAIN = 4  # times that noise is added to see what smoothing leaves
+_NOISE_SAMPLES = 4  # of added noise, to measure how much of it smoothing leaves
 _STRENGTH = 0.8  # of the smoothing, over the noise
 
 
@@ -129,14 +129,14 @@ def segmented(
     _refuse_clipped(values, borders)
     moved: Array | float = 0.0
     if level:
-        values = values - _judged(values, borders).light
-        borders = _judged(values, borders).middles
-    if smooth and (noise := _judged(values, borders).noise):
+        values = values - _classified(values, borders).light
+        borders = _classified(values, borders).middles
+    if smooth and (noise := _classified(values, borders).noise):
         rough, values = values, _smoothed(values, noise)
         again = np.abs(values - _smoothed(values, noise))
-        moved = np.maximum(again, _left(rough, values, noise))
-    judged = _judged(values, borders)
-    return Segmentation(values, borders, judged.levels, judged.light, judged.noise, moved)
+        moved = np.maximum(again, _remaining_noise(rough, values, noise))
+    result = _classified(values, borders)
+    return Segmentation(values, borders, result.levels, result.light, result.noise, moved)
 
 
 def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
@@ -148,13 +148,13 @@ def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
     labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
     far = _far(labels, _BORDER)
     classes = [values[far & (labels == k)] for k in range(len(borders) + 1)]
-    classes = [own for own in classes if own.size >= _FEWEST]
-    flat = [float(np.mean(own == np.median(own))) >= _FLAT for own in classes]
+    classes = [grey for grey in classes if grey.size >= _MIN_PIXELS]
+    flat = [float(np.mean(grey == np.median(grey))) >= _FLAT for grey in classes]
     for end in (float(values.min()), float(values.max())):
-        for own, even in zip(classes, flat, strict=True):
-            place, counts = np.unique(np.abs(own - end), return_counts=True)
-            pile = counts[0] / own.size if place[0] == 0 else 0.0
-            following = counts[1] / own.size if len(counts) > 1 else 0.0
+        for grey, even in zip(classes, flat, strict=True):
+            distance, counts = np.unique(np.abs(grey - end), return_counts=True)
+            pile = counts[0] / grey.size if distance[0] == 0 else 0.0
+            following = counts[1] / grey.size if len(counts) > 1 else 0.0
             steep = pile >= _LEAST_PILE and pile > _STEEPEST * following
             if steep and not (even and all(flat)):
                 what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
@@ -162,10 +162,10 @@ def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
                 raise RefusedError("image", what, "grey values that are not clipped", cure)
 
 
-def _judged(values: Array, borders: tuple[float, ...]) -> Segmentation:
-    """The image as it is."""
+def _classified(values: Array, borders: tuple[float, ...]) -> Segmentation:
+    """Classes, light and noise of an image without smoothing or levelling."""
     shapes, light, before = _polynomials(values.shape), np.zeros_like(values), None
-    for _ in range(_TURNS):
+    for _ in range(_MAX_ITERATIONS):
         labels = np.searchsorted(borders, values - light, side="right")
         if before is not None and np.array_equal(labels, before):
             break
@@ -180,13 +180,13 @@ def _smoothed(grey: Array, noise: float) -> Array:
 
     edge = _PATCH + _REACH
     around = np.pad(grey, edge, mode="wrap")
-    whole = restoration.denoise_nl_means(
+    smooth = restoration.denoise_nl_means(
         around, patch_size=_PATCH, patch_distance=_REACH, h=_STRENGTH * noise, sigma=noise
     )
-    return np.asarray(whole[edge:-edge, edge:-edge])
+    return np.asarray(smooth[edge:-edge, edge:-edge])
 
 
-def _left(rough: Array, smooth: Array, noise: float) -> Array:
+def _remaining_noise(rough: Array, smooth: Array, noise: float) -> Array:
     """Noise that smoothing leaves in each pixel: from what it makes of half as much again nearby.
 
     Near borders few patches are alike, so that more is left than inside the classes.
@@ -194,7 +194,7 @@ def _left(rough: Array, smooth: Array, noise: float) -> Array:
     rng = np.random.default_rng(0)
     squares = [
         (_smoothed(rough + noise / 2 * rng.normal(size=rough.shape), noise) - smooth) ** 2
-        for _ in range(_AGAIN)
+        for _ in range(_NOISE_SAMPLES)
     ]
     return np.asarray(2 * np.sqrt(uniform_filter(np.mean(squares, axis=0), 3, mode="wrap")))
 
@@ -209,15 +209,15 @@ def _polynomials(shape: tuple[int, ...]) -> Array:
 def _fitted(values: Array, labels: Rows, shapes: Array, classes: int) -> tuple[Array, Array, float]:
     """Levels of the classes, light and noise, from pixels away from the borders."""
     inner = _inner(labels, classes).ravel()
-    whole = np.hstack([labels.reshape(-1, 1) == np.arange(classes), shapes])
-    flat, kept = values.ravel(), inner
+    columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), shapes])
+    flat, used = values.ravel(), inner
     rounding = _EXACT * float(np.abs(flat).max())
     for _ in range(3):
-        fit = np.linalg.lstsq(whole[kept], flat[kept], rcond=None)[0]
-        rest = np.abs(flat - whole @ fit)
-        middle, most = np.quantile(rest[inner], (0.5, _MOST))
-        kept = inner & (rest <= max(_NEAR * _OF_NORMAL * float(middle), float(most), rounding))
-    noise, light = float(np.sqrt(np.mean(rest[kept] ** 2))), shapes @ fit[classes:]
+        fit = np.linalg.lstsq(columns[used], flat[used], rcond=None)[0]
+        residual = np.abs(flat - columns @ fit)
+        middle, most = np.quantile(residual[inner], (0.5, _NOISE_QUANTILE))
+        used = inner & (residual <= max(_NEAR * _OF_NORMAL * float(middle), float(most), rounding))
+    noise, light = float(np.sqrt(np.mean(residual[used] ** 2))), shapes @ fit[classes:]
     light[np.abs(light) < rounding] = 0.0
     return fit[:classes], light.reshape(values.shape), noise if noise > rounding else 0.0
 

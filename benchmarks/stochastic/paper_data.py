@@ -46,7 +46,7 @@ def sample_of(sections: Sequence[Particles]) -> AreaWeighted:
     """Area-weighted r_n of every cell; in open windows the cells as the window cuts them."""
     diagrams = [apollonius(section) for section in sections]
     radii = np.concatenate([diagram.reduced_radii for diagram in diagrams])
-    return AreaWeighted.of(radii, np.concatenate([diagram.areas for diagram in diagrams]))
+    return AreaWeighted.from_values(radii, np.concatenate([diagram.areas for diagram in diagrams]))
 
 
 def row(name: str, sample: AreaWeighted) -> str:

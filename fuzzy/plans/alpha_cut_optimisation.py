@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import Bound, CutSearch, attained, cuts_with_width
+from alphacut.fuzzy.plans.cut import Bound, CutSearch, attained_bounds, cuts_with_width
 from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
@@ -52,8 +52,8 @@ class Optimisation:
                 self._search(cut, outputs)
                 campaign.report(1 - cut.level / len(domain.alpha))
         except SpentError:
-            return attained(campaign, domain, self.name, spent=True)
-        return attained(campaign, domain, self.name, spent=False)
+            return attained_bounds(campaign, domain, self.name, ended=True)
+        return attained_bounds(campaign, domain, self.name, ended=False)
 
     def _search(self, cut: CutSearch, outputs: tuple[str, ...]) -> None:
         """Run the first points of a cut and the descents of all bounds."""

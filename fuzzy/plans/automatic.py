@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
-from alphacut.fuzzy.plans.cut import attained, cuts_with_width
+from alphacut.fuzzy.plans.cut import attained_bounds, cuts_with_width
 from alphacut.fuzzy.plans.sign_walk import POINTS, SignWalk
 from alphacut.fuzzy.plans.single_linkage import ROUNDING, VALUE_TOLERANCE, SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
@@ -25,12 +25,12 @@ _MAX_SEARCHED = 12  # outputs of which each bound is searched; of more each boun
 class Automatic:
     """Corners where they suffice, else multi-level single linkage.
 
-    Corners are guaranteed to suffice where the knowledge about the model says so. They are estimated
-    to suffice where the differences of every input keep their sign at 24 points of the widest cut. Other
-    outputs are searched (Rinnooy Kan, Timmer 1987) until the share of each cut that is not yet
-    covered is small (Boender, Rinnooy Kan 1987): the bounds are then estimated, to 1e-5 of the
-    range. They are attained where the budget ends the search, or where a bound lies at a kink or a
-    jump. Of more than 12 outputs none is searched.
+    Corners are guaranteed to suffice where the knowledge about the model says so. They are
+    estimated to suffice where the differences of every input keep their sign at 24 points of the
+    widest cut. Other outputs are searched (Rinnooy Kan, Timmer 1987) until the share of each cut
+    that is not yet covered is small (Boender, Rinnooy Kan 1987): the bounds are then estimated, to
+    1e-5 of the range. They are attained where the budget ends the search, or where a bound lies at
+    a kink or a jump. Of more than 12 outputs none is searched.
 
     Args:
         uncovered: Share of each cut up to which a search goes on, in (0, 1).
@@ -76,7 +76,7 @@ class _Search:
         self.monotone: Mask = np.zeros(len(outputs), bool)
         self.searched: tuple[str, ...] = ()
         self.linkage: SingleLinkage | None = None
-        self.spent = False
+        self.ended = False
 
     def run(self) -> Bounds:
         """Bounds of every output, with the nature that the search gives them."""
@@ -84,8 +84,10 @@ class _Search:
             if self.cuts:
                 self._search()
         except SpentError:
-            self.spent = True
-        return self._judge(attained(self.campaign, self.domain, Automatic.name, spent=self.spent))
+            self.ended = True
+        return self._judge(
+            attained_bounds(self.campaign, self.domain, Automatic.name, ended=self.ended)
+        )
 
     def _search(self) -> None:
         """Run the corners of the outputs whose effects keep their signs, and search the others."""
@@ -137,7 +139,7 @@ class _Search:
             notes.append(f"corners alone bound {names}: {which}")
         if self.linkage is not None and self.searched:
             notes.append(self.linkage.summary())
-            if not self.spent and (rough := [x for x in self.searched if self.linkage.is_rough(x)]):
+            if not self.ended and (rough := [x for x in self.searched if self.linkage.is_rough(x)]):
                 notes.append(f"a bound of {_listed(rough)} lies at a kink or a jump")
         return notes
 

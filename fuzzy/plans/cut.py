@@ -204,8 +204,8 @@ def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[CutSearch]:
             yield cut
 
 
-def attained(campaign: Campaign, domain: Domain, method: str, *, spent: bool) -> Bounds:
+def attained_bounds(campaign: Campaign, domain: Domain, method: str, *, ended: bool) -> Bounds:
     """Bounds from all samples of a search, with a note where the budget ended it."""
     bounds = bounds_of_samples(domain, campaign.samples, method)
     note = "the budget ended the search: a larger one may find more"
-    return replace(bounds, notes=(note,)) if spent else bounds
+    return replace(bounds, notes=(note,)) if ended else bounds

@@ -19,7 +19,7 @@ from alphacut.stochastic.figures.cells import (
     draw_overlay,
     draw_two_point,
 )
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE, beside, save, style
+from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE, save, style, two_panels
 from alphacut.stochastic.microstructure import Microstructure
 from alphacut.stochastic.microstructure_summary import to_dataset
 from alphacut.stochastic.particles.image import SectionImage
@@ -84,8 +84,8 @@ def of_discs(result: Microstructure) -> Figures:
 def _equal_discs(result: Microstructure, number: int) -> Particles:
     """A packing of equal discs with the area fraction and the mean disc area of the sections."""
     discs = [section.particles for section in result.sections]
-    radius = float(np.sqrt(np.mean(np.concatenate([one.radii for one in discs]) ** 2)))
-    fraction = float(np.mean([one.fraction for one in discs]))
+    radius = float(np.sqrt(np.mean(np.concatenate([packing.radii for packing in discs]) ** 2)))
+    fraction = float(np.mean([packing.fraction for packing in discs]))
     return Packing(number, min(fraction, DISCS.densest), LogNormalRadii(radius, radius)).make(
         np.random.default_rng([result.study.seed, number])
     )
@@ -97,7 +97,7 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
 
     drawn, axes = plt.subplots(figsize=(6.4, 3.8))
     particles = result.study.shape.particles
-    values = 1e3 * np.concatenate([one.particles.radii for one in result.sections])
+    values = 1e3 * np.concatenate([section.particles.radii for section in result.sections])
     axes.ecdf(values, color=BLUE, label=f"{len(values)} {particles}")
     if law is not None and law.smallest < law.largest:
         grid = np.linspace(law.smallest, law.largest, 400)
@@ -109,7 +109,7 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
 
 def draw_neighbour_statistics(discs: Particles) -> Figure:
     """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one size."""
-    drawn, (left, right) = beside(EQUAL.format(len(discs)))
+    drawn, (left, right) = two_panels(EQUAL.format(len(discs)))
     direct = neighbours(discs)
     distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
     left.hist(distance, bins=80, density=True, color=BLUE)
@@ -130,13 +130,13 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
     """Values of r_n of cells that share a wall, beside those of equal discs (Fig. 9)."""
     import matplotlib.pyplot as plt
 
-    drawn, both = plt.subplots(1, 2, figsize=(9.6, 4.4))
+    drawn, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
     diagrams = [section.diagram for section in result.sections if section.diagram]
     for axes, shown, title in zip(
-        both, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
+        panels, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
     ):
         pairs = np.concatenate(
-            [neighbouring_values(one, one.reduced_radii) for one in shown], axis=1
+            [neighbouring_values(diagram, diagram.reduced_radii) for diagram in shown], axis=1
         )
         axes.hist2d(*pairs, bins=80, cmap="Blues", range=[np.quantile(pairs, (0.0005, 0.9995))] * 2)
         axes.set(xlabel="reduced radius of a cell", ylabel="that of a neighbour", aspect="equal")
@@ -163,8 +163,8 @@ def draw_areas(result: Microstructure) -> Figure:
     text = f"{shape.particles[:-1]} larger\nthan its cell "
     axes.text(bound, axes.get_ylim()[1], text, ha="right", va="top", color=GREY)
     axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
-    kept = f"{100 * result.share_kept:.2f} % of the {shape.cells}"
-    axes.set_title(f"limits {low:.4g} and {high:.4g} keep {kept}")
+    share = f"{100 * result.share_within:.2f} % of the {shape.cells}"
+    axes.set_title(f"limits {low:.4g} and {high:.4g} contain {share}")
     return drawn
 
 
@@ -172,24 +172,24 @@ def draw_pbox(result: Microstructure) -> Figure:
     """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
     import matplotlib.pyplot as plt
 
-    drawn, (axes, apart) = plt.subplots(
+    drawn, (axes, residual_axes) = plt.subplots(
         2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
     )
     table = to_dataset(result)
     radius, share = table["r_n"].values, table["cdf"].values
-    for panel, base in ((axes, 0 * share), (apart, table["fitted"].values)):
+    for panel, base in ((axes, 0 * share), (residual_axes, table["fitted"].values)):
         scale = 1 if panel is axes else 100
         low, high = np.maximum(share - result.band, 0), np.minimum(share + result.band, 1)
         label = f"band of ± {result.band:.2g}"
         panel.fill_between(
             radius, scale * (low - base), scale * (high - base), fc=PALE, label=label
         )
-        label = f"{len(result.kept.values)} cells"
+        label = f"{len(result.truncated.values)} cells"
         panel.plot(radius, scale * (share - base), color=BLUE, label=label)
         panel.plot(radius, scale * (table["pbox_upper"] - base), color=INK, lw=1, label="p-box")
         panel.plot(radius, scale * (table["pbox_lower"] - base), color=INK, lw=1)
     axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
-    apart.set(xlabel=REDUCED, ylabel="less the fit [%]")
+    residual_axes.set(xlabel=REDUCED, ylabel="less the fit [%]")
     axes.legend(loc="upper left")
     return drawn
 
@@ -202,7 +202,9 @@ def draw_map(result: Microstructure) -> Figure:
     fit, box = result.pbox.fit, result.pbox
     law = fit.distribution
     theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
-    axes.step(theta, result.kept.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample")
+    axes.step(
+        theta, result.truncated.quantile(fit.distribution.cdf(theta)), color=BLUE, label="sample"
+    )
     fitted = fit.map((box.a2[1], box.a4[1]))
     label = f"$a_2$ = {fitted.a2:.4f}, $a_4$ = {fitted.a4:.4f}"
     axes.plot(theta, fitted(theta), color=ORANGE, ls="--", label=label)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.stochastic.figures.style import GREEN, GREY, INK, LIGHT, ORANGE, PALE, beside
+from alphacut.stochastic.figures.style import GREEN, GREY, INK, LIGHT, ORANGE, PALE, two_panels
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius, apollonius
 from alphacut.stochastic.tessellation.delaunay import neighbours
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-CORNER = 120  # discs in the corner of a section that is drawn
+CORNER_DISCS = 120  # of a larger section a corner with so many discs is drawn
 EQUAL = "{} equal discs of the same area fraction, not those of the section"
 
 
@@ -25,8 +25,8 @@ def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
     from matplotlib.collections import EllipseCollection
 
     width = 2e3 * radii
-    place = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
-    axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", **place, **look))
+    position = {"offsets": 1e3 * centres, "offset_transform": axes.transData}
+    axes.add_collection(EllipseCollection(width, width, 0 * width, units="xy", **position, **look))
 
 
 def _view(axes: Axes, low: Array, high: Array) -> None:
@@ -69,11 +69,11 @@ def _shifts(discs: Particles) -> list[Array]:
 def draw_cells(diagram: Apollonius) -> Figure:
     """Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
     discs = diagram.discs
-    view = discs.size * min(1.0, float(np.sqrt(CORNER / len(discs))))
+    view = discs.size * min(1.0, float(np.sqrt(CORNER_DISCS / len(discs))))
     width, height = 1e3 * discs.size
-    whole = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
-    whole = whole if (view == discs.size).all() else f"a corner of {whole}"
-    drawn, (left, right) = beside(whole, "Voronoi cells", "Apollonius cells")
+    title = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
+    title = title if (view == discs.size).all() else f"a corner of {title}"
+    drawn, (left, right) = two_panels(title, "Voronoi cells", "Apollonius cells")
     bare = apollonius(Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
     for axes, shown, colour in ((left, bare, PALE), (right, diagram, LIGHT)):
         plot_discs(axes, discs, colour, view)
@@ -86,10 +86,10 @@ def draw_neighbours(discs: Particles) -> Figure:
     from matplotlib.collections import LineCollection
 
     titles = "Delaunay triangulation: the direct neighbours", "Voronoi cells, its dual"
-    drawn, (left, right) = beside(EQUAL.format(len(discs)), *titles)
+    drawn, (left, right) = two_panels(EQUAL.format(len(discs)), *titles)
     direct = neighbours(discs)
     start = discs.centres[direct.first]
-    edges = list(1e3 * np.stack([start, start + direct.apart], axis=1))
+    edges = list(1e3 * np.stack([start, start + direct.offset], axis=1))
     for axes in (left, right):
         plot_discs(axes, discs, LIGHT)
     left.add_collection(LineCollection(edges, colors=ORANGE, linewidths=0.8))
@@ -106,20 +106,20 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     """
     reach, radius = 3.5 * discs.spacing, float(discs.radii[0])
     centre = int(np.argmin(np.hypot(*(discs.centres - discs.size / 2).T)))
-    every = np.arange(len(discs), dtype=np.intp)
-    apart = discs.separation(np.full(len(discs), centre, np.intp), every)
-    near = apart[(np.hypot(*apart.T) < reach) & (every != centre)]
+    indices = np.arange(len(discs), dtype=np.intp)
+    offset = discs.separation(np.full(len(discs), centre, np.intp), indices)
+    near = offset[(np.hypot(*offset.T) < reach) & (indices != centre)]
     direct = neighbours(discs)
-    touching = {tuple(np.round(v, 12)) for v in direct.apart[direct.first == centre]}
+    touching = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
     colours = [GREEN if tuple(np.round(v, 12)) in touching else LIGHT for v in near]
     fake = _from_pair_distances(discs, len(near), reach, generator)
-    drawn, both = beside(
+    drawn, panels = two_panels(
         EQUAL.format(len(discs)),
         f"pair distances alone: {_overlaps(fake, radius)} of {len(fake)} overlap",
         f"the packing: {colours.count(GREEN)} of {len(near)} are direct neighbours",
     )
     limit = np.full(2, reach + radius)
-    for axes, places, colour in zip(both, (fake, near), (LIGHT, colours), strict=True):
+    for axes, places, colour in zip(panels, (fake, near), (LIGHT, colours), strict=True):
         _circles(axes, np.zeros((1, 2)), np.array([radius]), color=ORANGE)
         radii = np.full(len(places), radius)
         _circles(axes, places, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
@@ -135,16 +135,16 @@ def _from_pair_distances(
 
     tree = KDTree(discs.centres, boxsize=discs.size)
     pairs = tree.query_pairs(reach, output_type="ndarray")
-    all_apart = discs.separation(pairs[:, 0], pairs[:, 1])
-    distance = generator.choice(np.hypot(all_apart[:, 0], all_apart[:, 1]), number)
+    offset = discs.separation(pairs[:, 0], pairs[:, 1])
+    distance = generator.choice(np.hypot(offset[:, 0], offset[:, 1]), number)
     angle = 2 * np.pi * generator.random(number)
     return np.asarray(distance[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def _overlaps(places: Array, radius: float) -> int:
-    apart = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
-    np.fill_diagonal(apart, np.inf)
-    return int((apart.min(axis=1) < 2 * radius).sum())
+    distance = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
+    np.fill_diagonal(distance, np.inf)
+    return int((distance.min(axis=1) < 2 * radius).sum())
 
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:

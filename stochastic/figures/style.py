@@ -1,4 +1,4 @@
-"""Style of the microstructure's figures, saved as SVG and PNG, whole or not at all."""
+"""Style of the microstructure's figures, and their files: SVG and PNG, replaced at once."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SETTINGS: dict[str, Any] = {
 
 @contextmanager
 def style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
-    """The look, for the figures drawn inside the block, with `more` of matplotlib's settings."""
+    """Context in which figures have this style; `more` are other settings of Matplotlib."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -41,15 +41,15 @@ def style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
         yield
 
 
-def beside(whole: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
-    """A figure of two panels, with a title for both and one for each, if any."""
+def two_panels(title: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
+    """Figure of two panels, with a common title and one for each panel, if any."""
     import matplotlib.pyplot as plt
 
-    drawn, both = plt.subplots(1, 2, figsize=(9.6, 5.0 if titles else 4.0))
-    drawn.suptitle(whole, fontsize=10)
-    for axes, title in zip(both, titles, strict=False):
-        axes.set_title(title)
-    return drawn, list(both)
+    figure, panels = plt.subplots(1, 2, figsize=(9.6, 5.0 if titles else 4.0))
+    figure.suptitle(title, fontsize=10)
+    for axes, panel_title in zip(panels, titles, strict=False):
+        axes.set_title(panel_title)
+    return figure, list(panels)
 
 
 def save(drawn: Figure, stem: Path) -> list[Path]:

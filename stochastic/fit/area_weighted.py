@@ -20,10 +20,10 @@ class AreaWeighted:
     Of spheres the share of volume takes the place of the share of area.
 
     Args:
-        values: r_n, shape (n,); sorted when built by `of`.
+        values: r_n, shape (n,); sorted when built by `from_values`.
         weights: shape (n,), sum 1.
-        groups: What is drawn anew in the bootstrap as a whole, shape (n,): number of the packing,
-            or of the patch of a section.
+        groups: Group of each value, shape (n,), the number of its packing or of its patch of a
+            section; the bootstrap draws groups.
     """
 
     values: Array
@@ -31,14 +31,14 @@ class AreaWeighted:
     groups: Rows
 
     @classmethod
-    def of(
+    def from_values(
         cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
     ) -> AreaWeighted:
-        """Sort the values and scale the weights (equal by default) to the sum 1."""
+        """Sample of sorted values, with weights (equal by default) scaled to the sum 1."""
         values = np.asarray(values, float).ravel()
         weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
-        each = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
-        labels = np.unique(each, return_inverse=True)[1]
+        members = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
+        labels = np.unique(members, return_inverse=True)[1]
         order = np.argsort(values, kind="stable")
         return cls(values[order], weights[order] / weights.sum(), labels[order])
 
@@ -56,13 +56,13 @@ class AreaWeighted:
 
     def cdf(self, radius: ArrayLike) -> Array:
         """Share of area with r_n ≤ radius, any shape."""
-        place = np.searchsorted(self.values, radius, side="right")
-        return np.asarray(np.append(0.0, self.cumulated)[place])
+        count = np.searchsorted(self.values, radius, side="right")
+        return np.asarray(np.append(0.0, self.cumulated)[count])
 
     def quantile(self, share: ArrayLike) -> Array:
         """Least value with at least `share` of the area at or below it, any shape."""
-        place = np.searchsorted(self.cumulated, np.asarray(share) - 1e-12)
-        return np.asarray(self.values[np.minimum(place, len(self.values) - 1)])
+        row = np.searchsorted(self.cumulated, np.asarray(share) - 1e-12)
+        return np.asarray(self.values[np.minimum(row, len(self.values) - 1)])
 
     @property
     def mean(self) -> float:
@@ -74,7 +74,7 @@ class AreaWeighted:
         return float(self.weights[(self.values >= lower) & (self.values <= upper)].sum())
 
     def limits(self, share: float) -> tuple[float, float]:
-        """Limits that keep `share` in (0, 1) of the area, equal shares cut off at both ends."""
+        """Limits that contain `share` in (0, 1) of the area, with equal shares beyond both."""
         return float(self.quantile((1 - share) / 2)), float(self.quantile((1 + share) / 2))
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
@@ -85,16 +85,18 @@ class AreaWeighted:
         """
         inside = (self.values >= lower) & (self.values <= upper)
         value = f"[{lower:g}, {upper:g}] with {int(inside.sum())} reduced radii"
-        allowed = "limits that hold ten or more"
+        allowed = "limits that contain ten or more"
         require(inside.sum() >= 10, "limits", value, allowed, "take more particles")
-        return AreaWeighted.of(self.values[inside], self.weights[inside], self.groups[inside])
+        return AreaWeighted.from_values(
+            self.values[inside], self.weights[inside], self.groups[inside]
+        )
 
     def capped(self, most: float) -> AreaWeighted:
         """The same sample, its values above `most` taken as `most`."""
         return AreaWeighted(np.minimum(self.values, most), self.weights, self.groups)
 
     def resampled(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
-        """Weights of `number` bootstrap samples of whole groups, each of shape (n,), sum 1."""
+        """Weights of `number` bootstrap samples of groups, shape (n,) each, sum 1."""
         count = int(self.groups.max()) + 1
         for _ in range(number):
             drawn = np.bincount(generator.integers(count, size=count), minlength=count)

@@ -59,33 +59,35 @@ class PBox:
 
 
 def least_pbox(
-    fit: HermiteFit, sample: AreaWeighted, band: float, *, hold: SlopeBand | None = None
+    fit: HermiteFit, sample: AreaWeighted, band: float, *, required: SlopeBand | None = None
 ) -> PBox:
     """Least p-box around the fitted map that contains `sample`, within a band of `band`.
 
-    Misfit alone gives little fuzziness where data are few and the band is wide; `hold` adds what
-    the slopes may be by chance.
+    The misfit alone gives little fuzziness where data are few and the band is wide; `required` adds
+    the scatter of the slopes.
 
     Args:
         fit: Ends of the map and law of θ.
         sample: r_n within the ends.
         band: In probability, in [0, 1).
-        hold: Slopes that the supports must hold as well, such as their own bootstrap band, as far
-            as its maps are monotone.
+        required: Slopes that the supports must contain as well, such as their bootstrap band, as
+            far as its maps are monotone.
 
     Raises:
         FailedError: No p-box of monotone cubics with these ends contains the sample.
     """
     modal = fit.slopes(sample)
-    core = _core(modal, None if hold is None else hold.monotone(fit))
+    core = _core(modal, None if required is None else required.monotone(fit))
     ends = _solve(fit, core, *_containment(fit, sample, band))
     return PBox(fit, (ends[0], modal[0], ends[1]), (ends[2], modal[1], ends[3]))
 
 
-def _core(modal: tuple[float, float], hold: SlopeBand | None) -> list[tuple[float, float | None]]:
+def _core(
+    modal: tuple[float, float], required: SlopeBand | None
+) -> list[tuple[float, float | None]]:
     """Ranges of the four ends (a2L, a2U, a4L, a4U) around the modal slopes, in the supports."""
-    held = ((), ()) if hold is None else (hold.a2, hold.a4)
-    a2, a4 = ((x, *more) for x, more in zip(modal, held, strict=True))
+    bands = ((), ()) if required is None else (required.a2, required.a4)
+    a2, a4 = ((slope, *band) for slope, band in zip(modal, bands, strict=True))
     return [(0, min(a2)), (max(a2), None), (0, min(a4)), (max(a4), None)]
 
 

@@ -55,10 +55,10 @@ class CircleFile:
         share = -surface_distance(discs, first, second) / smaller
         if share.max(initial=0.0) > ROUNDING:
             worst = int(np.argmax(share))
-            one, other = sorted(int(rows[k]) for k in (first[worst], second[worst]))
+            upper, lower = sorted(int(rows[k]) for k in (first[worst], second[worst]))
             raise RefusedError(
-                f"{self.path.name}, row {other}",
-                f"a circle that overlaps that of row {one} by {share[worst]:.2g} of its radius",
+                f"{self.path.name}, row {lower}",
+                f"a circle that overlaps that of row {upper} by {share[worst]:.2g} of its radius",
                 "circles that do not overlap",
                 "mend the row",
             )

@@ -39,7 +39,7 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
             number.
     """
     (_, header), *rows = fields(path)
-    places = [_place(header, name, path) for name in columns]
+    places = [_column(header, name, path) for name in columns]
     values = [[factor * number(path, row, cells, k) for k, factor in places] for row, cells in rows]
     return np.array([row for row, _ in rows]), np.array(values)
 
@@ -86,26 +86,26 @@ def text_of(path: Path) -> str:
         raise RefusedError(str(path), reason, "text files in UTF-8") from None
 
 
-def number(path: Path, row: int, cells: Sequence[str], place: int) -> float:
+def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
     """The number in a field, in plain ASCII digits with a point.
 
     Raises:
         RefusedError: The field is missing or holds no number.
     """
-    text = cells[place].strip() if place < len(cells) else ""
+    text = cells[column].strip() if column < len(cells) else ""
     if len(text) > LONGEST or not NUMBER.fullmatch(text) or not isfinite(float(text)):
         allowed = "numbers such as 1.25 or 1e-3"
-        raise RefusedError(f"{path.name}, row {row}, column {place + 1}", repr(text[:40]), allowed)
+        raise RefusedError(f"{path.name}, row {row}, column {column + 1}", repr(text[:40]), allowed)
     return float(text)
 
 
-def _place(header: list[str], name: str, path: Path) -> tuple[int, float]:
-    """Place of a column in a row, and the factor that makes metres of it."""
+def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
+    """Index of a column, and the factor from its unit to metres."""
     named = (*RADII, *DIAMETERS) if name == "r" else (name,)
-    for place, cell in enumerate(header):
+    for column, cell in enumerate(header):
         match = re.fullmatch(HEADER, cell)
         if match and match[1].lower() in named and match[2] in METRES:
-            return place, METRES[match[2]] * (0.5 if match[1].lower() in DIAMETERS else 1.0)
+            return column, METRES[match[2]] * (0.5 if match[1].lower() in DIAMETERS else 1.0)
     needed = f"a column '{name} [mm]'" + (" or 'd [mm]'" if name == "r" else "")
     units = f"units are {', '.join(METRES)}"
     raise RefusedError(f"{path.name}, header", ",".join(header)[:80], needed, units)

@@ -1,8 +1,8 @@
 """Circles from the image of a section, by scikit-image.
 
 The image is smoothed and cut at Otsu's threshold. A watershed on the distance to the background
-parts particles that touch. Each piece becomes the circle of its centroid and area. Pieces that the
-image's edge cuts are left out, since their circle is not known.
+separates particles that touch. Each piece becomes the circle of its centroid and area. Pieces at
+the image's edge are left out, since their circle is not known.
 
 Tested limits: radii of 8 pixels or more, gaps of 3 or more, contrast at least 5 times the standard
 deviation of the noise: the count is exact and half of the radii are within half a pixel.
@@ -23,9 +23,9 @@ from alphacut.stochastic.particles.particles import Particles
 SMOOTHING = 1.5  # standard deviation, in pixels
 SMALLEST = 4.0  # least radius of a particle, in pixels
 ROUND = 0.9  # share of its convex hull that a round piece fills
-LOST = 0.02  # share of the particles' area that may lie in pieces that are not round
+MAX_NOT_ROUND = 0.02  # share of the particles' area in pieces that are not round
 NOISE = 3.0  # distance of the two greys over their standard deviation, at least
-UNEVEN = 0.2  # of the contrast, by which the matrix may differ between tiles
+MAX_UNEVENNESS = 0.2  # of the contrast, by which the matrix may differ between tiles
 TILES = 8  # along each side of the image
 
 
@@ -89,11 +89,11 @@ class SectionImage:
             else:
                 inside.append((*piece.centroid, piece.equivalent_diameter_area / 2))
         require(
-            bool(inside) and odd <= LOST * phase.sum(),
+            bool(inside) and odd <= MAX_NOT_ROUND * phase.sum(),
             self.path.name,
             f"{odd / max(phase.sum(), 1):.1%} of the particles' area in pieces that are not"
             f" round, beside {len(inside)} that are",
-            f"images with round particles, up to {LOST:.0%} of others",
+            f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others",
             "take the image itself as the cell: cell.image",
         )
         row, column, radius = np.array(inside).T
@@ -115,10 +115,16 @@ class SectionImage:
         allowed = f"images of two greys, {NOISE:g} standard deviations apart"
         require(clear, self.path.name, value, allowed, "average the image before")
         phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
-        apart = _unevenness(smooth, ~phase) / contrast
-        value = f"light that differs by {apart:.2g} of the contrast"
+        unevenness = _unevenness(smooth, ~phase) / contrast
+        value = f"light that differs by {unevenness:.2g} of the contrast"
         cure = "subtract the background, for example by skimage.restoration.rolling_ball"
-        require(apart <= UNEVEN, self.path.name, value, f"values up to {UNEVEN:g}", cure)
+        require(
+            unevenness <= MAX_UNEVENNESS,
+            self.path.name,
+            value,
+            f"values up to {MAX_UNEVENNESS:g}",
+            cure,
+        )
         return phase
 
 

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.stochastic.particles.particles import Particles
 
-MOST = 3_000_000  # pairs in a portion
+MAX_PAIRS = 3_000_000  # in a portion, so that it fits into memory
 
 
 def size_classes(radii: Array) -> Iterator[Rows]:
@@ -52,7 +52,7 @@ def balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Rows, Rows]:
     """Numbers of points in balls, shape (n,), and the points of all balls, one after the other."""
     near = tree.query_ball_point(centres, reach, return_sorted=False)
     counts = np.fromiter(map(len, near), int, len(near))
-    return counts, np.fromiter((k for one in near for k in one), int, counts.sum())
+    return counts, np.fromiter((k for ball in near for k in ball), int, counts.sum())
 
 
 @dataclass(frozen=True)
@@ -62,16 +62,16 @@ class Pairs:
     Args:
         first: i, shape (m,), rising.
         second: j, shape (m,).
-        apart: Vector from the centre of i to that image of j, shape (m, 2), in m.
+        offset: Vector from the centre of i to that image of j, shape (m, 2), in m.
     """
 
     first: Rows
     second: Rows
-    apart: Array
+    offset: Array
 
     def where(self, keep: Mask) -> Pairs:
         """The pairs that a mask selects."""
-        return Pairs(self.first[keep], self.second[keep], self.apart[keep])
+        return Pairs(self.first[keep], self.second[keep], self.offset[keep])
 
     @staticmethod
     def join(parts: list[Pairs]) -> Pairs:
@@ -79,8 +79,8 @@ class Pairs:
         first = np.concatenate([part.first for part in parts])
         order = np.argsort(first, kind="stable")
         second = np.concatenate([part.second for part in parts])
-        apart = np.concatenate([part.apart for part in parts])
-        return Pairs(first[order], second[order], apart[order])
+        offset = np.concatenate([part.offset for part in parts])
+        return Pairs(first[order], second[order], offset[order])
 
 
 def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]:
@@ -94,26 +94,26 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]
     places = discs.centres[image] + shift
     tree = KDTree(places)
     number = tree.query_ball_point(discs.centres, reach, return_length=True)
-    portion = np.cumsum(number) // MOST
+    portion = np.cumsum(number) // MAX_PAIRS
     for value in np.unique(portion):
         part = np.flatnonzero(portion == value)
         counts, near = balls(tree, discs.centres[part], reach[part])
         first, second = np.repeat(part, counts), image[near]
         # the same, with its sign, seen from j
-        apart = discs.centres[second] - discs.centres[first] + shift[near]
-        keep = (first != second) | (apart != 0).any(axis=1)
-        yield part, Pairs(first, second, apart).where(keep)
+        offset = discs.centres[second] - discs.centres[first] + shift[near]
+        keep = (first != second) | (offset != 0).any(axis=1)
+        yield part, Pairs(first, second, offset).where(keep)
 
 
 def _images(discs: Particles, margin: float) -> tuple[Rows, Array]:
     """Indices of all discs, and shifts to all their images within `margin` of the rectangle."""
-    every = np.arange(len(discs), dtype=np.intp)
-    indices: list[Rows] = [every]
+    originals = np.arange(len(discs), dtype=np.intp)
+    indices: list[Rows] = [originals]
     shifts: list[Array] = [np.zeros((len(discs), 2))]
     tiles = np.ceil(margin / discs.size).astype(int) if discs.periodic else (0, 0)
     for tile in itertools.product(*(range(-number, number + 1) for number in tiles)):
         image = discs.centres + discs.size * tile
         near = ((image > -margin) & (image < discs.size + margin)).all(axis=1) & any(tile)
-        indices.append(every[near])
+        indices.append(originals[near])
         shifts.append(np.broadcast_to(discs.size * tile, (int(near.sum()), 2)))
     return np.concatenate(indices), np.concatenate(shifts)

@@ -1,10 +1,10 @@
 """Periodic packings of discs or spheres without overlap.
 
-Loose ones by random sequential addition. In dense ones overlapping particles are pushed apart, then
-shaken: they repel each other while they overlap, and the energy ½ Σ overlap² falls to zero by the
-fast inertial relaxation engine (Bitzek et al. 2006). They repel with radii a little larger than
-their own, so that none touches in the end. Then they move at random in small steps wherever no
-overlap arises: the memory of the pushing fades.
+Loose packings are made by random sequential addition. For dense ones overlapping particles repel
+each other: the energy ½ Σ overlap² is minimised by the fast inertial relaxation engine (Bitzek et
+al. 2006), with radii a little larger than the particles', so that none touch in the end. Then the
+particles move at random in small steps that cause no overlap, so that their arrangement does not
+depend on the relaxation.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from alphacut.stochastic.particles.neighbour_search import balls, close_pairs, s
 from alphacut.stochastic.particles.particles import DISCS, Particles, Shape, nearest_image
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
 
-ROUNDS = 1000  # proposals for one particle before the packing is given up
-MOST = 100_000  # particles to which their number is raised where the largest needs more room
-HEADROOM = 0.3  # growth of the share of the box while they repel, of what is left to the densest
-STEPS = 4000  # of the relaxation before it is given up
-SWEEPS, EACH = 60, 5  # random moves per particle after it, and between two searches of neighbours
+MAX_PROPOSALS = 1000  # for a particle, before random sequential addition ends without a packing
+MAX_NUMBER = 100_000  # particles to which their number is raised where the largest needs more room
+HEADROOM = 0.3  # growth of the fraction while particles repel, over that up to the densest packing
+MAX_STEPS = 4000  # of the relaxation
+MOVES, MOVES_PER_SEARCH = 60, 5  # random moves of a particle, and between searches of neighbours
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Packing:
         """One packing, in a box as large as the particles and the fraction make it.
 
         Raises:
-            FailedError: The particles find no place.
+            FailedError: The packing is too dense.
         """
         radii, side = self._radii(generator)
         box = np.full(self.shape.dimensions, side)
@@ -70,13 +70,14 @@ class Packing:
         side = -np.inf
         room = 2.0 * (self.shape.dimensions - 1)  # a sphere's cell has room for its own images
         while not len(radii) or room * radii.max() > side:
-            least = f"more than {MOST}, where the largest radius is {radii.max(initial=0.0):.3g} m"
+            largest = radii.max(initial=0.0)
+            least = f"more than {MAX_NUMBER}, where the largest radius is {largest:.3g} m"
             cure = "leave out the smallest sizes, or lower the fraction"
-            few = len(radii) < max(MOST, self.number)
+            few = len(radii) < max(MAX_NUMBER, self.number)
             require(few, f"packing.{self.shape.particles}", self.number, least, cure)
             radii = np.append(radii, self.radii.sample(self.number, generator))
-            whole = float(self.shape.measure(radii).sum()) / self.fraction
-            side = float(np.sqrt(whole) if self.shape == DISCS else np.cbrt(whole))
+            measure = float(self.shape.measure(radii).sum()) / self.fraction
+            side = float(np.sqrt(measure) if self.shape == DISCS else np.cbrt(measure))
         return radii, side
 
     def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:
@@ -89,7 +90,7 @@ class Packing:
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
     """Centres of particles without overlap in a periodic box, shape (n, d), in m.
 
-    None if a particle finds no place in `ROUNDS` proposals.
+    None if `MAX_PROPOSALS` proposals for a particle all overlap.
 
     Particles are added from the largest down, in blocks; each one that fails is proposed again at a
     new place, uniform in the box.
@@ -129,10 +130,10 @@ class _Standing:
         hit = np.zeros(len(proposal), bool)
         for tree, centres, standing in self.parts:
             open_ = np.flatnonzero(~hit)
-            counts, other = balls(tree, proposal[open_], radii[open_] + standing.max())
+            counts, placed = balls(tree, proposal[open_], radii[open_] + standing.max())
             which = np.repeat(open_, counts)
-            apart = nearest_image(proposal[which] - centres[other], self.box)
-            near = np.linalg.norm(apart, axis=1) < radii[which] + standing[other]
+            offset = nearest_image(proposal[which] - centres[placed], self.box)
+            near = np.linalg.norm(offset, axis=1) < radii[which] + standing[placed]
             hit[which[near]] = True
         return hit
 
@@ -142,7 +143,7 @@ def _added(standing: _Standing, radii: Array, generator: np.random.Generator) ->
     box = standing.box
     new = np.full((len(radii), len(box)), np.nan)
     fresh = _Standing(new[:0], radii[:0], box)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_PROPOSALS):
         pending = np.flatnonzero(np.isnan(new[:, 0]))
         if not len(pending):
             return new
@@ -183,25 +184,26 @@ def relaxed(radii: Array, box: Array, generator: np.random.Generator) -> Array:
         FailedError: The particles still overlap after all steps.
     """
     start = box * generator.random((len(radii), len(box)))
-    own = Particles(start, radii, box)
-    grown = own.fraction + HEADROOM * (own.shape.densest - own.fraction)
-    growth = max(1 + 1e-4, float((grown / own.fraction) ** (1 / len(box))))
-    return _shake(_push(own, growth), generator)
+    overlapping = Particles(start, radii, box)
+    fraction = overlapping.fraction
+    grown = fraction + HEADROOM * (overlapping.shape.densest - fraction)
+    growth = max(1 + 1e-4, float((grown / fraction) ** (1 / len(box))))
+    return _shake(_push(overlapping, growth), generator)
 
 
-def _push(own: Particles, growth: float) -> Particles:
+def _push(particles: Particles, growth: float) -> Particles:
     """Relaxes until no two particles overlap; they repel as if grown."""
-    centres, box, radii = own.centres, own.size, own.radii * growth
+    centres, box, radii = particles.centres, particles.size, particles.radii * growth
     velocity, step, mixing, downhill = np.zeros_like(centres), 0.1, 0.1, 0
-    skin, overlap = 0.6 * float(own.radii.mean()), 0.0
+    skin, overlap = 0.6 * float(particles.radii.mean()), 0.0
     pairs, anchor = None, centres
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         moved = float(np.linalg.norm(nearest_image(centres - anchor, box), axis=1).max())
         if pairs is None or 2 * moved > skin:
             pairs, anchor = close_pairs(Particles(centres, radii, box), skin), centres
         force, overlap = _repulsion(centres, radii, pairs, box)
-        if overlap < (growth - 1) * 2 * float(own.radii.min()):
-            return Particles(centres, own.radii, box)
+        if overlap < (growth - 1) * 2 * float(particles.radii.min()):
+            return Particles(centres, particles.radii, box)
         if float((force * velocity).sum()) > 0:
             downhill += 1
             pull = np.sqrt((velocity**2).sum() / max((force**2).sum(), 1e-300))
@@ -214,8 +216,8 @@ def _push(own: Particles, growth: float) -> Particles:
         velocity = velocity + step * force
         centres = centres + step * velocity
     raise FailedError(
-        f"{own.shape.particles} on a share {own.fraction:.3f} of the box still overlap by"
-        f" {overlap:.3g} m after {STEPS} steps",
+        f"{particles.shape.particles} on a share {particles.fraction:.3f} of the box still overlap"
+        f" by {overlap:.3g} m after {MAX_STEPS} steps",
         "lower the fraction",
     )
 
@@ -225,10 +227,10 @@ def _repulsion(
 ) -> tuple[Array, float]:
     """Forces, shape (n, d), and the greatest overlap, in m."""
     first, second = pairs
-    apart = nearest_image(centres[second] - centres[first], box)
-    distance = np.maximum(np.linalg.norm(apart, axis=1), 1e-300)
+    offset = nearest_image(centres[second] - centres[first], box)
+    distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-300)
     overlap = np.maximum(radii[first] + radii[second] - distance, 0)
-    push = (overlap / distance)[:, None] * apart
+    push = (overlap / distance)[:, None] * offset
     count = len(centres)
     force = [
         np.bincount(second, along, count) - np.bincount(first, along, count) for along in push.T
@@ -236,23 +238,23 @@ def _repulsion(
     return np.stack(force, axis=1), float(overlap.max(initial=0.0))
 
 
-def _shake(own: Particles, generator: np.random.Generator) -> Array:
+def _shake(particles: Particles, generator: np.random.Generator) -> Array:
     """Random moves that keep clear of the neighbours' old and new places; the centres."""
-    box, dimensions, radii = own.size, len(own.size), own.radii
-    reach = 0.25 * own.spacing * (1 - own.fraction ** (1 / dimensions))
-    centres = own.centres
-    for _ in range(0, SWEEPS, EACH):
-        first, second = close_pairs(Particles(centres, radii, box), 4 * EACH * reach)
+    box, dimensions, radii = particles.size, len(particles.size), particles.radii
+    reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))
+    centres = particles.centres
+    for _ in range(0, MOVES, MOVES_PER_SEARCH):
+        first, second = close_pairs(Particles(centres, radii, box), 4 * MOVES_PER_SEARCH * reach)
         limit = radii[first] + radii[second]
-        for _ in range(EACH):
-            way = generator.standard_normal(centres.shape)
-            way /= np.linalg.norm(way, axis=1)[:, None]
+        for _ in range(MOVES_PER_SEARCH):
+            direction = generator.standard_normal(centres.shape)
+            direction /= np.linalg.norm(direction, axis=1)[:, None]
             length = reach * generator.random(len(radii)) ** (1 / dimensions)
-            moved = centres + length[:, None] * way
+            moved = centres + length[:, None] * direction
             stays = np.zeros(len(radii), bool)
-            for mine, other in ((first, second), (second, first)):
-                for place in (centres, moved):
-                    apart = nearest_image(place[other] - moved[mine], box)
-                    stays[mine[np.linalg.norm(apart, axis=1) < limit]] = True
+            for mover, neighbour in ((first, second), (second, first)):
+                for positions in (centres, moved):
+                    offset = nearest_image(positions[neighbour] - moved[mover], box)
+                    stays[mover[np.linalg.norm(offset, axis=1) < limit]] = True
             centres = np.where(stays[:, None], centres, moved)
     return centres

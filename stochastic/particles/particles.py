@@ -120,13 +120,13 @@ class Particles:
 
     def separation(self, first: Rows, second: Rows) -> Array:
         """Vectors from centres `first` to the nearest images of `second`, shape (…, d), in m."""
-        apart: Array = self.centres[second] - self.centres[first]
-        return nearest_image(apart, self.size) if self.periodic else apart
+        offset: Array = self.centres[second] - self.centres[first]
+        return nearest_image(offset, self.size) if self.periodic else offset
 
 
-def nearest_image(apart: Array, size: Array) -> Array:
+def nearest_image(offset: Array, size: Array) -> Array:
     """Vectors between centres, shape (…, d), brought to the nearest image in a periodic box."""
-    return np.asarray(apart - size * np.round(apart / size))
+    return np.asarray(offset - size * np.round(offset / size))
 
 
 def _refuse(bad: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:

@@ -44,7 +44,7 @@ class Apollonius:
             their angle.
         neighbour: Disc on the other side, shape (m,); the disc itself for its own image; −1 at the
             edge of a window.
-        apart: Vector from the centre to that image of the neighbour, shape (m, 2), in m.
+        offset: Vector from the centre to that image of the neighbour, shape (m, 2), in m.
         start: Angle at the centre where the arc begins, shape (m,).
         end: Angle where it ends, shape (m,), `start` ≤ `end` ≤ `start` + 2π.
     """
@@ -53,7 +53,7 @@ class Apollonius:
     areas: Array
     cell: Rows
     neighbour: Rows
-    apart: Array
+    offset: Array
     start: Array
     end: Array
 
@@ -68,8 +68,8 @@ class Apollonius:
         Two arrays of shape (count, m), the distance from the centre in m.
         """
         angle = np.asarray(np.linspace(self.start, self.end, count), float)
-        near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.apart)
-        psi = angle - np.arctan2(self.apart[:, 1], self.apart[:, 0])
+        near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.offset)
+        psi = angle - np.arctan2(self.offset[:, 1], self.offset[:, 0])
         return angle, near * far / ((far - near) + (far + near) * np.cos(psi))
 
 
@@ -91,22 +91,22 @@ def apollonius(discs: Particles) -> Apollonius:
     for walls in _walls(discs, 2 * largest - discs.radii + widest):
         areas += walls.areas()
         arcs, pairs = walls.arcs, walls.pairs
-        second, apart = pairs.second[arcs.function], pairs.apart[arcs.function]
-        parts.append((arcs.owner, second, apart, arcs.start, arcs.end))
+        second, offset = pairs.second[arcs.function], pairs.offset[arcs.function]
+        parts.append((arcs.owner, second, offset, arcs.start, arcs.end))
     columns = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Apollonius(discs, areas, *columns)
 
 
-def _near_far(radii: Array, first: Rows, second: Rows, apart: Array) -> tuple[Array, Array]:
+def _near_far(radii: Array, first: Rows, second: Rows, offset: Array) -> tuple[Array, Array]:
     """Sums d + Δ and differences d − Δ of pairs; a window's edge is a wall to an equal disc."""
-    distance = np.hypot(apart[:, 0], apart[:, 1])
+    distance = np.hypot(offset[:, 0], offset[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
     return distance + difference, distance - difference
 
 
 @dataclass(frozen=True, eq=False)
 class _Walls:
-    """Walls of every disc towards the others, and the envelopes that they form."""
+    """Walls of the discs towards their neighbours, and the envelopes that they form."""
 
     discs: Particles
     pairs: Pairs
@@ -114,10 +114,12 @@ class _Walls:
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
         """Anomalies at both ends of every arc, and d + Δ, d − Δ of its wall."""
-        of = self.arcs.function
-        apart = self.pairs.apart[of]
-        near, far = _near_far(self.discs.radii, self.pairs.first[of], self.pairs.second[of], apart)
-        towards = np.arctan2(apart[:, 1], apart[:, 0])
+        wall = self.arcs.function
+        offset = self.pairs.offset[wall]
+        near, far = _near_far(
+            self.discs.radii, self.pairs.first[wall], self.pairs.second[wall], offset
+        )
+        towards = np.arctan2(offset[:, 1], offset[:, 0])
         return (
             anomaly(self.arcs.start - towards, near, far),
             anomaly(self.arcs.end - towards, near, far),
@@ -152,11 +154,12 @@ class _Walls:
 
 def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
     """Cells of portions of the discs, with all others within reach and own images around them."""
-    for of, others in pairs_within(discs, reach):
-        near, far = _near_far(discs.radii, others.first, others.second, others.apart)
-        pairs = Pairs.join([others.where((near > 0) & (far > 0)), _bounds(discs, of)])
-        near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.apart)
-        direction = pairs.apart / np.hypot(pairs.apart[:, 0], pairs.apart[:, 1])[:, None]
+    for portion, neighbours in pairs_within(discs, reach):
+        near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
+        walls = neighbours.where((near > 0) & (far > 0))
+        pairs = Pairs.join([walls, _bounds(discs, portion)])
+        near, far = _near_far(discs.radii, pairs.first, pairs.second, pairs.offset)
+        direction = pairs.offset / np.hypot(pairs.offset[:, 0], pairs.offset[:, 1])[:, None]
         amplitude = 1 / near + 1 / far
         arcs = upper_envelopes(
             amplitude * direction[:, 0],
@@ -167,20 +170,22 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
         yield _Walls(discs, pairs, arcs)
 
 
-def _bounds(discs: Particles, of: Rows) -> Pairs:
-    """Bounds of every cell: own images in a periodic box, mirror images in a window."""
+def _bounds(discs: Particles, portion: Rows) -> Pairs:
+    """Pairs that bound the cells: images of a disc in a periodic box, mirror images in a window."""
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
-        return Pairs(np.repeat(of, 8), np.repeat(of, 8), np.tile(shifts, (len(of), 1)))
+        return Pairs(
+            np.repeat(portion, 8), np.repeat(portion, 8), np.tile(shifts, (len(portion), 1))
+        )
     # off the edge, so that there is a mirror image
-    centres = np.clip(discs.centres[of], 1e-15 * discs.size, (1 - 1e-15) * discs.size)
-    apart = np.zeros((len(of), 4, 2))
-    apart[:, 0, 0], apart[:, 1, 0] = -2 * centres[:, 0], 2 * (discs.size[0] - centres[:, 0])
-    apart[:, 2, 1], apart[:, 3, 1] = -2 * centres[:, 1], 2 * (discs.size[1] - centres[:, 1])
-    return Pairs(np.repeat(of, 4), np.full(4 * len(of), -1), apart.reshape(-1, 2))
+    centres = np.clip(discs.centres[portion], 1e-15 * discs.size, (1 - 1e-15) * discs.size)
+    offset = np.zeros((len(portion), 4, 2))
+    offset[:, 0, 0], offset[:, 1, 0] = -2 * centres[:, 0], 2 * (discs.size[0] - centres[:, 0])
+    offset[:, 2, 1], offset[:, 3, 1] = -2 * centres[:, 1], 2 * (discs.size[1] - centres[:, 1])
+    return Pairs(np.repeat(portion, 4), np.full(4 * len(portion), -1), offset.reshape(-1, 2))
 
 
-def whole_cells(diagram: Apollonius) -> tuple[Rows, Array]:
+def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
     """Cells clear of the window's edge, with weights that make up for the others.
 
     A cell counts only if no disc whose centre lies beyond the window's edge could change it. Such a

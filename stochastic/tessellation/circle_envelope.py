@@ -73,7 +73,7 @@ class Arcs:
 
 
 def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
-    """Upper envelopes of consecutive groups of functions.
+    """Upper envelopes of groups of functions a cos φ + b sin φ + c.
 
     Args:
         a: Coefficients of cos φ, shape (k,), the groups one after the other.
@@ -117,10 +117,10 @@ def _sweep(
     live, limit = row, phi + 2 * np.pi
     took: list[tuple[Rows, Rows, Array]] = []  # row, function that takes over, angle
     for step in range(4 * a.shape[1] + 16):
-        beyond = phi + STRIDE if step else phi
-        current, ahead = _next_crossing(a, b, c, beyond)
+        after = phi + STRIDE if step else phi
+        current, ahead = _next_crossing(a, b, c, after)
         took.append((live, current, phi))
-        phi = beyond + ahead
+        phi = after + ahead
         on = phi < limit
         if not on.all():
             a, b, c, live, limit, phi = a[on], b[on], c[on], live[on], limit[on], phi[on]

@@ -10,7 +10,7 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.stochastic.particles.particles import Particles
 from alphacut.stochastic.tessellation.apollonius import Apollonius
 
-LAYER = 8.0
+LAYER = 8.0  # mean spacings; no circumcircle of a packing is wider
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,17 +20,17 @@ class Neighbours:
     Args:
         number: Neighbours of each centre that is counted, shape (n,).
         first: Centre at one end of each edge, shape (m,); each edge appears once from either end.
-        apart: Vector to the other end, shape (m, 2), in m.
+        offset: Vector to the other end, shape (m, 2), in m.
     """
 
     number: Rows
     first: Rows
-    apart: Array
+    offset: Array
 
     @property
     def distances(self) -> Array:
         """Distances of the centres, shape (m,), in m."""
-        return np.asarray(np.hypot(self.apart[:, 0], self.apart[:, 1]))
+        return np.asarray(np.hypot(self.offset[:, 0], self.offset[:, 1]))
 
 
 def neighbours(discs: Particles) -> Neighbours:
@@ -54,15 +54,15 @@ def neighbours(discs: Particles) -> Neighbours:
     counted = np.ones(len(points), bool)
     counted[len(discs) :] = False
     counted[triangulation.convex_hull] = False
-    start, other = triangulation.vertex_neighbor_vertices
+    start, second = triangulation.vertex_neighbor_vertices
     first = np.repeat(np.arange(len(points)), np.diff(start))
-    first, other = first[counted[first]], other[counted[first]]
+    first, second = first[counted[first]], second[counted[first]]
     number = np.bincount(first, minlength=len(points))[counted]
-    return Neighbours(number, first, points[other] - points[first])
+    return Neighbours(number, first, points[second] - points[first])
 
 
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
     """Pairs of `values` of cells that share a wall, either way round, shape (2, m)."""
-    beyond = diagram.neighbour > diagram.cell
-    pair = np.unique(np.stack([diagram.cell[beyond], diagram.neighbour[beyond]]), axis=1)
+    once = diagram.neighbour > diagram.cell
+    pair = np.unique(np.stack([diagram.cell[once], diagram.neighbour[once]]), axis=1)
     return np.concatenate([values[pair], values[pair[::-1]]], axis=1)

@@ -33,8 +33,8 @@ def cell_volumes(spheres: Particles) -> Array:
         np.savetxt(file, table, fmt="%d %.17g %.17g %.17g %.17g")
         command = [program, "-r", "-p", "-c", "%i %v", *"010101", str(file)]
         subprocess.run(command, capture_output=True, check=False)
-        made = file.with_suffix(".vol")
-        cells = np.loadtxt(made, ndmin=2) if made.is_file() else np.zeros((0, 2))
+        output = file.with_suffix(".vol")
+        cells = np.loadtxt(output, ndmin=2) if output.is_file() else np.zeros((0, 2))
     volumes = np.zeros(count)
     volumes[cells[:, 0].astype(int)] = cells[:, 1]
     if not (volumes > 0).all() or abs(volumes.sum() - 1) > 1e-5:  # Voro++ prints six digits

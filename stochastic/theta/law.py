@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 
-NARROWEST = 1e-4  # width of a support over its greater end, beside which rounding is small
+MIN_WIDTH = 1e-4  # of a support over its greater end, so that rounding is small beside it
 
 
 class ThetaLaw(Protocol):
@@ -41,16 +41,16 @@ class ThetaLaw(Protocol):
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
-    """Refuse a support that is not two finite ends in order, `NARROWEST` or more apart.
+    """Refuse a support that is not two finite ends in order, `MIN_WIDTH` or more apart.
 
     Raises:
         RefusedError: It is not.
     """
-    least = NARROWEST * max(abs(lower), abs(upper), unit)
+    least = MIN_WIDTH * max(abs(lower), abs(upper), unit)
     ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
     wide = ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough
-    apart = f", {least:.2g} or more apart" if ordered else ""
-    require(wide, "support of θ", [lower, upper], f"two finite ends, rising{apart}")
+    distance = f", {least:.2g} or more apart" if ordered else ""
+    require(wide, "support of θ", [lower, upper], f"two finite ends, rising{distance}")
 
 
 @dataclass(frozen=True)
@@ -118,5 +118,5 @@ class TruncatedNormal:
 def _normal(theta: ArrayLike) -> Array:
     """Distribution function of the standard normal law, any shape; SciPy would start later."""
     values = np.asarray(theta, float)
-    shares = [erfc(-one / sqrt(2)) / 2 for one in values.ravel()]
+    shares = [erfc(-value / sqrt(2)) / 2 for value in values.ravel()]
     return np.array(shares).reshape(values.shape)

@@ -80,8 +80,8 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
     """
     real("points", points, whole=True, least=1)
     fine = _fine_rule(distribution, 16 + 2 * points)
-    held = fine.weights > _NEGLIGIBLE
-    at, weights = fine.nodes[held], fine.weights[held]
+    relevant = fine.weights > _NEGLIGIBLE
+    at, weights = fine.nodes[relevant], fine.weights[relevant]
     diagonal, off = np.zeros(points), np.zeros(points)
     previous, current = np.zeros_like(at), np.ones_like(at)
     for k in range(points):

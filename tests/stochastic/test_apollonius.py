@@ -220,7 +220,7 @@ def test_walls_are_equally_far_from_both_discs():
     discs = Particles(np.random.default_rng(2).random((40, 2)), np.linspace(0.01, 0.06, 40), (1, 1))
     diagram = apollonius(discs)
     angle, rho = (middle[1] for middle in diagram.walls(3))
-    beyond = rho[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1) - diagram.apart
+    beyond = rho[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1) - diagram.offset
     towards = np.hypot(beyond[:, 0], beyond[:, 1]) - discs.radii[diagram.neighbour]
     assert towards == pytest.approx(rho - discs.radii[diagram.cell], abs=1e-12)
 

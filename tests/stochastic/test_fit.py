@@ -18,7 +18,7 @@ FIT = HermiteFit(0.13, 0.87)
 
 
 def drawn(radius: HermiteMap, number: int, seed: int) -> AreaWeighted:
-    return AreaWeighted.of(radius(LAW.sample(number, np.random.default_rng(seed))))
+    return AreaWeighted.from_values(radius(LAW.sample(number, np.random.default_rng(seed))))
 
 
 def staircase_fit(sample: AreaWeighted) -> np.ndarray:
@@ -33,7 +33,7 @@ def staircase_fit(sample: AreaWeighted) -> np.ndarray:
 
 
 def test_weighted_distribution_by_hand():
-    sample = AreaWeighted.of([0.5, 0.2, 0.8], [1, 2, 1])
+    sample = AreaWeighted.from_values([0.5, 0.2, 0.8], [1, 2, 1])
     assert sample.cdf([0.1, 0.2, 0.5, 0.79, 0.8]).tolist() == [0, 0.5, 0.75, 0.75, 1]
     assert sample.quantile([0.1, 0.5, 0.6, 1]).tolist() == [0.2, 0.2, 0.5, 0.8]
     assert sample.mean == pytest.approx(0.425)
@@ -50,13 +50,15 @@ def test_limits_keep_their_share():
 @pytest.mark.parametrize("weighted", [False, True])
 def test_fit_equals_brute_force_least_squares(weighted):
     rng = np.random.default_rng(2)
-    sample = AreaWeighted.of(TRUE(LAW.sample(50, rng)), rng.random(50) if weighted else None)
+    sample = AreaWeighted.from_values(
+        TRUE(LAW.sample(50, rng)), rng.random(50) if weighted else None
+    )
     assert FIT.slopes(sample) == pytest.approx(staircase_fit(sample), abs=1e-4)
 
 
 def test_fit_returns_the_map_of_its_own_quantiles():
     share = (np.arange(200_000) + 0.5) / 200_000
-    assert FIT.slopes(AreaWeighted.of(TRUE(LAW.quantile(share)))) == pytest.approx(
+    assert FIT.slopes(AreaWeighted.from_values(TRUE(LAW.quantile(share)))) == pytest.approx(
         (0.3, 0.5), abs=2e-4
     )
 
@@ -75,7 +77,7 @@ def test_fit_stays_monotone_and_nearest():
         np.full(400, 0.5),
         0.13 + 0.74 * rng.random(400) ** 6,
     ):
-        sample = AreaWeighted.of(values)
+        sample = AreaWeighted.from_values(values)
         slopes = FIT.slopes(sample)
         fitted = FIT.map(slopes)
         assert rises(fitted)
@@ -121,7 +123,7 @@ def test_supports_hold_the_true_slopes_and_only_monotone_maps(slopes):
         sample = drawn(true, 150, seed)
         generator = np.random.default_rng(seed)
         band = slope_band(FIT, sample, level=0.95, resamples=60, generator=generator)
-        box = least_pbox(FIT, sample, sample.band(0.95, 60, generator), hold=band)
+        box = least_pbox(FIT, sample, sample.band(0.95, 60, generator), required=band)
         assert all(rises(FIT.map((a2, a4))) for a2 in box.a2 for a4 in box.a4), seed
         held += all(
             low - 1e-9 <= slope <= high + 1e-9
@@ -150,8 +152,8 @@ def test_band_narrows_with_the_root_of_the_sample():
 def test_bootstrap_over_groups_feels_their_likeness():
     values = np.repeat(TRUE(LAW.sample(40, np.random.default_rng(4))), 50)
     alone, grouped = (
-        AreaWeighted.of(values),
-        AreaWeighted.of(values, groups=np.repeat(np.arange(40), 50)),
+        AreaWeighted.from_values(values),
+        AreaWeighted.from_values(values, groups=np.repeat(np.arange(40), 50)),
     )
     bands = [sample.band(0.95, 300, np.random.default_rng(0)) for sample in (alone, grouped)]
     assert bands[1] > 4 * bands[0]
@@ -166,7 +168,7 @@ def two_sorts(number: int, seed: int) -> AreaWeighted:
     """A sample that no cubic fits: a mixture of two maps."""
     rng = np.random.default_rng(seed)
     theta = LAW.sample(number, rng)
-    return AreaWeighted.of(
+    return AreaWeighted.from_values(
         np.where(rng.random(number) < 0.5, TRUE(theta), HermiteMap(0.13, 0.1, 0.87, 1.2)(theta))
     )
 
@@ -239,9 +241,9 @@ def test_pbox_area_is_the_area_between_the_bounds():
 def test_hopeless_samples_are_refused():
     half = np.concatenate([np.full(500, 0.14), np.full(500, 0.86)])
     with pytest.raises(FailedError, match=r"no p-box of monotone cubics from 0\.13 to 0\.87"):
-        least_pbox(FIT, AreaWeighted.of(half), 0.01)
+        least_pbox(FIT, AreaWeighted.from_values(half), 0.01)
     with pytest.raises(RefusedError, match="five packings"):
-        AreaWeighted.of([0.2, 0.3], groups=[0, 0]).band(0.9, 10, np.random.default_rng(0))
+        AreaWeighted.from_values([0.2, 0.3], groups=[0, 0]).band(0.9, 10, np.random.default_rng(0))
     with pytest.raises(RefusedError, match="with 0 reduced radii"):
         drawn(TRUE, 100, 0).truncated(0.5, 0.5001)
 
@@ -250,6 +252,6 @@ def test_hopeless_samples_are_refused():
 def test_the_bootstrap_band_has_kolmogorovs_quantile(level, limit):
     """√n sup |F* − F| tends to Kolmogorov's law, whose quantiles are tabulated."""
     count = 900
-    sample = AreaWeighted.of(np.linspace(0.1, 0.9, count))
+    sample = AreaWeighted.from_values(np.linspace(0.1, 0.9, count))
     band = sample.band(level, 2000, np.random.default_rng(7))
     assert np.sqrt(count) * band == pytest.approx(limit, rel=0.06)

@@ -23,8 +23,8 @@ from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii
-from alphacut.stochastic.sections import Simulated, reduced_radii, section_of
-from alphacut.stochastic.tessellation.apollonius import apollonius, whole_cells
+from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
+from alphacut.stochastic.tessellation.apollonius import apollonius, counted_cells
 from alphacut.stochastic.tessellation.delaunay import neighbours
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
@@ -64,7 +64,7 @@ def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bi
     plain, weighted, truth = [], [], []
     for window, areas in windows(60):
         diagram = apollonius(window)
-        whole, weight = whole_cells(diagram)
+        whole, weight = counted_cells(diagram)
         area = diagram.areas[whole]
         assert area == pytest.approx(areas[whole], rel=1e-10)
         assert len(whole) > 0.4 * len(window)
@@ -78,7 +78,7 @@ def test_whole_cells_are_those_of_the_larger_section_and_weights_remove_their_bi
 def test_a_window_without_a_whole_cell_is_refused():
     discs = Particles([(0.3, 0.5), (0.7, 0.5)], [0.1, 0.1], (1, 1), periodic=False)
     with pytest.raises(RefusedError, match="larger section"):
-        whole_cells(apollonius(discs))
+        counted_cells(apollonius(discs))
 
 
 GOOD = "x [mm],y [mm],r [mm]\n10,10,4\n30,12,5\n20,30,3\n"
@@ -221,7 +221,7 @@ def test_study_of_packings(result):
     for section in result.sections:
         assert section.cells.sum() == pytest.approx(section.particles.measure, rel=1e-10)
     assert numbers["mean_area_fraction_of_map"] == pytest.approx(0.2, abs=0.005)
-    assert result.pbox.excess(result.kept) <= result.band + 1e-6
+    assert result.pbox.excess(result.truncated) <= result.band + 1e-6
 
 
 def test_fragment_is_toml_that_gives_the_map(result):
@@ -240,20 +240,20 @@ def test_slopes_that_differ_by_round_off_alone_are_crisp(result):
 
 def test_narrower_band_gives_a_wider_pbox(result):
     crisp = PBox(result.pbox.fit, (result.pbox.a2[1],) * 3, (result.pbox.a4[1],) * 3)
-    least = crisp.excess(result.kept)
-    boxes = [least_pbox(crisp.fit, result.kept, band * least) for band in (1.2, 0.9, 0.8)]
+    least = crisp.excess(result.truncated)
+    boxes = [least_pbox(crisp.fit, result.truncated, band * least) for band in (1.2, 0.9, 0.8)]
     areas = [box.area for box in boxes]
     assert areas[0] == pytest.approx(0, abs=1e-9)
     assert areas == sorted(areas)
     assert areas[2] > 1e-5
-    assert boxes[2].excess(result.kept) <= 0.8 * least + 1e-6 < least
+    assert boxes[2].excess(result.truncated) <= 0.8 * least + 1e-6 < least
 
 
 def test_supports_hold_what_chance_may_do_to_the_slopes(result):
     for slope, band in ((result.pbox.a2, result.slopes.a2), (result.pbox.a4, result.slopes.a4)):
         assert slope[0] <= max(band[0], 0) + 1e-9
         assert slope[2] >= band[2] - 1e-9
-    alone = least_pbox(result.pbox.fit, result.kept, result.band)
+    alone = least_pbox(result.pbox.fit, result.truncated, result.band)
     assert result.pbox.area > alone.area
 
 
@@ -279,8 +279,8 @@ def test_study_of_measured_circles(tmp_path):
 def test_cells_as_tight_as_no_square_are_counted_or_refused():
     dense = study(Study(Simulated(Packing(300, 0.55, LogNormalRadii(1e-3, 2e-3)), 5)))
     assert dense.limits[1] == 0.99 < dense.sample.values[-1]
-    assert 0 < dense.share_beyond < 0.05
-    assert dense.share_kept > 0.99
+    assert 0 < dense.share_capped < 0.05
+    assert dense.share_within > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
         study(Study(Simulated(Packing(200, 0.75, EQUAL), 5)))
 
@@ -290,7 +290,7 @@ def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
     groups = np.arange(100) % 5
     for tight, allowed in ((15, True), (16, False)):
         radii = np.r_[np.linspace(0.4, 0.9, 100 - tight), np.full(tight, 1.05)]
-        sample = AreaWeighted.of(radii, np.ones(100), groups)
+        sample = AreaWeighted.from_values(radii, np.ones(100), groups)
         if allowed:
             assert case.used(sample) is sample
         else:
@@ -300,7 +300,7 @@ def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
 
 def test_equal_cells_leave_nothing_to_fit():
     grid = np.stack(np.meshgrid(np.arange(6), np.arange(6)), axis=-1).reshape(-1, 2) + 0.5
-    section = section_of(Particles(grid, np.full(36, 0.3), (6, 6)))
+    section = with_cells(Particles(grid, np.full(36, 0.3), (6, 6)))
     assert reduced_radii([section]).values == pytest.approx(np.full(36, 0.6), rel=1e-14)
     with pytest.raises(RefusedError, match=r"0\.6 in all cells"):
         fitted_map(replace(SMALL, limits=None), reduced_radii([section]))
@@ -332,6 +332,6 @@ def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
 @needs_voro
 def test_a_cubic_array_of_spheres_has_cubes_for_cells():
     grid = np.stack(np.meshgrid(*[np.arange(3)] * 3), axis=-1).reshape(-1, 3) + 0.5
-    section = section_of(Particles(grid, np.full(27, 0.4), (3, 3, 3)))
+    section = with_cells(Particles(grid, np.full(27, 0.4), (3, 3, 3)))
     assert section.cells == pytest.approx(np.ones(27), rel=1e-5)
     assert section.reduced_radii == pytest.approx(np.full(27, 0.8), rel=1e-5)
