@@ -19,7 +19,7 @@ from alphacut.stochastic.microstructure import Study, fitted_map
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
-from alphacut.stochastic.sections import Simulated, reduced_radii, section_of
+from alphacut.stochastic.sections import Simulated, reduced_radii, with_cells
 from benchmarks.relations.relation import ROUNDED, Chance, Relation
 from benchmarks.relations.stated import Stated
 
@@ -177,7 +177,7 @@ class Sections:
 
     def stated(self) -> Stated:
         """Limits, slopes and shares of the map."""
-        sample = reduced_radii([section_of(particles) for particles in self.packings])
+        sample = reduced_radii([with_cells(particles) for particles in self.packings])
         _, pbox, _, band = fitted_map(Study(self.source), sample)
         numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": band}
         numbers |= {f"a2[{i}]": x for i, x in enumerate(pbox.a2)}

@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     packing = Packing(options.spheres, FRACTION, law, shape=SPHERES)
     result = study(Study(Simulated(packing, options.packings), seed=options.seed))
     print(fragment(summary(result)), end="")
-    print(f"# share of the volume beyond r_n = {SPHERES.reach:g}: {result.share_beyond:.4f}")
+    print(f"# share of the volume beyond r_n = {SPHERES.reach:g}: {result.share_capped:.4f}")
 
 
 if __name__ == "__main__":

@@ -191,7 +191,7 @@ def test_a_row_that_was_changed_is_not_believed(tmp_path):
         connection.execute(
             "update sample set outputs = ? where rowid = ?", (changed.tobytes(), row[0])
         )
-    with pytest.warns(UserWarning, match="54 samples are whole, the others are run anew"):
+    with pytest.warns(UserWarning, match="54 samples are intact, the others are evaluated anew"):
         run(path)
     assert len(calls) == 1
     assert (tmp_path / "s.db.damaged").exists()
@@ -331,6 +331,6 @@ def test_a_second_damage_leaves_the_copy_of_the_first(tmp_path):
         with closing(sqlite3.connect(path)) as base:
             base.execute("update sample set layout = ? where rowid = 1", (stored,))
             base.commit()
-        with pytest.warns(UserWarning, match="54 samples are whole"):
+        with pytest.warns(UserWarning, match="54 samples are intact"):
             run(path)
     assert b"first" in (tmp_path / "s.db.damaged").read_bytes()
