@@ -127,16 +127,16 @@ class PrismProblem:
         return krylov_solver(operator, self.numbering, self.map.distribution, options)
 
     def assemble_operator(self, form: fem.Form) -> PETSc.Mat:
-        """Reduced matrix of a bilinear form of one's own on `form.space`."""
+        """Reduced matrix Pᵀ A P of a bilinear form of the user on `form.space`."""
         matrix = self.matrix.duplicate()
-        matrix.setLGMap(self.local_map, self.local_map)
-        matrix.zeroEntries()
+        for option in (PETSc.Mat.Option.SPD, PETSc.Mat.Option.SYMMETRIC):  # not known of this form
+            matrix.setOption(option, False)
         petsc.assemble_matrix(matrix, form)
         matrix.assemble()
         return matrix
 
     def assemble_forces(self, form: fem.Form) -> PETSc.Vec:
-        """Reduced vector of a linear form of one's own on `form.space`."""
+        """Reduced vector Pᵀ b of a linear form of the user on `form.space`."""
         values = fem.assemble_vector(form).array
         return reduced(values, self.local_map, len(self.numbering.rows), self.numbering.size)
 

@@ -12,12 +12,11 @@ import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import form as elasticity
-from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
+from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import own_mesh_problem, require_law
 from alphacut.rve.prism.problem import PrismProblem
-from alphacut.rve.solver.krylov import Solutions, krylov_solver, solve
-from alphacut.rve.solver.numbering import reduced
+from alphacut.rve.solver.krylov import Solutions, solve
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import RadiusMap, ThetaLaw
@@ -70,18 +69,11 @@ class ProductSpace:
 
     def assemble_matrix(self, form: ufl.Form) -> PETSc.Mat:
         """Reduced matrix Pᵀ A P of a bilinear form in `space`."""
-        matrix = self._problem.matrix.duplicate()
-        for option in (PETSc.Mat.Option.SPD, PETSc.Mat.Option.SYMMETRIC):  # not known of this form
-            matrix.setOption(option, False)
-        petsc.assemble_matrix(matrix, self._compiled(form))
-        matrix.assemble()
-        return matrix
+        return self._problem.assemble_operator(self._compiled(form))
 
     def assemble_vector(self, form: ufl.Form) -> PETSc.Vec:
         """Reduced vector Pᵀ b of a linear form in `space`."""
-        numbering = self._problem.numbering
-        values = fem.assemble_vector(self._compiled(form)).array
-        return reduced(values, self._problem.local_map, len(numbering.rows), numbering.size)
+        return self._problem.assemble_forces(self._compiled(form))
 
     def mean(self, form: ufl.Form) -> float:
         """Mean over cell and θ of a scalar form: its integral over that of f_Θ."""
@@ -124,8 +116,7 @@ class ProductSpace:
         """
         require_symmetric(matrix)
         options = SolverOptions(self._petsc if petsc_options is None else petsc_options)
-        law = self._problem.map.distribution
-        return solve(krylov_solver(matrix, self._problem.numbering, law, options), loads)
+        return solve(self._problem.solver(options, matrix), loads)
 
     def _compiled(self, form: ufl.Form) -> fem.Form:
         """The compiled form; its coefficients keep the values that they have when assembled."""

@@ -34,13 +34,11 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
         rows: Unknowns of this rank.
         size: Unknowns in all.
     """
-    first, last = rows.start // 2, rows.stop // 2
-    pairs = pairs[((pairs >= first) & (pairs < last)).any(axis=1)]  # the others touch no row here
     kept = pairs >= 0
     cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[kept]
     shape = len(pairs), size // 2
     touch = sp.csr_matrix((np.ones(len(cell), np.int8), (cell, pairs[kept])), shape)
-    own = touch.T.tocsr()[first:last]
+    own = touch.T.tocsr()[rows.start // 2 : rows.stop // 2]
     pattern = sp.kron((own @ touch).astype(bool), np.ones((2, 2), bool), "csr")
     pattern.sort_indices()
     csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
