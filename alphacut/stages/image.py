@@ -61,7 +61,9 @@ def compute_cuts(
     model = ImageModel(aspect, division=division, solver=solver, average=average)
     crisp = model.solve(modal)
     tick(0.2)
-    cuts = model.cuts([study.images(level, level) for level in alpha], (modal, crisp))
+    images = [study.images(level, level) for level in alpha]
+    cuts = model.cuts(images, (modal, crisp))
+    model.require_consistent(images, cuts)
     tick(0.8)
 
     def width(threshold: Level, phases: Level) -> float:

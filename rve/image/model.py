@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.anisotropy import ISOTROPIC, require_average
 from alphacut.rve.image.bounds import Ends, StiffnessBounds
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
@@ -16,6 +16,8 @@ from alphacut.rve.image.solve import ImageSolution, solve_between
 
 MILD = 10.0
 LARGE = 1 << 19
+COARSER = 10.0
+"""Multiple of the solver's accuracy for a test; a larger one is cheaper and sees less."""
 FLATTEST = 1e-3  # least side of a pixel over the other; beyond, rounding spoils the fields
 
 
@@ -86,6 +88,31 @@ class ImageModel:
         )
         rows = zip(solutions, moduli, ratios, strict=True)
         return [ImageCut(s.bounds, e, nu) for s, e, nu in rows][::-1]
+
+    def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
+        """Refuse cuts that contradict bounds of images inside them, at another accuracy.
+
+        These lie half way between the least and the greatest moduli of the narrowest and of the
+        widest cut, and are solved anew, from no start, with fields that lack `COARSER` times the
+        energy.
+
+        Raises:
+            FailedError: The proved interval of such an image lies outside the cut.
+        """
+        solver = replace(self.solver, accuracy=min(COARSER * self.solver.accuracy, 0.1))
+        judge, points = replace(self, solver=solver), [images[-1].half_way, images[0].half_way]
+        for k, point in enumerate(points[: 1 if points[0].same(points[1]) else 2]):
+            bounds = judge.solve(point).bounds
+            for cut in cuts if k == 0 else cuts[:1]:  # the narrowest one lies in all
+                for name, own, (low, high) in (
+                    ("E", cut.modulus, bounds.young(self.average)),
+                    ("ν", cut.poisson, bounds.poisson(self.average)),
+                ):
+                    if not (low <= own[1] and own[0] <= high):
+                        what = f"{name} of an image inside a cut is {low:.9g} … {high:.9g}"
+                        what += f", the cut {own[0]:.9g} … {own[1]:.9g}"
+                        cure = "keep the case and report it"
+                        raise FailedError(f"the proof is wrong: {what}", cure)
 
 
 def nested(intervals: Sequence[Ends]) -> list[Ends]:

@@ -28,6 +28,12 @@ class ModuliImages:
     bulk: tuple[Array, Array]
     shear: tuple[Array, Array]
 
+    @property
+    def half_way(self) -> ModuliImages:
+        """One image between both: the geometric means of the moduli."""
+        bulk, shear = (np.sqrt(low * high) for low, high in (self.bulk, self.shear))
+        return ModuliImages((bulk, bulk), (shear, shear))
+
     def same(self, other: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""
         pairs = zip((*self.bulk, *self.shear), (*other.bulk, *other.shear), strict=True)

@@ -1,9 +1,11 @@
 """Guaranteed cuts: fuzzy threshold, fuzzy phases, phases without order; reading of images."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.image.model import ImageModel, nested, usual_division
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
@@ -81,6 +83,19 @@ def test_an_interval_of_poisson_ratios_is_enclosed_and_no_wider_than_it_must(see
         assert getattr(interval.upper, name) == pytest.approx(high.max(), rel=1e-6)
         assert getattr(interval.lower, name) <= low.min()
         assert getattr(interval.upper, name) >= high.max()
+
+
+def test_cuts_that_leave_out_an_image_inside_them_are_refused():
+    grey, model = smooth(24, 1), ImageModel(division=1)
+    pairs = [images(grey, alpha) for alpha in ALPHA]
+    cuts = model.cuts(pairs, (pairs[-1], model.solve(pairs[-1])))
+    model.require_consistent(pairs, cuts)
+    for level in (0, 2):
+        high = cuts[level].modulus[1]
+        moved = (high + 1e-3 * high, 1.1 * high)
+        wrong = [replace(cut, modulus=moved) if k == level else cut for k, cut in enumerate(cuts)]
+        with pytest.raises(FailedError, match="the proof is wrong: E of an image inside a cut"):
+            model.require_consistent(pairs, wrong)
 
 
 def test_nested_cuts_hold_those_before():
