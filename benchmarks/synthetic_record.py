@@ -1,6 +1,7 @@
 """Synthetic earthquake record: noise in the spectrum of Kanai and Tajimi.
 
     python -m benchmarks.synthetic_record > cases/building.record.csv
+    python -m benchmarks.synthetic_record --suite cases/suite
 
 The spectrum is that of Kanai and Tajimi with the high-pass of Clough and Penzien (Dynamics of
 Structures, 1975), the amplitude rises, stays and fades like a moderate earthquake. The seed is
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -78,5 +80,40 @@ def text(record: SyntheticRecord) -> str:
     )
 
 
+SUITE_SEEDS = range(2001, 2012)
+"""Seeds of the eleven records of `cases/suite.toml`."""
+
+
+def at2_text(record: SyntheticRecord) -> str:
+    """The record as a file of type AT2, in g."""
+    samples = record.acceleration() / 9.80665
+    rows = (samples[k : k + 5] for k in range(0, len(samples), 5))
+    numbers = "".join("".join(f"{x:15.7E}" for x in row) + "\n" for row in rows)
+    return (
+        "SYNTHETIC RECORD, NO MEASURED EARTHQUAKE\n"
+        f"made by python -m benchmarks.synthetic_record --suite, seed {record.seed}\n"
+        "ACCELERATION TIME SERIES IN UNITS OF G\n"
+        f"NPTS= {len(samples):6d}, DT= {record.step:7.4f} SEC\n{numbers}"
+    )
+
+
+def write_suite(folder: Path) -> None:
+    """Eleven records of 10 s whose peaks and grounds differ."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for seed in SUITE_SEEDS:
+        rng = np.random.default_rng(seed)
+        record = SyntheticRecord(
+            peak=2.0 * rng.lognormal(0, 0.3),
+            duration=10.0,
+            step=0.02,
+            ground=15 * rng.lognormal(0, 0.2),
+            seed=seed,
+        )
+        (folder / f"record-{seed}.AT2").write_text(at2_text(record), encoding="utf-8")
+
+
 if __name__ == "__main__":
-    sys.stdout.write(text(SyntheticRecord()))
+    if sys.argv[1:2] == ["--suite"]:
+        write_suite(Path(sys.argv[2]))
+    else:
+        sys.stdout.write(text(SyntheticRecord()))

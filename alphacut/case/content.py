@@ -18,16 +18,18 @@ from alphacut.case.material import (
 from alphacut.case.matrices import MatricesSection
 from alphacut.case.motion import Envelope, Identify, Study
 from alphacut.case.particles import Microstructure
+from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.questions.decision import Decision
+from alphacut.questions.fragility import Fragility
 from alphacut.questions.probability import Probability
 from alphacut.questions.question import Question
 from alphacut.questions.tolerances import Tolerances
 
 Stage = Literal["microstructure", "modulus", "envelope"]
-QUESTIONS: tuple[type[Question], ...] = (Probability, Decision, Tolerances)
+QUESTIONS: tuple[type[Question], ...] = (Probability, Decision, Tolerances, Fragility)
 """Questions that a case may put to its motion, each a section as well."""
 
 
@@ -47,12 +49,14 @@ class Content(Section):
     frame: Frame | None = None
     pendulum: Pendulum | None = None
     matrices: MatricesSection | None = None
+    records: RecordsSection | None = None
     study: tuple[Study, ...] = ()
     envelope: Envelope | None = None
     identify: Identify | None = None
     probability: Probability | None = None
     decision: Decision | None = None
     tolerances: Tolerances | None = None
+    fragility: Fragility | None = None
 
     @property
     def questions(self) -> dict[str, Question]:
@@ -140,6 +144,25 @@ class Content(Section):
             (method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell"),
         ):
             require(holds, key, value, allowed)
+        return self
+
+    @model_validator(mode="after")
+    def _records(self) -> Self:
+        """Refuses a structure that nothing moves, and questions that a suite does not answer."""
+        section, suite = self.structure_section, self.records
+        ground = getattr(section, "accelerogram", None)
+        moves = suite is not None or getattr(section, "starts", True) or ground is not None
+        allowed = "a start, an accelerogram, or a section [records]"
+        require(moves, "frame.displacements", None, allowed, "nothing moves the frame")
+        if suite is None:
+            require(self.fragility is None, "fragility", "without records", "beside [records]")
+            return self
+        require(ground is None, "records", "beside an accelerogram", "one of them")
+        for key in ("probability", "tolerances", "identify"):
+            answered = getattr(self, key) is None
+            allowed = "[decision] and [fragility] beside [records]"
+            require(answered, key, "beside [records]", allowed)
+        require(not self.study, "study", "beside [records]", "one motion for each record")
         return self
 
     @model_validator(mode="after")

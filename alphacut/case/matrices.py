@@ -84,8 +84,8 @@ class MatricesSection(Section):
     pattern: dict[str, float] | None = Field(
         default=None, description="how unknowns move with the ground, in place of direction"
     )
-    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] = Field(
-        description="file of the ground's acceleration; motion is relative to it"
+    accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = Field(
+        default=None, description="file of the ground's acceleration; motion is relative to it"
     )
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
@@ -151,6 +151,11 @@ class MatricesSection(Section):
             return self._vector("pattern", self.pattern)
         ends = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
         return np.array(ends)
+
+    @property
+    def starts(self) -> bool:
+        """True if the structure moves without a record: it starts at rest."""
+        return False
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -189,6 +189,11 @@ class Frame(Section):
         return any(number.support.upper > 0 for number in self.dampers)
 
     @property
+    def starts(self) -> bool:
+        """True if a floor is displaced or moves at the start."""
+        return any(any(x.support) for x in (*self.displacements, *self.velocities))
+
+    @property
     def is_whole(self) -> bool:
         """True if it needs no modulus of a stage."""
         return self.modulus is not None or self.stiffness is not None
@@ -257,14 +262,11 @@ class Frame(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        """Refuses a frame without damping or motion, or that is none."""
+        """Refuses a frame without damping, or that is none."""
         placed = self.names("dampers") == (self.damper_placement is not None)
-        starts = any(any(x.support) for x in (*self.displacements, *self.velocities))
-        moves = starts or self.accelerogram is not None
         for holds, key, allowed, cure in (
             (placed, "damper_placement", "both dampers and damper_placement", ""),
             (any(map(self.names, DAMPING)), "dampers", " or ".join(DAMPING), '"0 %" for none'),
-            (moves, "displacements", "a start, or an accelerogram", "nothing moves the frame"),
         ):
             require(holds, f"frame.{key}", None, allowed, cure)
         self.structure()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -96,6 +97,23 @@ def peak_document(peaks: Peaks, output: str) -> Document:
 
 
 @dataclass(frozen=True)
+class SuiteMotion:
+    """Motions of the structure under the records of a suite.
+
+    Args:
+        period: First natural period at the most plausible inputs, in s.
+        ratio: Damping ratio of that mode.
+        measures: Measures of each record by its name, such as {"PGA": 2.1}.
+        peaks: Peaks under each record by its name.
+    """
+
+    period: float
+    ratio: float
+    measures: Mapping[str, Mapping[str, float]]
+    peaks: Mapping[str, Peaks]
+
+
+@dataclass(frozen=True)
 class Motion:
     """The motion of [envelope], to which a question is put.
 
@@ -105,7 +123,9 @@ class Motion:
         alpha: Levels.
         duration: Length, in s.
         step: Distance of nodes, in s.
-        peaks: Peaks of the outputs; None where no question reads them.
+        peaks: Peaks of the outputs, under a suite of any record; None where no question reads
+            them.
+        suite: Records that move the structure one by one; None where there are none.
         progress: Takes the share done.
     """
 
@@ -115,6 +135,7 @@ class Motion:
     duration: float
     step: float
     peaks: Peaks | None = None
+    suite: SuiteMotion | None = None
     progress: Progress | None = None
 
     @property

@@ -50,6 +50,7 @@ PARTS = {
     "image": ("How stiff is the image?", "image", ("image",)),
     "update": ("What do the measured modes teach?", "update", ("update-inputs",)),
     "envelopes": ("How does the structure move?", "peaks", ()),
+    "records": ("How far does it move under each record?", "records", ()),
     **{one.key: (one.title, one.key, (one.key,)) for one in QUESTIONS},
     "shares": ("What drives the width?", "shares", ()),
 }

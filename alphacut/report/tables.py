@@ -149,6 +149,22 @@ def peaks(studies: Document) -> Table:
     return (*head, "peak reached"), rows
 
 
+def records(part: Document) -> Table:
+    """Measures and peaks on the lowest level of each record, then their statistics, in SI."""
+    rows: list[Row] = []
+    for name, record in part["records"].items():
+        measures = tuple(_number(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
+        for output, peak in record["peak"].items():
+            ends = _number(peak["upper"][0]), _number(peak["reached"][0])
+            rows.append((name, *measures, output, Output(output).unit, *ends, peak["nature"]))
+    for output, statistics in part["statistics"].items():
+        for word in statistics["proved"]:
+            ends = tuple(_number(statistics[x][word][0]) for x in ("proved", "reached"))
+            rows.append((f"{word} of all", "", "", output, Output(output).unit, *ends, ""))
+    head = ("record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit")
+    return (*head, "greatest peak", "peak reached", "nature"), rows
+
+
 def shares(part: Document) -> Table:
     """Shares of the inputs in the width of each result, on the lowest level."""
     inputs = dict.fromkeys(name for of in part.values() for name in of)
@@ -165,6 +181,7 @@ MAKERS = {
     "image": ("image", modulus),
     "update": ("update", update),
     "peaks": ("envelopes", peaks),
+    "records": ("records", records),
     "shares": ("shares", shares),
 }
 """Part of the summary of each table, and the function that makes it."""

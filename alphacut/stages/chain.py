@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 from alphacut.case.content import Content
+from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.columns import columns_text
+from alphacut.io.files import as_json
 from alphacut.questions.question import Motion, Question
-from alphacut.stages import cell, envelope, identify, image, microstructure, modulus, shares
+from alphacut.stages import (
+    cell,
+    envelope,
+    identify,
+    image,
+    microstructure,
+    modulus,
+    shares,
+    suite,
+)
 from alphacut.stages.envelope import EnvelopeTask, peaks_of
 from alphacut.stages.modulus import Campaign
 from alphacut.stages.results import Results
@@ -133,15 +145,35 @@ class Chain:
         if content.identify is not None:
             measured, alpha = content.identify, task.section.alpha
             results.learned, structure = identify.learned(measured, structure, alpha)
+        if content.records is not None:
+            self._suite(content.records, structure, task)
+            return
         self.motion(structure)
         peaks = self._peaks(replace(task, limited=content.limited_outputs), structure)
         times = (task.section.alpha, task.duration, task.section.step)
-        motion = Motion(structure, task.fuzzy, *times, peaks)
-        for key, section in content.questions.items():
-            inputs = [section, structure.model, structure.numbers, task.fuzzy, task.section, peaks]
+        self._answer(Motion(structure, task.fuzzy, *times, peaks))
+
+    def _answer(self, motion: Motion) -> None:
+        """Answers to what the case asks of a motion."""
+        for key, section in self.content.questions.items():
             compute = partial(answer_of, section, motion)
-            stage = Stage(key, inputs, ("fuzzy", "frame", "alphacut"), compute)
-            results.answers[key] = self.store.take(stage).document
+            stage = Stage(key, [section, motion], ("fuzzy", "frame", "alphacut"), compute)
+            self.results.answers[key] = self.store.take(stage).document
+
+    def _suite(self, section: RecordsSection, structure: Structure, task: EnvelopeTask) -> None:
+        """Peaks under each record of a suite, and the answers to what the case asks of them."""
+        results = self.results
+        results.structure = structure
+        mode = suite.nominal_mode(structure)
+        records = suite.suite(section, task.section, structure)
+        limited = self.content.limited_outputs or structure.outputs
+        stages = suite.stages(structure, replace(task, limited=limited), records)
+        outcomes = self.store.take_all(stages, self.executor)
+        peaks = suite.peaks_by_record(outcomes, records, task.section.alpha)
+        results.suite = json.loads(as_json(suite.document(peaks, records, mode)))
+        times = (task.section.alpha, task.duration, task.section.step)
+        moved = suite.motion(peaks, records, mode)
+        self._answer(Motion(structure, task.fuzzy, *times, suite.any_record(peaks), moved))
 
     def _peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks of the motion of [envelope]: of the study that has it, else of limited outputs."""

@@ -35,6 +35,7 @@ class Results:
         learned: Inputs after measured modes.
         answers: Answers to the questions of the case, by their keys.
         shares: Shares of the inputs in the widths.
+        suite: Peaks under each record of a suite.
     """
 
     content: Content
@@ -47,6 +48,7 @@ class Results:
     learned: Document | None = None
     answers: dict[str, Document] = field(default_factory=dict)
     shares: StageResult | None = None
+    suite: Document | None = None
 
     @property
     def is_paper(self) -> bool:
@@ -72,6 +74,8 @@ class Results:
                 name: envelope.document(data, of[name].fuzzy) | {"drawn": list(of[name].figures)}
                 for name, data in self.envelopes.items()
             }
+        if self.suite is not None:
+            numbers["records"] = self.suite
         if self.learned is not None:
             numbers["update"] = self.learned
         return {**numbers, **self.answers}

@@ -152,3 +152,14 @@ def frequencies(system: LinearSystem) -> Array:
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
     squared = eigh(matrices.stiffness.value[0], matrices.mass.value[0], eigvals_only=True)
     return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+
+
+def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
+    """Undamped frequencies in rad/s and φᵀDφ/(2ω) of each mode at the modal parameters, (n,)."""
+    from scipy.linalg import eigh
+
+    matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
+    squared, shapes = eigh(matrices.stiffness.value[0], matrices.mass.value[0])
+    omega = np.sqrt(np.maximum(squared, 0.0))
+    damping = np.einsum("ik,ij,jk->k", shapes, matrices.damping.value[0], shapes)
+    return omega, damping / np.maximum(2 * omega, 1e-300)

@@ -32,6 +32,7 @@ DIRECT = {
     "matplotlib": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
+    "mpmath": "python3-sympy",  # which depends on it
     "numba": "python3-numba",
     "numpy": "python3-numpy",
     "petsc4py": "python3-petsc4py-real",
@@ -63,7 +64,8 @@ INDIRECT = {  # imported by others on this project's behalf
     "xdist": "python3-pytest-xdist",  # pytest, for make test
     "sphinx": "python3-sphinx",
 }
-FROM_PYPI = {  # each is needed by one comparison
+FROM_PYPI = {  # each is needed by one comparison, or is an optional extra
+    "pyuff": "alphacut/records/uff.py",
     "openseespylinux": "benchmarks/frame/opensees.py",
 }
 

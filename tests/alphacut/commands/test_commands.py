@@ -110,7 +110,7 @@ REFUSED = [
     ("run .", "is a directory"),
     ("run case.toml --out case.toml", "the name of a folder"),
     ("envelope case.toml --out /proc/none", "nothing can be written"),
-    ("modulus case.toml", "sections [radius] and [cell]"),
+    ("modulus case.toml", "a section [cell]"),
     ("identify case.toml", "sections [identify]"),
     ("microstructure case.toml", "[microstructure]"),
     ("report none", "without summary.json"),

@@ -1,0 +1,117 @@
+"""Section on a suite of records: files, correction, trimming and scaling."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Self
+
+from pydantic import Field, ValidationInfo, model_validator
+
+from alphacut.case.types import Each, Section, Some, Time, text
+from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.io import quantity
+from alphacut.records.read import read_recording
+from alphacut.records.recording import Baseline, Recording, Trim
+
+MAX_RECORDS = 500
+ENDING = re.compile(r"[^A-Za-z0-9_+-]+")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Scale of every record.
+
+    Args:
+        value: Factor, or the value of the measure in m/s².
+        measure: "" of a factor, "PGA" or "Sa(T1)".
+    """
+
+    value: float = 1.0
+    measure: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedRecording:
+    """A recording by the name of its file without ending, which no other has."""
+
+    name: str
+    recording: Recording
+
+
+def _files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
+    """Recordings of the files that one pattern names; a bad one is named before any is used."""
+    folder: Path = (info.context or {}).get("folder", Path())
+    pattern, _, channel = str(value).partition("#")
+    allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
+    relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
+    require(relative, "", value, allowed)
+    paths = sorted(path for path in folder.glob(pattern) if path.is_file())
+    require(0 < len(paths) <= MAX_RECORDS, "", value, f"{allowed}; 1 to {MAX_RECORDS} files")
+    names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
+    every = [read_recording(path, channel) for path in paths]
+    return tuple(NamedRecording(*pair) for pair in zip(names, every, strict=True))
+
+
+def _scale(value: object, _: ValidationInfo) -> Scale:
+    allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
+    measure, equals, size = (part.strip() for part in str(value).partition("="))
+    try:
+        if not equals:
+            scale = Scale(quantity.number(value, ""))
+        else:
+            scale = Scale(quantity.number(size, "m/s^2"), measure)
+    except ValueError as error:
+        raise RefusedError("", value, allowed, str(error)) from None
+    require(scale.value > 0 and scale.measure in ("", "PGA", "Sa(T1)"), "", value, allowed)
+    return scale
+
+
+def _trim(value: object, _: ValidationInfo) -> Trim:
+    allowed = '"arias" for 5 to 95 % of the Arias intensity, or two times as ["2 s", "30 s"]'
+    if value == "arias":
+        return "arias"
+    try:
+        first, last = (quantity.number(x, "s") for x in value)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise RefusedError("", value, allowed) from None
+    require(0 <= first < last, "", value, allowed)
+    return first, last
+
+
+Files = Annotated[tuple[NamedRecording, ...], text(_files)]
+
+
+class RecordsSection(Section):
+    """Suite of records of the ground's acceleration: each moves the structure by itself.
+
+    Each record is corrected, then trimmed, then scaled.
+    """
+
+    files: Annotated[tuple[Files, ...], Each, Some] = Field(
+        description="files or patterns, as records/*.AT2; FILE#CHANNEL of several"
+    )
+    baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
+    trim: Annotated[Trim, text(_trim)] | None = Field(
+        default=None, description='times to keep, as ["2 s", "30 s"], or "arias"'
+    )
+    scale: Annotated[Scale, text(_scale)] = Field(
+        default=Scale(), description='factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g"'
+    )
+    longest: Time | None = Field(
+        default=None, description="longest motion; else each record and five natural periods"
+    )
+
+    @property
+    def recordings(self) -> tuple[NamedRecording, ...]:
+        """The recordings of all files."""
+        return tuple(named for group in self.files for named in group)
+
+    @model_validator(mode="after")
+    def _unlike(self) -> Self:
+        """Refuses files of one name, under which their results would be stored."""
+        names = [named.name for named in self.recordings]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        require(not twice, "records.files", ", ".join(twice), "each file once, by its name")
+        return self

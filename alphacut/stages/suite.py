@@ -1,0 +1,207 @@
+"""Stage records: peaks of a structure under each record of a suite, one result a record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil, pi
+
+import numpy as np
+
+from alphacut.case.motion import Envelope
+from alphacut.case.records import NamedRecording, RecordsSection
+from alphacut.case.structure import Structure
+from alphacut.frame import Accelerogram
+from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.structures.linear import modal_damping_ratios
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Nature
+from alphacut.io.files import Document
+from alphacut.questions.question import SuiteMotion
+from alphacut.records.recording import arias_shares
+from alphacut.records.spectrum import spectral_acceleration
+from alphacut.stages.envelope import EnvelopeTask, by_output, peaks_of
+from alphacut.stages.store import Stage, StageResult, Work
+
+FREE_PERIODS = 5
+"""Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
+QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
+"""Statistics of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """First mode of the structure at its most plausible inputs.
+
+    Args:
+        period: T1, in s.
+        ratio: Damping ratio of the mode.
+    """
+
+    period: float
+    ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class SuiteRecord:
+    """A record of the suite as it moves the structure.
+
+    Args:
+        name: Name of its file without ending.
+        ground: The record, corrected, trimmed and scaled.
+        duration: Length of the motion, in s.
+        measures: "PGA" and "Sa(T1)" of the scaled record, in m/s², and "scale", 1.
+        cut_share: Share of the Arias intensity after the end of the motion.
+    """
+
+    name: str
+    ground: Accelerogram
+    duration: float
+    measures: Mapping[str, float]
+    cut_share: float
+
+
+def nominal_mode(structure: Structure) -> Nominal:
+    """First mode at the most plausible inputs.
+
+    Raises:
+        RefusedError: The structure is not linear.
+    """
+    linear = structure.linear
+    require(linear is not None, "records", "with a system that is not linear", "linear structures")
+    assert linear is not None
+    omega, ratios = modal_damping_ratios(linear)
+    return Nominal(2 * pi / float(omega[0]), float(ratios[0]))
+
+
+def suite(
+    section: RecordsSection, envelope: Envelope, structure: Structure
+) -> tuple[SuiteRecord, ...]:
+    """The records of a suite, in the order of the case."""
+    mode = nominal_mode(structure)
+    return tuple(_record(section, envelope, one, mode) for one in section.recordings)
+
+
+def _record(
+    section: RecordsSection, envelope: Envelope, named: NamedRecording, mode: Nominal
+) -> SuiteRecord:
+    ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
+    measures = {
+        "PGA": ground.extremes[0],
+        "Sa(T1)": spectral_acceleration(ground, mode.period, min(mode.ratio, 0.999)),
+        "scale": 1.0,
+    }
+    wanted = section.scale
+    size = measures.get(wanted.measure, 1.0)
+    require(size > 0, f"record {named.name}", "zero throughout", "a record that moves something")
+    factor = wanted.value / size
+    length = (len(ground.acceleration) - 1) * ground.step
+    duration = length + FREE_PERIODS * mode.period
+    if section.longest is not None:
+        duration = min(section.longest, duration)
+    steps = max(1, ceil(duration / envelope.step - 1e-9))
+    envelope.require_steps(f"records.longest of {named.name}", steps * envelope.step)
+    shares = arias_shares(ground.acceleration, ground.step)
+    end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
+    scaled = Accelerogram(ground.step, factor * ground.acceleration)
+    sizes = {name: size * (factor if name != "scale" else 1.0) for name, size in measures.items()}
+    cut_share = 0.0 if duration >= length else float(1 - shares[end])
+    return SuiteRecord(named.name, scaled, steps * envelope.step, sizes, cut_share)
+
+
+def under(structure: Structure, record: SuiteRecord) -> Structure:
+    """The structure moved by a record."""
+    assert structure.linear is not None
+    return replace(structure, model=replace(structure.linear, ground=record.ground))
+
+
+def stages(structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord]) -> list[Stage]:
+    """A stage for each record, the longest first."""
+    longest = sorted(records, key=lambda record: -record.duration)
+    return [_stage(structure, task, record) for record in longest]
+
+
+def _stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stage:
+    moved = under(structure, record)
+    of_record = replace(task, name=record.name, duration=record.duration)
+    inputs = [moved.model, moved.numbers, of_record]
+    return Stage(stage_name(record), inputs, ("fuzzy", "frame"), partial(compute, of_record, moved))
+
+
+def stage_name(record: SuiteRecord) -> str:
+    """Name of the files of a record's result."""
+    return f"record_{record.name}"
+
+
+def compute(task: EnvelopeTask, structure: Structure, work: Work) -> StageResult:
+    """Peaks of the outputs under one record."""
+    return StageResult({"peak": by_output(task.close_peaks(structure, work))})
+
+
+def peaks_by_record(
+    results: Mapping[str, StageResult], records: Sequence[SuiteRecord], alpha: Sequence[float]
+) -> dict[str, Peaks]:
+    """Peaks under each record by its name."""
+    return {
+        record.name: peaks_of(results[stage_name(record)].document["peak"], alpha)
+        for record in records
+    }
+
+
+def motion(
+    peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal
+) -> SuiteMotion:
+    """Motions under all records, to which questions are put."""
+    measures = {record.name: record.measures for record in records}
+    return SuiteMotion(mode.period, mode.ratio, measures, peaks)
+
+
+def any_record(peaks: Mapping[str, Peaks]) -> Peaks:
+    """Peaks under whichever record is the worst for each structure.
+
+    The peak of a structure is the largest over the records, so that each end is.
+    """
+    first = next(iter(peaks.values()))
+    ends = {
+        name: np.max([getattr(x, name) for x in peaks.values()], axis=0)
+        for name in ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+    }
+    columns = zip(*(x.natures for x in peaks.values()), strict=True)
+    return replace(first, natures=tuple(map(Nature.weakest, columns)), **ends)
+
+
+def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal) -> Document:
+    """Measures and peaks of each record, and mean, median and 84 % of each output's peaks."""
+    first = next(iter(peaks.values()))
+    outputs = {
+        name: {
+            "proved": statistics(np.stack([one.most(name).upper for one in peaks.values()])),
+            "reached": statistics(np.stack([one.most(name).lower for one in peaks.values()])),
+        }
+        for name in first.outputs
+    }
+    return {
+        "period_s": mode.period,
+        "damping_ratio": mode.ratio,
+        "alpha": first.alpha,
+        "records": {
+            record.name: {
+                "duration_s": record.duration,
+                "cut_share": record.cut_share,
+                "measures": dict(record.measures),
+                "peak": by_output(peaks[record.name]),
+            }
+            for record in records
+        },
+        "statistics": outputs,
+    }
+
+
+def statistics(values: Array) -> Document:
+    """Mean and quantiles over records of values (records, levels), each by level."""
+    return {
+        name: values.mean(0) if share is None else np.quantile(values, share, axis=0)
+        for name, share in QUANTILES.items()
+    }

@@ -1,0 +1,116 @@
+"""A suite of records: measures, scaling, peaks by record, fragility against its closed form."""
+
+import json
+
+import numpy as np
+import pytest
+
+from alphacut.case.load import load
+from alphacut.entry import main
+from alphacut.io.problem import BadInput
+from alphacut.records.spectrum import spectral_acceleration
+from alphacut.stages.suite import nominal_mode, suite
+
+CASE = """
+title = "One storey under two records"
+stages = ["envelope"]
+[frame]
+stiffness = ["8 MN/m ± 4 %"]
+masses = ["20 t"]
+damping_ratio = "5 %"
+outputs = ["drift1"]
+[records]
+files = ["one.csv", "two.csv"]
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.01 s"
+[fragility]
+limits = ["drift1 <= 10 mm"]
+measure = "PGA"
+"""
+
+
+def written(folder, text=CASE):
+    for name, seed, size in (("one", 1, 1.0), ("two", 2, 3.0)):
+        samples = size * np.random.default_rng(seed).normal(size=80)
+        rows = "".join(f"{0.02 * k:.2f},{x:.6f}\n" for k, x in enumerate(samples))
+        (folder / f"{name}.csv").write_text(f"time [s],acceleration [m/s^2]\n{rows}")
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def records_of(folder, old="", new=""):
+    content = load(written(folder, CASE.replace(old, new))).content
+    return suite(content.records, content.envelope, content.structure), content.structure
+
+
+@pytest.mark.parametrize(
+    ("scale", "measure", "value"),
+    [('"PGA = 0.3 g"', "PGA", 0.3 * 9.80665), ('"Sa(T1) = 2 m/s^2"', "Sa(T1)", 2.0)],
+)
+def test_records_are_scaled_to_a_measure(tmp_path, scale, measure, value):
+    records, structure = records_of(tmp_path, "[envelope]", f"scale = {scale}\n[envelope]")
+    mode = nominal_mode(structure)
+    assert mode.period == pytest.approx(2 * np.pi * np.sqrt(20e3 / 8e6))
+    assert mode.ratio == pytest.approx(0.05)
+    for record in records:
+        assert record.measures[measure] == pytest.approx(value)
+        size = spectral_acceleration(record.ground, mode.period, mode.ratio)
+        assert record.measures["Sa(T1)"] == pytest.approx(size)
+
+
+def test_each_record_has_its_length_and_five_periods_unless_cut(tmp_path):
+    records, structure = records_of(tmp_path)
+    free = 1.58 + 5 * nominal_mode(structure).period
+    assert [record.duration for record in records] == pytest.approx([free] * 2, abs=0.01)
+    cut, _ = records_of(tmp_path, "[envelope]", 'longest = "0.5 s"\n[envelope]')
+    assert [record.duration for record in cut] == pytest.approx([0.5] * 2)
+    assert all(0.3 < record.cut_share < 0.95 for record in cut)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("one.csv", "none*.csv", "files or patterns"),
+        ('"two.csv"', '"one.csv"', "each file once"),
+        ("[records]", "[records]\nscale = 0", "a factor above 0"),
+        ("[records]", '[records]\nscale = "PGV = 1 m/s"', "a factor above 0"),
+        ("[records]", '[records]\ntrim = ["3 s", "1 s"]', "two times"),
+        ('[records]\nfiles = ["one.csv", "two.csv"]', "", "nothing moves the frame"),
+    ],
+)
+def test_what_makes_no_suite_is_one_line(tmp_path, old, new, message):
+    with pytest.raises(BadInput) as caught:
+        records_of(tmp_path, old, new)
+    assert message in str(caught.value)
+
+
+def test_a_bad_record_is_named_before_anything_is_computed(tmp_path, capsys):
+    path = written(tmp_path)
+    (tmp_path / "two.csv").write_text("time [s],acceleration [m/s^2]\n0,0\n0.02,x\n")
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert "two.csv, line 3" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
+    path, out = written(tmp_path), tmp_path / "out"
+    assert main(["run", str(path), "--out", str(out), "--no-figures"]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    answer, records = summary["fragility"]["limits"]["drift1"], summary["records"]["records"]
+    assert answer["nature"] == "guaranteed"
+    grounds = {r.name: r for r in records_of(tmp_path)[0]}
+    for row, (name, record) in enumerate(records.items()):
+        exact = []
+        for k in np.linspace(0.96, 1.04, 41) * 8e6:
+            period = 2 * np.pi * np.sqrt(20e3 / k)
+            peak = spectral_acceleration(grounds[name].ground, period, 0.05) / (k / 20e3)
+            exact.append(record["measures"]["PGA"] * 0.01 / peak)
+        low, high = (answer["critical"][end][0][row] for end in ("low", "high"))
+        assert low <= min(exact) * 1.004  # peaks of spectra are read 0.3 % low at most
+        assert max(exact) * 0.996 <= high
+        assert high < 1.3 * max(exact)
+        assert low > 0.9 * min(exact)
