@@ -1,6 +1,7 @@
 """PETSc's own options reach it from the command line and print to standard error alone."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -56,3 +57,19 @@ def test_a_petsc_of_complex_numbers_is_refused():
     require_real(np.float64)
     with pytest.raises(RefusedError, match="PETSc is built for complex numbers"):
         require_real(np.complex128)
+
+
+def test_a_complex_build_ends_in_one_line_before_dolfinx_is_imported(tmp_path):
+    fake = tmp_path / "petsc4py"
+    fake.mkdir()
+    (fake / "__init__.py").write_text("def init(arguments): pass\n")
+    (fake / "PETSc.py").write_text("import numpy\n\nScalarType = numpy.complex128\n")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    command = [sys.executable, *SOLVE, "--method", "prism"]
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "PETSc is built for complex numbers" in done.stderr
