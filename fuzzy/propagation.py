@@ -89,6 +89,12 @@ def propagate(
         RefusedError: An argument is wrong, or the budget does not carry the method.
         CampaignError: Samples failed; the others were run first, and are in the store.
         FailedError: The store cannot be written, a worker died, or a cut has no sample.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval, Triangular
+        >>> inputs = {"x": Triangular(1, 2, 4), "y": Interval(3, 5)}
+        >>> propagate(lambda x, y: x * y, inputs, alpha=[0, 1], progress=False).bounds()
+        Ends(lower=array([3., 6.]), upper=array([20., 10.]))
     """
     start = perf_counter()
     domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
@@ -196,6 +202,13 @@ def width_shares(
 
     Raises:
         RefusedError: A group names no input.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval, Reduced
+        >>> inputs = {"a": Interval(0, 1), "b": Interval(0, 3)}
+        >>> total = lambda fuzzy: propagate(lambda a, b: a + b, fuzzy, Reduced(), alpha=[0])
+        >>> width_shares(total, inputs).share.ravel()
+        array([0.25, 0.75])
     """
     numbers = fuzzy_inputs(inputs)
     members = groups or {name: (name,) for name in numbers}

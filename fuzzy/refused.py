@@ -50,6 +50,10 @@ class RefusedError(ValueError):
         value: The value as the caller wrote it; None where it is missing.
         allowed: The allowed values, such as "values in (0, 1]".
         cure: What to do, where `allowed` does not say it.
+
+    Example:
+        >>> RefusedError("mesh.size", -1, "values in (0, 1]")
+        RefusedError('mesh.size is -1; allowed: values in (0, 1]')
     """
 
     def __init__(self, key: str, value: object, allowed: str, cure: str = "") -> None:
@@ -68,6 +72,10 @@ class FailedError(RuntimeError):
     Args:
         what: What failed, with its numbers.
         cure: What the caller can change.
+
+    Example:
+        >>> FailedError("no convergence after 20 steps", "take a smaller step")
+        FailedError('no convergence after 20 steps; take a smaller step')
     """
 
     def __init__(self, what: str, cure: str = "") -> None:

@@ -30,7 +30,12 @@ _MAX_LINES = 25
 
 
 class Nature(StrEnum):
-    """What bounds promise, from the weakest to the strongest."""
+    """What bounds promise, from the weakest to the strongest.
+
+    Example:
+        >>> Nature.ATTAINED.sentence
+        'Some inputs reach these bounds; the true range may be wider.'
+    """
 
     ATTAINED = "attained"
     ESTIMATED = "estimated"
@@ -113,6 +118,12 @@ class Bounds:
         RefusedError: Levels do not rise within [0, 1], shapes differ, an end is not finite or an
             error negative.
         FailedError: Attained bounds leave proved ones, or cuts are not nested: the method is wrong.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval, Reduced, propagate
+        >>> bounds = propagate(lambda x: 2 * x, {"x": Interval(1, 3)}, Reduced(), alpha=[0])
+        >>> bounds.bounds().lower.item(), bounds.bounds().upper.item()
+        (2.0, 6.0)
     """
 
     alpha: Array

@@ -24,7 +24,7 @@ from alphacut.stochastic.fit.pbox import PBox, least_pbox
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
-from alphacut.stochastic.sections import Section, Simulated, reduced_radii, with_cells
+from alphacut.stochastic.sections import ParticleCells, Simulated, reduced_radii, with_cells
 from alphacut.stochastic.theta.quadrature import gauss_rule
 
 SHARE_WITHIN = 0.9927  # share of the area between the limits where none are set (Fig. 12)
@@ -38,7 +38,7 @@ FRACTION_EXPONENT = 1.5  # above 1, since the limit cuts off more than in propor
 
 
 @dataclass(frozen=True)
-class Study:
+class MicrostructureStudy:
     """Settings of a study: from a microstructure to a radius map.
 
     Args:
@@ -106,8 +106,8 @@ class Microstructure:
             probability.
     """
 
-    study: Study
-    sections: list[Section]
+    study: MicrostructureStudy
+    sections: list[ParticleCells]
     sample: AreaWeighted
     truncated: AreaWeighted
     pbox: PBox
@@ -142,7 +142,7 @@ class Microstructure:
 
 
 def study(
-    case: Study,
+    case: MicrostructureStudy,
     *,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
@@ -167,8 +167,8 @@ def study(
 
 
 def _sections(
-    case: Study, executor: Executor | None, progress: Callable[[float], None]
-) -> list[Section]:
+    case: MicrostructureStudy, executor: Executor | None, progress: Callable[[float], None]
+) -> list[ParticleCells]:
     """Sections of the source; packings of spheres are made denser until the map's fraction fits."""
     source = case.source
     if not isinstance(source, Simulated):
@@ -190,7 +190,9 @@ def _sections(
     return best
 
 
-def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, SlopeBand, float]:
+def fitted_map(
+    case: MicrostructureStudy, sample: AreaWeighted
+) -> tuple[AreaWeighted, PBox, SlopeBand, float]:
     """Sample within the limits, p-box, band of the slopes and of the distribution function.
 
     Raises:
@@ -216,7 +218,7 @@ def fitted_map(case: Study, sample: AreaWeighted) -> tuple[AreaWeighted, PBox, S
     return truncated, pbox, slopes, band
 
 
-def _mapped_fraction(case: Study, sample: AreaWeighted) -> float:
+def _mapped_fraction(case: MicrostructureStudy, sample: AreaWeighted) -> float:
     """Volume fraction of the map fitted to a sample within its own limits."""
     lower, upper = case.limits_of(sample)
     fit = HermiteFit(lower, upper)

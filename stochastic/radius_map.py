@@ -25,6 +25,11 @@ class RadiusMap(Protocol):
     """Random radius of the cell problem: the law of θ and the map from θ.
 
     Any object with these two will do; every model of the cell calls `require_map`.
+
+    Example:
+        >>> radius_map: RadiusMap = HermiteMap(0.2, 0.1, 0.8, 0.2)
+        >>> radius_map.distribution
+        TruncatedNormal(lower=-3.0, upper=3.0)
     """
 
     @property
@@ -40,6 +45,9 @@ def require_map(radius_map: RadiusMap) -> None:
 
     Raises:
         RefusedError: The map or its law is refused.
+
+    Example:
+        >>> require_map(HermiteMap(0.2, 0.1, 0.8, 0.2))
     """
     law = radius_map.distribution
     require_support(law.lower, law.upper)
@@ -65,6 +73,10 @@ class HermiteMap:
 
     Raises:
         RefusedError: r(θ) leaves (0, 1) somewhere on the support.
+
+    Example:
+        >>> HermiteMap(a1=0.2, a2=0.1, a3=0.8, a4=0.2)([-3, 0, 3])
+        array([0.2   , 0.4875, 0.8   ])
     """
 
     a1: float

@@ -20,7 +20,7 @@ PATCHES = 5  # a single section is cut into 5 × 5 patches, which the bootstrap 
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class ParticleCells:
     """Particles of one section or packing with their cells.
 
     Args:
@@ -44,14 +44,14 @@ class Section:
         return np.asarray(2 * self.particles.radii[self.counted] / sides)
 
 
-def with_cells(particles: Particles) -> Section:
+def with_cells(particles: Particles) -> ParticleCells:
     """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
     if particles.shape != DISCS:
         indices = np.arange(len(particles), dtype=np.intp)
-        return Section(particles, indices, cell_volumes(particles), np.ones(len(particles)))
+        return ParticleCells(particles, indices, cell_volumes(particles), np.ones(len(particles)))
     diagram = apollonius(particles)
     counted, weight = counted_cells(diagram)
-    return Section(particles, counted, diagram.areas[counted], weight, diagram)
+    return ParticleCells(particles, counted, diagram.areas[counted], weight, diagram)
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ class Simulated:
         *,
         executor: Executor | None = None,
         progress: Callable[[float], None] | None = None,
-    ) -> list[Section]:
+    ) -> list[ParticleCells]:
         """All packings with their cells; the k-th depends on `seed` and k only."""
         seeds = np.random.SeedSequence(seed).spawn(self.packings)
-        sections: list[Section] = []
+        sections: list[ParticleCells] = []
         for section in (executor.map if executor else map)(
             _packing_with_cells, [self.packing] * self.packings, seeds
         ):
@@ -85,7 +85,7 @@ class Simulated:
         return sections
 
 
-def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
+def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     """r_n of all counted cells, weighted by area or volume, grouped by section or patch.
 
     Raises:
@@ -106,12 +106,12 @@ def reduced_radii(sections: Sequence[Section]) -> AreaWeighted:
     return sample
 
 
-def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> Section:
+def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> ParticleCells:
     """Random packing with its cells."""
     return with_cells(packing.make(np.random.default_rng(seed)))
 
 
-def _patches(section: Section) -> Rows:
+def _patches(section: ParticleCells) -> Rows:
     """Numbers of the patches in which the counted cells lie, shape (k,)."""
     particles = section.particles
     patch = (PATCHES * particles.centres[section.counted] / particles.size).astype(int)

@@ -12,12 +12,12 @@ from alphacut.case.material import (
     ImageCell,
     Mesh,
     ModulusSection,
-    RadiusMap,
+    RadiusMapSection,
     RoundCell,
 )
 from alphacut.case.matrices import MatricesSection
 from alphacut.case.motion import Envelope, Identify, Study
-from alphacut.case.particles import Microstructure
+from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
@@ -41,8 +41,8 @@ class Content(Section):
     stages: Annotated[tuple[Stage, ...], Some, after(unlike)] = Field(
         description="stages that `alphacut run` computes"
     )
-    microstructure: Microstructure | None = None
-    radius: RadiusMap | None = None
+    microstructure: MicrostructureSection | None = None
+    radius: RadiusMapSection | None = None
     cell: Cell | None = None
     mesh: Mesh = Mesh()
     modulus: ModulusSection = ModulusSection()

@@ -40,7 +40,7 @@ SHAPES = (
 )
 
 
-class RadiusMap(Section):
+class RadiusMapSection(Section):
     """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
 
     theta: Annotated[tuple[Theta, Theta], after(rising)] = Field(
@@ -233,7 +233,7 @@ class ImageCell(Section):
         return self
 
 
-AnyRadius = RadiusMap | FractionMap
+AnyRadius = RadiusMapSection | FractionMap
 """The random radius of a case, of [radius] or of cell.fraction."""
 Cell = Annotated[
     Annotated[RoundCell, Tag("<round>")] | Annotated[ImageCell, Tag("<image>")],

@@ -8,16 +8,16 @@ from pydantic import Field, model_validator
 
 from alphacut.case.types import CaseFile, Length, Quantity, Section, Share, after, rising
 from alphacut.fuzzy.refused import require
-from alphacut.stochastic.microstructure import Study
+from alphacut.stochastic.microstructure import MicrostructureStudy
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
-from alphacut.stochastic.particles.packing import Packing as Specification
+from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii, MeasuredRadii, RadiusLaw
 from alphacut.stochastic.sections import Simulated
 
 
-class Packing(Section):
+class PackingSection(Section):
     """Particles packed at random in a periodic box: discs, or spheres where the cell has spheres.
 
     Radii are log-normal between two ends (eq. 11), or those of a file.
@@ -46,7 +46,7 @@ class Packing(Section):
         else:
             radii = MeasuredRadii.read(self.file)
         shape = SPHERES if spheres else DISCS
-        each = Specification(self.particles, self.fraction, radii, shape=shape)
+        each = Packing(self.particles, self.fraction, radii, shape=shape)
         return Simulated(each, self.packings)
 
     @model_validator(mode="after")
@@ -81,7 +81,7 @@ class Photograph(Section):
         return SectionImage(self.file, self.pixel)
 
 
-class Microstructure(Section):
+class MicrostructureSection(Section):
     """Particles from which the random radius comes: one of packing, circles and image."""
 
     seed: Annotated[int, Quantity(least=0, most=1e18, whole=True)] = Field(
@@ -90,12 +90,12 @@ class Microstructure(Section):
     limits: Annotated[tuple[Share, Share], after(rising)] | None = Field(
         default=None, description="lower and upper limit of r/a"
     )
-    packing: Packing | None = None
+    packing: PackingSection | None = None
     circles: Circles | None = None
     image: Photograph | None = None
 
     @property
-    def sources(self) -> list[Packing | Circles | Photograph]:
+    def sources(self) -> list[PackingSection | Circles | Photograph]:
         """The section on the particles; one, once this is built."""
         return [x for x in (self.packing, self.circles, self.image) if x is not None]
 
@@ -106,10 +106,10 @@ class Microstructure(Section):
         require(count == 1, "microstructure", f"with {count} of them" if count else None, allowed)
         return self
 
-    def study(self, *, spheres: bool) -> Study:
+    def study(self, *, spheres: bool) -> MicrostructureStudy:
         """The way from the particles to the radius map.
 
         Args:
             spheres: Whether packed particles are spheres.
         """
-        return Study(self.sources[0].source(spheres), self.limits, self.seed)
+        return MicrostructureStudy(self.sources[0].source(spheres), self.limits, self.seed)

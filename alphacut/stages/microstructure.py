@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.case.material import RadiusMap
-from alphacut.case.particles import Microstructure as Section
+from alphacut.case.material import RadiusMapSection
+from alphacut.case.particles import MicrostructureSection
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
@@ -17,7 +17,7 @@ from alphacut.stochastic.microstructure import Microstructure, study
 from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
 
 
-def stage(section: Section, spheres: bool, figures: bool = True) -> Stage:
+def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage:
     """The stage of some particles; in a folder it writes radius.toml and figures as well."""
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
@@ -25,12 +25,14 @@ def stage(section: Section, spheres: bool, figures: bool = True) -> Stage:
     return Stage("microstructure", inputs, ("stochastic",), compute)
 
 
-def compute_map(section: Section, spheres: bool, figures: bool, work: Work) -> StageResult:
+def compute_map(
+    section: MicrostructureSection, spheres: bool, figures: bool, work: Work
+) -> StageResult:
     """The fuzzy radius map with its data; the same for any number of workers.
 
     Raises:
         RefusedError: Measured data have no meaning.
-        FailedError: Particles find no place.
+        FailedError: The packing is too dense.
     """
     with pool(work.workers) as executor:
         map_of = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
@@ -40,9 +42,9 @@ def compute_map(section: Section, spheres: bool, figures: bool, work: Work) -> S
     return StageResult(numbers, to_dataset(map_of))
 
 
-def radius_of(result: StageResult) -> RadiusMap:
+def radius_of(result: StageResult) -> RadiusMapSection:
     """The section [radius] that the particles give."""
-    return RadiusMap.model_validate(result.document["radius"])
+    return RadiusMapSection.model_validate(result.document["radius"])
 
 
 def write(map_of: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:

@@ -15,7 +15,7 @@ from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
 from alphacut.rve.image.solve import solve_image
 from alphacut.rve.mesh.outline import circle
 from alphacut.stochastic import HermiteMap
-from alphacut.stochastic.microstructure import Study, fitted_map
+from alphacut.stochastic.microstructure import MicrostructureStudy, fitted_map
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Particles
 from alphacut.stochastic.particles.radius_laws import LogNormalRadii
@@ -178,7 +178,7 @@ class Sections:
     def stated(self) -> Stated:
         """Limits, slopes and shares of the map."""
         sample = reduced_radii([with_cells(particles) for particles in self.packings])
-        _, pbox, _, band = fitted_map(Study(self.source), sample)
+        _, pbox, _, band = fitted_map(MicrostructureStudy(self.source), sample)
         numbers = {"a1": pbox.fit.a1, "a3": pbox.fit.a3, "band": band}
         numbers |= {f"a2[{i}]": x for i, x in enumerate(pbox.a2)}
         numbers |= {f"a4[{i}]": x for i, x in enumerate(pbox.a4)}

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.stochastic.microstructure import Study, study
+from alphacut.stochastic.microstructure import MicrostructureStudy, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.packing import Packing
 from alphacut.stochastic.particles.particles import SPHERES
@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     circles = LogNormalRadii(1e-3, 1e-2).sample(CIRCLES, np.random.default_rng(options.seed))
     law = unfolded(circles, visible=1e-3, largest=1e-2)
     packing = Packing(options.spheres, FRACTION, law, shape=SPHERES)
-    result = study(Study(Simulated(packing, options.packings), seed=options.seed))
+    result = study(MicrostructureStudy(Simulated(packing, options.packings), seed=options.seed))
     print(fragment(summary(result)), end="")
     print(f"# share of the volume beyond r_n = {SPHERES.reach:g}: {result.share_capped:.4f}")
 

@@ -92,6 +92,14 @@ class Store:
 
     Raises:
         RefusedError: The file is not a store, or it cannot be opened or created.
+
+    Example:
+        >>> from tempfile import TemporaryDirectory
+        >>> from alphacut.fuzzy import Interval, Reduced, propagate
+        >>> with TemporaryDirectory() as folder, Store(f"{folder}/samples.db") as store:
+        ...     options = {"store": store, "identity": {"version": 1}, "alpha": [0]}
+        ...     propagate(lambda x: x, {"x": Interval(0, 1)}, Reduced(), **options).evaluations
+        2
     """
 
     def __init__(self, path: str | Path) -> None:

@@ -54,6 +54,11 @@ def from_data(
 
     Raises:
         RefusedError: An argument is wrong, or the values decide nothing.
+
+    Example:
+        >>> number = from_data([2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05], "median", bounds=(0, 9))
+        >>> number.cut(0.05)
+        Cut(lower=1.88, upper=2.1)
     """
     quantile = _quantile(claim)
     if law is not None:

@@ -33,6 +33,12 @@ def jointly(
     Raises:
         RefusedError: Claims of different kinds are joined without a meaning, or one number stands
             for several independent inputs.
+
+    Example:
+        >>> from alphacut.fuzzy import from_data
+        >>> numbers = {name: from_data([1, 2, 3, 4, 5, 6, 7], "median") for name in ("a", "b")}
+        >>> numbers["a"].decided, jointly(numbers)["a"].decided
+        (0.015625, 0.03125)
     """
     claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
     if not claimed:

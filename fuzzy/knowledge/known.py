@@ -31,6 +31,10 @@ class Knowledge:
 
     Raises:
         RefusedError: A sign is neither 1 nor −1, or the number of tests no whole number.
+
+    Example:
+        >>> Knowledge(signs={"load": 1}, source="by statics").words
+        ('the signs of load hold, by statics',)
     """
 
     signs: Mapping[str, int | Mapping[str, int]] = field(default_factory=dict)

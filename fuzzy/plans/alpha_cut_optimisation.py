@@ -33,6 +33,13 @@ class Optimisation:
 
     Raises:
         RefusedError: A number is not positive.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval, propagate
+        >>> inputs, method = {"x": Interval(0, 1)}, Optimisation()
+        >>> bounds = propagate(lambda x: (x - 0.3) ** 2, inputs, method, alpha=[0])
+        >>> bounds.lower.round(6).item(), bounds.upper.round(6).item()
+        (0.0, 0.49)
     """
 
     starts: int = 3

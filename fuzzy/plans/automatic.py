@@ -38,6 +38,12 @@ class Automatic:
 
     Raises:
         RefusedError: A value is out of range.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval, propagate
+        >>> bounds = propagate(lambda x: x * (1 - x), {"x": Interval(0, 1)}, Automatic(), alpha=[0])
+        >>> bounds.upper.round(6).item(), str(bounds.nature)
+        (0.25, 'estimated')
     """
 
     uncovered: float = 0.002

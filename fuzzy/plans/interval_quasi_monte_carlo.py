@@ -43,6 +43,12 @@ class RandomInput:
         quantile: From a probability and the parameters by name to a quantile, monotone in each
             parameter.
         parameters: The fuzzy parameters by name; a plain number is crisp.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval
+        >>> uniform = RandomInput(lambda u, start: start + u, {"start": Interval(0, 1)})
+        >>> uniform.at(0.5, [0.0]).support
+        Cut(lower=0.5, upper=1.5)
     """
 
     quantile: Callable[..., float]
@@ -148,6 +154,14 @@ class IntervalQuasiMonteCarlo:
         seed: Seed of the scramblings.
         method: How the model is bounded over the box of each point; corners, the default, are exact
             where the model is monotone, and too narrow where it is not.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval
+        >>> uniform = RandomInput(lambda u, start: start + u, {"start": Interval(0, 1)})
+        >>> method = IntervalQuasiMonteCarlo(64)
+        >>> mean = method.run(lambda r: r, {"r": uniform}, {}, alpha=[0]).mean()
+        >>> mean.lower.round(2).item(), mean.upper.round(2).item()
+        (0.5, 1.5)
     """
 
     points: int = 256

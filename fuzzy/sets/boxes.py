@@ -17,7 +17,12 @@ _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
 
 def levels(steps: int) -> tuple[float, ...]:
-    """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five."""
+    """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five.
+
+    Example:
+        >>> levels(4)
+        (0.0, 0.25, 0.5, 0.75, 1.0)
+    """
     real("steps between levels", steps, positive=True, whole=True)
     return tuple(step / steps for step in range(steps + 1))
 

@@ -34,6 +34,13 @@ class Linear:
 
     Raises:
         RefusedError: A weight or the bound is not finite.
+
+    Example:
+        >>> from alphacut.fuzzy import Interval, Optimisation, propagate
+        >>> inputs, half = {"x": Interval(0, 1), "y": Interval(0, 1)}, [Linear({"x": 1, "y": 1}, 1)]
+        >>> area = propagate(lambda x, y: x * y, inputs, Optimisation(), alpha=[0], interactions=half)
+        >>> area.upper.round(6).item()
+        0.25
     """
 
     weights: Mapping[str, float]
@@ -72,6 +79,14 @@ class Ellipsoidal:
     Raises:
         RefusedError: No two inputs are named, a correlation is out of range, or correlations
             contradict each other.
+
+    Example:
+        >>> from alphacut.fuzzy import Optimisation, Triangular, propagate
+        >>> inputs = {name: Triangular(-1, 0, 1) for name in ("x", "y")}
+        >>> pair = [Ellipsoidal({("x", "y"): 0.5})]
+        >>> sum_ = propagate(lambda x, y: x + y, inputs, Optimisation(), alpha=[0], interactions=pair)
+        >>> sum_.upper.round(4).item()
+        1.7321
     """
 
     correlation: Mapping[tuple[str, str], float]

@@ -37,7 +37,12 @@ class Cuts(NamedTuple):
 
 
 class FuzzyNumber(ABC):
-    """A normal, convex fuzzy set over the reals whose membership is piecewise linear."""
+    """A normal, convex fuzzy set over the reals whose membership is piecewise linear.
+
+    Example:
+        >>> Triangular(1, 2, 4).membership([1.5, 2.0, 5.0])
+        array([0.5, 1. , 0. ])
+    """
 
     @property
     @abstractmethod
@@ -134,7 +139,12 @@ class _Corners(FuzzyNumber):
 
 @dataclass(frozen=True)
 class Crisp(_Corners):
-    """A single value of membership 1."""
+    """A single value of membership 1.
+
+    Example:
+        >>> Crisp(2.0).support
+        Cut(lower=2.0, upper=2.0)
+    """
 
     value: float
 
@@ -147,6 +157,10 @@ class Interval(_Corners):
 
     Raises:
         RefusedError: The ends are not finite or not in order.
+
+    Example:
+        >>> Interval(1.0, 2.0).cut(0.5)
+        Cut(lower=1.0, upper=2.0)
     """
 
     lower: float
@@ -166,6 +180,10 @@ class Triangular(_Corners):
 
     Raises:
         RefusedError: The three are not finite or not in order.
+
+    Example:
+        >>> Triangular(1, 2, 4).cut(0.5)
+        Cut(lower=1.5, upper=3.0)
     """
 
     lower: float
@@ -187,6 +205,10 @@ class Trapezoidal(_Corners):
 
     Raises:
         RefusedError: The four are not finite or not in order.
+
+    Example:
+        >>> Trapezoidal(0, 1, 2, 4).cut(0.5)
+        Cut(lower=0.5, upper=3.0)
     """
 
     lower: float
@@ -233,6 +255,10 @@ class PiecewiseLinear(_Nested):
     Raises:
         RefusedError: Lengths differ, levels do not rise from 0 to 1, or cuts are not finite, nested
             intervals.
+
+    Example:
+        >>> PiecewiseLinear((0, 0.5, 1), lower=(0, 1, 2), upper=(5, 3, 2)).cut(0.75)
+        Cut(lower=1.5, upper=2.5)
     """
 
     to_one = True

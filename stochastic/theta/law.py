@@ -20,6 +20,11 @@ class ThetaLaw(Protocol):
     """Law of θ on a bounded support, with a density.
 
     Laws that can be hashed (frozen dataclasses) have their quadrature rules kept.
+
+    Example:
+        >>> law: ThetaLaw = TruncatedNormal(-2.0, 2.0)
+        >>> law.cdf([-2.0, 0.0, 2.0])
+        array([0. , 0.5, 1. ])
     """
 
     @property
@@ -63,6 +68,10 @@ class TruncatedNormal:
 
     Raises:
         RefusedError: The ends are not finite or not in order.
+
+    Example:
+        >>> TruncatedNormal().quantile(0.5).item()
+        0.0
     """
 
     lower: float = -3.0

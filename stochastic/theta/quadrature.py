@@ -29,6 +29,11 @@ class ThetaRule:
     Args:
         nodes: θ, shape (n,), rising.
         weights: shape (n,); their sum is 1.
+
+    Example:
+        >>> import numpy as np
+        >>> ThetaRule(np.array([-1.0, 1.0]), np.array([0.5, 0.5])).mean(np.array([2.0, 4.0])).item()
+        3.0
     """
 
     nodes: Array
@@ -45,6 +50,11 @@ def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRu
     The weights are scaled to the sum 1, so that a constant is its own mean whatever the number of
     layers; where the density is smooth, the error of the mean of a smooth function falls with the
     power 2·points of the layer height.
+
+    Example:
+        >>> from alphacut.stochastic import TruncatedNormal
+        >>> len(layered_rule(TruncatedNormal(), layers=4, points=2).nodes)
+        8
     """
     levels = np.asarray(np.linspace(distribution.lower, distribution.upper, layers + 1), float)
     return level_rule(distribution, levels, points=points)
@@ -77,6 +87,12 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
 
     Raises:
         RefusedError: There is no point, or density and distribution function disagree.
+
+    Example:
+        >>> from alphacut.stochastic import TruncatedNormal
+        >>> rule = gauss_rule(TruncatedNormal(), points=3)
+        >>> rule.mean(rule.nodes**2).round(4).item()
+        0.9733
     """
     real("points", points, whole=True, least=1)
     fine = _fine_rule(distribution, 16 + 2 * points)

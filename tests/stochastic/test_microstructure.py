@@ -16,7 +16,7 @@ from alphacut.stochastic import microstructure
 from alphacut.stochastic.figures.all import draw
 from alphacut.stochastic.fit.area_weighted import AreaWeighted
 from alphacut.stochastic.fit.pbox import PBox, least_pbox
-from alphacut.stochastic.microstructure import Study, fitted_map, study
+from alphacut.stochastic.microstructure import MicrostructureStudy, fitted_map, study
 from alphacut.stochastic.microstructure_summary import fragment, summary
 from alphacut.stochastic.particles.circles_csv import CircleFile
 from alphacut.stochastic.particles.image import SectionImage
@@ -29,7 +29,7 @@ from alphacut.stochastic.tessellation.delaunay import neighbours
 
 EQUAL, TENFOLD = LogNormalRadii(1e-3, 1e-3), LogNormalRadii(1e-3, 1e-2)
 SOURCE = Simulated(Packing(300, 0.2, TENFOLD), 12)
-SMALL = Study(SOURCE, limits=(0.15, 0.85), seed=3)
+SMALL = MicrostructureStudy(SOURCE, limits=(0.15, 0.85), seed=3)
 needs_voro = pytest.mark.skipif(not shutil.which("voro++"), reason="needs Voro++")
 
 
@@ -267,9 +267,9 @@ def test_study_of_measured_circles(tmp_path):
     packing = Packing(900, 0.2, TENFOLD).make(np.random.default_rng(8))
     table = 1e3 * np.column_stack([packing.centres, packing.radii])
     rows = "".join(f"{x!r},{y!r},{r!r}\n" for x, y, r in table.tolist())
-    truth = study(Study(Simulated(Packing(900, 0.2, TENFOLD), 6)))
+    truth = study(MicrostructureStudy(Simulated(Packing(900, 0.2, TENFOLD), 6)))
     text, size = "x [mm],y [mm],r [mm]\n" + rows, tuple(packing.size)
-    measured = study(Study(circle_file(tmp_path, text, size=size)))
+    measured = study(MicrostructureStudy(circle_file(tmp_path, text, size=size)))
     assert measured.sample.mean == pytest.approx(truth.sample.mean, abs=0.03)
     far = replace(measured.study, source=circle_file(tmp_path, GOOD, size=(9.0, 9.0)))
     with pytest.raises(RefusedError, match="larger section"):
@@ -277,16 +277,16 @@ def test_study_of_measured_circles(tmp_path):
 
 
 def test_cells_as_tight_as_no_square_are_counted_or_refused():
-    dense = study(Study(Simulated(Packing(300, 0.55, LogNormalRadii(1e-3, 2e-3)), 5)))
+    dense = study(MicrostructureStudy(Simulated(Packing(300, 0.55, LogNormalRadii(1e-3, 2e-3)), 5)))
     assert dense.limits[1] == 0.99 < dense.sample.values[-1]
     assert 0 < dense.share_capped < 0.05
     assert dense.share_within > 0.99
     with pytest.raises(RefusedError, match="cells tighter than r_n"):
-        study(Study(Simulated(Packing(200, 0.75, EQUAL), 5)))
+        study(MicrostructureStudy(Simulated(Packing(200, 0.75, EQUAL), 5)))
 
 
 def test_spheres_that_lose_more_than_15_percent_of_their_cells_are_refused():
-    case = Study(Simulated(Packing(200, 0.4, TENFOLD, shape=SPHERES), 5))
+    case = MicrostructureStudy(Simulated(Packing(200, 0.4, TENFOLD, shape=SPHERES), 5))
     groups = np.arange(100) % 5
     for tight, allowed in ((15, True), (16, False)):
         radii = np.r_[np.linspace(0.4, 0.9, 100 - tight), np.full(tight, 1.05)]
@@ -318,7 +318,7 @@ def test_figures_are_drawn(result, tmp_path):
 def test_spheres_take_the_same_way_and_keep_their_fraction(tmp_path):
     law = MeasuredRadii(tuple(np.linspace(1e-3, 2e-3, 20)))
     spheres = Packing(300, 0.2, law, shape=SPHERES)
-    result = study(Study(Simulated(spheres, 6), seed=2))
+    result = study(MicrostructureStudy(Simulated(spheres, 6), seed=2))
     numbers = summary(result)
     assert numbers["mean_volume_fraction_of_map"] == pytest.approx(0.2, rel=6e-3)
     assert numbers["volume_fraction_of_cells"] == pytest.approx(

@@ -22,7 +22,7 @@ from alphacut.fuzzy.refused import FailedError
 LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
 
 
-class Linear(Protocol):
+class LinearOperator(Protocol):
     """A symmetric linear map of fields, shape (loads, unknowns, rows, columns)."""
 
     def apply(self, fields: Array, /) -> Array:
@@ -42,8 +42,8 @@ class System:
         start: First guess, of the load's shape; None: zero.
     """
 
-    operator: Linear
-    preconditioner: Linear
+    operator: LinearOperator
+    preconditioner: LinearOperator
     load: Array
     scale: Array
     least: float
