@@ -198,8 +198,8 @@ class Signed:
 
     Example:
         >>> from alphacut.fuzzy import Interval, Knowledge, propagate
-        >>> rises = Knowledge(signs={"x": 1})
-        >>> cube = propagate(lambda x: x**3, {"x": Interval(0, 2)}, Signed(), alpha=[0], knowledge=rises)
+        >>> inputs, rises = {"x": Interval(0, 2)}, Knowledge(signs={"x": 1})
+        >>> cube = propagate(lambda x: x**3, inputs, Signed(), alpha=[0], knowledge=rises)
         >>> cube.upper.item(), str(cube.nature)
         (8.0, 'guaranteed')
     """

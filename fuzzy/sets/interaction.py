@@ -38,7 +38,8 @@ class Linear:
     Example:
         >>> from alphacut.fuzzy import Interval, Optimisation, propagate
         >>> inputs, half = {"x": Interval(0, 1), "y": Interval(0, 1)}, [Linear({"x": 1, "y": 1}, 1)]
-        >>> area = propagate(lambda x, y: x * y, inputs, Optimisation(), alpha=[0], interactions=half)
+        >>> options = {"alpha": [0], "interactions": half}
+        >>> area = propagate(lambda x, y: x * y, inputs, Optimisation(), **options)
         >>> area.upper.round(6).item()
         0.25
     """
@@ -83,8 +84,8 @@ class Ellipsoidal:
     Example:
         >>> from alphacut.fuzzy import Optimisation, Triangular, propagate
         >>> inputs = {name: Triangular(-1, 0, 1) for name in ("x", "y")}
-        >>> pair = [Ellipsoidal({("x", "y"): 0.5})]
-        >>> sum_ = propagate(lambda x, y: x + y, inputs, Optimisation(), alpha=[0], interactions=pair)
+        >>> options = {"alpha": [0], "interactions": [Ellipsoidal({("x", "y"): 0.5})]}
+        >>> sum_ = propagate(lambda x, y: x + y, inputs, Optimisation(), **options)
         >>> sum_.upper.round(4).item()
         1.7321
     """
