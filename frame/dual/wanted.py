@@ -9,7 +9,8 @@ from alphacut.frame.dual.blocks import Centre
 from alphacut.frame.dual.ranges import POWERS
 from alphacut.frame.dual.rest import Excitation
 from alphacut.frame.dual.structure import Classical
-from alphacut.frame.dual.waves import Grid, Oscillators
+from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.structures.linear import Accelerogram
 from alphacut.fuzzy.arrays import Array
 
 MAX_NODES = 500
@@ -44,10 +45,11 @@ def modes_wanted(
     decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
     omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
     doubt = np.zeros((n, len(allowed)))
-    tables = [Oscillators(_point(x), ground, time) for x in zip(omega, decay / omega, strict=True)]
+    sigma = -decay + 1j * omega
+    motions = {source: _motion(source, sigma, ground, time) for source in sources}
     for o, order in enumerate(structure.order):
         for s, source in enumerate(sources):
-            waves = np.stack([table.waves(source, int(order)).value.ravel() for table in tables])
+            waves = _waves(source, sigma, motions[source], int(order))
             each = []
             for power in POWERS:
                 row, share = (
@@ -63,8 +65,20 @@ def modes_wanted(
     return int(enough.argmax()) if enough.any() else n
 
 
-def _point(at: tuple[float, float]) -> Grid:
-    return Grid(np.array([at[0]]), np.array([at[1]]))
+def _motion(source: str, sigma: Array, ground: Accelerogram | None, time: Array) -> Array:
+    """ρ(σ; t) of a load, or exp(σ t), at nodes, shape (modes, T)."""
+    if source == "load" and ground is not None:
+        return np.asarray(responses_at_nodes(sigma, ground, time, 1)[0][0].T)
+    return np.asarray(np.exp(sigma[:, None] * time))
+
+
+def _waves(source: str, sigma: Array, motion: Array, order: int) -> Array:
+    """Responses to a unit share of a source, as those of `waves`, shape (modes, T)."""
+    G = sigma[:, None] ** order * motion
+    if source == "start":
+        return np.asarray(G.real - (sigma.real / sigma.imag)[:, None] * G.imag)
+    side = -1.0 if source == "load" else 1.0
+    return np.asarray(side * G.imag / sigma.imag[:, None])
 
 
 def _with_below(x: Array) -> Array:
