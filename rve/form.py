@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
 
 WHOLE = slice(None)
 """All parts of a form."""
 
 
-def measure_of(mesh: Any, cells: Array, metadata: dict[str, Any]) -> Any:
+def measure_of(mesh: Any, cells: Rows, metadata: dict[str, Any]) -> Any:
     """Measure of some cells of this rank; forms over any of them are compiled once."""
     part = [(0, np.asarray(cells, np.int32))]
     return ufl.Measure("dx", mesh, metadata=metadata, subdomain_data=part)(0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from alphacut.commands.options import Command, add_quiet, answer
 from alphacut.frame.envelope import Ends, Envelope
+from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.frame.verification.self_test import ContradictionError, Trial
 from alphacut.frame.verification.stored import stored_motions
 from alphacut.fuzzy.arrays import Array
@@ -70,11 +72,12 @@ def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document
         put_text(folder, "contradiction.csv", columns_text(error.table))
         raise
     places = {tuple(point): k for k, point in enumerate(points.tolist())}
-    named = [places[point] for x in trial.named().tolist() if (point := tuple(x)) in places]
-    files = {
+    named_points = [tuple(point) for point in trial.named().tolist()]
+    named = [places[point] for point in named_points if point in places]
+    files: dict[str, dict[str, Array]] = {
         f"{name}_motions.csv": motions_table(trial, [motions[k] for k in named]),
         f"{name}_inputs.csv": {
-            "motion": np.arange(1.0, len(named) + 1),
+            "motion": np.arange(1, len(named) + 1).astype(float),
             **{f"{x} [SI]": points[named, k] for k, x in enumerate(trial.envelope.inputs)},
         },
     }
@@ -84,7 +87,7 @@ def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document
     return {"nature": str(data.attrs["nature"]), **tested}
 
 
-def motions_table(trial: Trial, motions: list) -> dict[str, Array]:
+def motions_table(trial: Trial, motions: Sequence[LinearMotion]) -> dict[str, Array]:
     """Time and outputs of motions at the nodes, by titles of columns."""
     of, table = trial.envelope, {"time [s]": trial.envelope.time}
     for k, motion in enumerate(motions, 1):
@@ -113,8 +116,13 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
         units=tuple(x.partition("[")[2].rstrip("]") for x in labels),
         between=values.get("between"),
         attained_error=values.get("attained_error"),
-        **{name: values[name] for name in ("lower", "upper", "lower_at", "upper_at", "error")},
-        **pairs,
+        lower=values["lower"],
+        upper=values["upper"],
+        lower_at=values["lower_at"],
+        upper_at=values["upper_at"],
+        error=values["error"],
+        inner=pairs.get("inner"),
+        outer=pairs.get("outer"),
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.material import RadiusMap
+from alphacut.case.material import RadiusMapSection
 from alphacut.case.structure import Frame
 from alphacut.figures import style as look
 from alphacut.fuzzy.arrays import Array
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 SHOWN_LEVEL = 0.5
 
 
-def maps(section: RadiusMap, alpha: float) -> list[HermiteMap]:
+def maps(section: RadiusMapSection, alpha: float) -> list[HermiteMap]:
     """The radius maps at the corners of an α-cut."""
     numbers = section.numbers
     corners = itertools.product(*(sorted(set(one.cut(alpha))) for one in numbers.values()))
     return [section.at(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
-def modal_map(section: RadiusMap) -> HermiteMap:
+def modal_map(section: RadiusMapSection) -> HermiteMap:
     """The radius map at the modal values."""
     return section.at({name: one.modal for name, one in section.numbers.items()})
 
@@ -44,7 +44,7 @@ def distribution(radius: HermiteMap, at: Array) -> Array:
     return np.asarray(np.interp(at, radii[order], share, left=0.0, right=1.0))
 
 
-def p_box(section: RadiusMap) -> Figure:
+def p_box(section: RadiusMapSection) -> Figure:
     """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
     drawn, axes = look.figure()
     corners = maps(section, 0.0)
@@ -66,7 +66,7 @@ def p_box(section: RadiusMap) -> Figure:
     return drawn
 
 
-def cone(section: RadiusMap) -> Figure:
+def cone(section: RadiusMapSection) -> Figure:
     """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
     import matplotlib.pyplot as plt
 

@@ -159,7 +159,7 @@ def measure_grid(critical: CriticalMeasures) -> Array:
     """Measures from below the least critical one to above the greatest that is finite."""
     finite = critical.high[np.isfinite(critical.high)]
     greatest = float(finite.max()) if finite.size else float(critical.low_reached.max())
-    return np.linspace(0.8 * float(critical.low.min()), 1.1 * greatest, POINTS)
+    return np.asarray(np.linspace(0.8 * float(critical.low.min()), 1.1 * greatest, POINTS), float)
 
 
 def _range(ends: Document | None, level: int, unit: str) -> str:

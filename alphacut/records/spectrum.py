@@ -41,7 +41,8 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     substep = ground.step / parts
     start, end = _ends_of_substeps(ground, parts, ceil(period / substep))
     state = np.zeros((4, 4))
-    state[:2, :2] = [[0, 1], [-(omega**2), -2 * ratio * omega]]
+    state[0, 1] = 1.0
+    state[1, :2] = -(omega**2), -2 * ratio * omega
     state[1, 2], state[2, 3] = -1.0, 1.0
     step = expm(state * substep)
     A, b = step[:2, :2], step[:2, 2:]

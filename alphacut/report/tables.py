@@ -155,7 +155,7 @@ def records(part: Document) -> Table:
     for name, record in part["records"].items():
         measures = tuple(_number(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
         for output, peak in record["peak"].items():
-            ends = _number(peak["upper"][0]), _number(peak["reached"][0])
+            ends: Row = (_number(peak["upper"][0]), _number(peak["reached"][0]))
             rows.append((name, *measures, output, Output(output).unit, *ends, peak["nature"]))
     for output, statistics in part["statistics"].items():
         for word in statistics["proved"]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -63,7 +64,7 @@ class EnvelopeTask:
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
 
-    def options(self, structure: Structure) -> dict[str, object]:
+    def options(self, structure: Structure) -> dict[str, Any]:
         """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
         method, own = self.section.method, self.tolerance(structure).value
         auto = method == "auto" and self.section.tolerance is None

@@ -17,6 +17,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
 from alphacut.frame.certificate.remainder import Part, largest_growth, parts, suprema
 from alphacut.frame.modal.fitting import fit_states
@@ -103,7 +104,7 @@ def _require_affordable(grid: LowerGrid, sample: Sample) -> None:
     values = sample(np.zeros((1, d))).values()
     width = sum(x.size * (2 if np.iscomplexobj(x) else 1) for x in values)
     if len(grid) * width > MOST_NUMBERS:
-        raise dependence.UnprovedError(
+        raise UnprovedError(
             f"the error of the modes takes {len(grid)} points of {d} fuzzy inputs, and"
             f" {MOST_NUMBERS // width} are affordable; fewer outputs at once, narrower or fewer"
             " inputs, or a shorter duration, can be proved"

@@ -20,6 +20,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, fit
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modal.fitting import analyse, fit_points
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence as dependence
@@ -42,13 +43,13 @@ class Comparison:
         try:
             factor = np.linalg.cholesky(coefficients[0])
         except np.linalg.LinAlgError:
-            raise dependence.UnprovedError(
+            raise UnprovedError(
                 "the mean mass or stiffness matrix is not positive definite"
             ) from None
         inverse = np.linalg.inv(factor)
         spread = float(np.linalg.norm(np.abs(inverse @ coefficients[1:] @ inverse.T).sum(0), 2))
         if spread >= 1:
-            raise dependence.UnprovedError(
+            raise UnprovedError(
                 "the box is so wide that mass and stiffness are not shown to stay positive definite"
             )
         self.factor, self.lowest, self.highest = factor, 1 - spread, 1 + spread
@@ -172,7 +173,5 @@ def _least(polynomial: Polynomial) -> Array:
     """
     least: Array = polynomial.coefficients[0] - np.abs(polynomial.coefficients[1:]).sum(0)
     if not (least > 0).all():
-        raise dependence.UnprovedError(
-            "the box is so wide that frequencies are not shown to stay positive"
-        )
+        raise UnprovedError("the box is so wide that frequencies are not shown to stay positive")
     return least

@@ -104,7 +104,7 @@ class MatrixStructure:
     def _require_definite(self) -> None:
         """Refuse masses, and springs and dampers of unknowns without mass, that have no motion."""
         mass, stiffness = (
-            sum(float(value_of(f, self.parameters)) * A for f, A in terms)
+            np.sum([float(value_of(f, self.parameters)) * A for f, A in terms], axis=0)
             for terms in (self.mass, self.stiffness)
         )
         a, b = self.massive, self.massless

@@ -258,7 +258,10 @@ class SingleLinkage:
         if len(rows) < 2:  # the interactions leave next to nothing
             return
         unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
-        names = [*rows.tolist(), *range(-len(cut.corners), 0)]  # of corners, which N does not count
+        names: list[int] = [
+            *map(int, rows),
+            *range(-len(cut.corners), 0),
+        ]  # of corners, which N does not count
         distance = critical_distance(len(rows), len(cut.moving), self._volumes[cut.level])
         for bound in bounds:
             state = self.states[cut.level, bound]

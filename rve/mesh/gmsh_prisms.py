@@ -94,7 +94,9 @@ def read(gmsh: Any) -> Prisms:
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     place = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
     place[tags] = np.arange(len(tags))
-    names, cells, phases = [], [], []
+    names: list[str] = []
+    cells: list[Rows] = []
+    phases: list[Rows] = []
     seen: set[int] = set()
     for _, group in gmsh.model.getPhysicalGroups(3):
         name = gmsh.model.getPhysicalName(3, group) or f"group {group}"

@@ -108,6 +108,7 @@ class PrismModel:
         if self.mesh:
             return [self._solve_own_mesh(radius_map, matrix)]
         assert not isinstance(matrix, Mapping)
+        assert not isinstance(radius_map, ThetaLaw)
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         seconds: Seconds = {}

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
@@ -30,9 +31,9 @@ class FixedCell:
 
     distribution: ThetaLaw
 
-    def __call__(self, theta: Array) -> Array:
+    def __call__(self, theta: ArrayLike) -> Array:
         """No radius."""
-        return np.full(np.shape(theta), np.nan)
+        return np.full(np.shape(np.asarray(theta)), np.nan)
 
 
 @dataclass(frozen=True)
