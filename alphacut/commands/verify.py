@@ -71,9 +71,10 @@ def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document
     except ContradictionError as error:
         put_text(folder, "contradiction.csv", columns_text(error.table))
         raise
-    places = {tuple(point): k for k, point in enumerate(points.tolist())}
-    named_points = [tuple(point) for point in trial.named().tolist()]
-    named = [places[point] for point in named_points if point in places]
+    rows: list[list[float]] = points.tolist()
+    wanted: list[list[float]] = trial.named().tolist()
+    places = {tuple(point): k for k, point in enumerate(rows)}
+    named = [places[tuple(point)] for point in wanted if tuple(point) in places]
     files: dict[str, dict[str, Array]] = {
         f"{name}_motions.csv": motions_table(trial, [motions[k] for k in named]),
         f"{name}_inputs.csv": {

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -108,7 +108,7 @@ class PrismModel:
         if self.mesh:
             return [self._solve_own_mesh(radius_map, matrix)]
         assert not isinstance(matrix, Mapping)
-        assert not isinstance(radius_map, ThetaLaw)
+        radius_map = cast("RadiusMap", radius_map)
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         seconds: Seconds = {}

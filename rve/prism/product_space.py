@@ -131,8 +131,7 @@ def _separate_problem(model: PrismModel, law: RadiusMap | ThetaLaw) -> PrismProb
         kept = own_mesh_problem(model.mesh, model.parallel)
         radius: RadiusMap = require_law(kept.form.grid, law)
     else:
-        assert not isinstance(law, ThetaLaw)
-        kept = model.problem(law)
+        kept = model.problem(cast("RadiusMap", law))
         radius = kept.map
     problem = PrismProblem(kept.form.grid, kept.comm)
     problem.move(radius)
