@@ -7,6 +7,7 @@ factor `density`, f_Θ of eq. 1, and the strain is that of `strain`, without a d
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
