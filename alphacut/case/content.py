@@ -81,6 +81,16 @@ class Content(Section):
         return self.cell if isinstance(self.cell, RoundCell) else None
 
     @property
+    def has_spheres(self) -> bool:
+        """True if the particles of the cell are spheres."""
+        return self.round is not None and self.round.particles == "spheres"
+
+    @property
+    def has_own_modulus(self) -> bool:
+        """True if the structure needs no modulus of a stage."""
+        return self.frame is None or self.frame.is_whole
+
+    @property
     def stated_fraction(self) -> float | None:
         """Share of the cell that the particles take as the case says, at its modal value."""
         if self.microstructure is not None and self.microstructure.packing is not None:

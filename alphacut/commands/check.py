@@ -9,6 +9,7 @@ from typing import TextIO
 
 from alphacut.case.content import Content
 from alphacut.case.keys import quantity_of
+from alphacut.case.structure import Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, answer, read
 from alphacut.frame import MatrixStructure, StoreyFrame
@@ -17,6 +18,7 @@ from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.quantity import engineering
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
+from alphacut.stages.readiness import overhangs, require_runnable
 
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
@@ -25,6 +27,7 @@ Row = tuple[str, str, str]
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Checks and reports."""
     content = read(options).content
+    require_runnable(content)
     rows, linear = list(rows_of("", content)), structure(content)
     period = 2 * pi / float(frequencies(linear)[0]) if linear else None
     document = {
@@ -39,6 +42,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
         text += f"record: {len(record.acceleration)} samples, peak {peak}\n"
+        text += "".join(f"{words}\n" for words in overhangs(content, Structure(linear, {})))
     answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 

@@ -183,6 +183,14 @@ class Question(Section, ABC):
         """
         self.in_si(structure)
 
+    def require_answerable(self, motion: Motion) -> None:
+        """Refuses a motion that the question cannot be put to.
+
+        Raises:
+            RefusedError: It is one.
+        """
+        self.check(motion.structure)
+
     @abstractmethod
     def answer(self, motion: Motion) -> Document:
         """Numbers of the answer, in SI, as JSON holds them."""

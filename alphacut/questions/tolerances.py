@@ -11,8 +11,11 @@ from pydantic import Field
 from alphacut.case.types import Quantity
 from alphacut.figures import style
 from alphacut.figures.style import BLUE, GREY, INK
-from alphacut.frame.questions.tolerances import tolerances
+from alphacut.frame.boxes import boxes
+from alphacut.frame.propagation import require_admissible
+from alphacut.frame.questions.tolerances import scaled, tolerances
 from alphacut.frame.structures.quantities import of_storey_frame
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
@@ -45,6 +48,21 @@ class Tolerances(Question):
     most: Annotated[float, Quantity(above=0, most=100)] = Field(
         default=2.0, description="largest scale that is tried; 1 is that of the case"
     )
+
+    def require_answerable(self, motion: Motion) -> None:
+        """Refuses scales at which inputs reach values that have no meaning.
+
+        Raises:
+            RefusedError: They do at the largest scale.
+        """
+        super().require_answerable(motion)
+        try:
+            widest = boxes(scaled(motion.inputs, self.most), [0.0])
+            require_admissible(motion.structure.model, widest)
+        except RefusedError as error:
+            what, cure = f"{self.most:g} times the supports: {error.key}", "a smaller scale"
+            value = f"{what} is {error.value}"
+            raise RefusedError("tolerances.most", value, error.allowed, cure) from None
 
     def answer(self, motion: Motion) -> Document:
         """Scales at which no limit and one is exceeded, and the supports at the first."""

@@ -16,7 +16,7 @@ from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.columns import columns_text
-from alphacut.io.files import as_json
+from alphacut.io.files import as_json, say
 from alphacut.questions.question import Motion, Question
 from alphacut.stages import (
     cell,
@@ -29,7 +29,8 @@ from alphacut.stages import (
     suite,
 )
 from alphacut.stages.envelope import EnvelopeTask, peaks_of
-from alphacut.stages.modulus import Campaign
+from alphacut.stages.modulus import CellCampaign
+from alphacut.stages.readiness import campaign_of, overhangs
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, StageResult, StageStore, Work
 
@@ -79,20 +80,13 @@ class Chain:
         section = self.content.microstructure
         if section is None:
             raise RefusedError("microstructure", None, "a section [microstructure]")
-        spheres = self.content.round is not None and self.content.round.particles == "spheres"
-        return self.store.take(microstructure.stage(section, spheres, self.figures))
+        stage = microstructure.stage(section, self.content.has_spheres, self.figures)
+        return self.store.take(stage)
 
     @property
-    def campaign(self) -> Campaign:
+    def campaign(self) -> CellCampaign:
         """Samples of a round cell."""
-        content = self.content
-        return Campaign(
-            *content.round_cell,
-            content.mesh,
-            content.modulus,
-            self.petsc,
-            content.stated_fraction,
-        )
+        return campaign_of(self.content, self.petsc)
 
     def material(self) -> None:
         """The modulus of the cell, round or an image."""
@@ -113,8 +107,12 @@ class Chain:
         section = content.structure_section
         if section is None or content.envelope is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
-        young = number is not None or content.frame is None or content.frame.is_whole
-        require(young, "frame.modulus", None, "a modulus, or --modulus FILE.nc")
+        require(
+            number is not None or content.has_own_modulus,
+            "frame.modulus",
+            None,
+            "a modulus, or --modulus FILE.nc",
+        )
         return section.structure(number)
 
     def motion(self, structure: Structure, studies: bool = True) -> None:
@@ -122,6 +120,8 @@ class Chain:
         assert self.content.envelope is not None
         results = self.results
         results.structure = structure
+        for words in overhangs(self.content, structure):
+            say(f"warning: {words}")
         section, content = self.content.envelope, self.content
         limited = content.limited_outputs
         results.tasks = envelope.tasks(section, content.study if studies else (), limited)

@@ -15,6 +15,7 @@ from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import Peaks, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
@@ -78,7 +79,15 @@ class EnvelopeTask:
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
-        result = frame.envelope(
+        result = self.envelope_of(structure, work.tick)
+        of_envelope = peaks(result)
+        if not has_close(of_envelope, self.limited):
+            of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
+        return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
+
+    def envelope_of(self, structure: Structure, tick: Progress | None = None) -> frame.Envelope:
+        """The envelope by the method of the case."""
+        return frame.envelope(
             structure.model,
             structure.inputs(self.fuzzy),
             duration=self.duration,
@@ -88,13 +97,9 @@ class EnvelopeTask:
             integrator=self.section.integrator,
             relative=not self.tolerance(structure).unit,
             interruptible=False,
-            progress=work.tick or False,
+            progress=tick or False,
             **self.options(structure),
         )
-        of_envelope = peaks(result)
-        if not has_close(of_envelope, self.limited):
-            of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
-        return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
 
     def close_peaks(self, structure: Structure, work: Work) -> Peaks:
         """Peaks of the limited outputs by the method that bounds peaks most closely."""

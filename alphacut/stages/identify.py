@@ -10,6 +10,7 @@ from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, meas
 from alphacut.frame.identify import identify as identified
 from alphacut.frame.identify.identify import widest
 from alphacut.frame.structures.quantities import of_storey_frame
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Ends
 from alphacut.io.files import Document
@@ -30,22 +31,33 @@ def learned(
     Raises:
         RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
-    require(alpha[0] > 0, "envelope.alpha", list(alpha), "levels above 0")
-    rows = {row.mode: row for row in _rows(section)}
-    some, held = f"some of modes {[*rows]}, not all", section.held_out
-    require(set(held) < set(rows), "identify.held_out", ", ".join(map(str, held)), some)
-    used = [_measured(section, row) for mode, row in rows.items() if mode not in held]
-    prior = structure.inputs(section.learn, "identify.learn")
+    rows, used, prior = require_learnable(section, structure, alpha)
     assert structure.frame is not None
     try:
         after = identified(structure.frame, prior, used, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
-    known = sorted(mode for mode in held if mode <= structure.frame.floors)
+    known = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
     predicted = [_predicted(rows[mode], after.predictions()) for mode in known]
     document = {**_document(after), "held_out": predicted}
     document["prior"] = {name: list(widest(number)) for name, number in prior.items()}
     return document, replace(structure, numbers={**structure.numbers, **after.numbers})
+
+
+def require_learnable(
+    section: Identify, structure: Structure, alpha: tuple[float, ...]
+) -> tuple[dict[int, ModeRows], list[MeasuredMode], dict[str, FuzzyNumber]]:
+    """Measurements by mode, those that are learned from, and the inputs before.
+
+    Raises:
+        RefusedError: The file of modes is wrong, or an input cannot be learned.
+    """
+    require(alpha[0] > 0, "envelope.alpha", list(alpha), "levels above 0")
+    rows = {row.mode: row for row in _rows(section)}
+    some, held = f"some of modes {[*rows]}, not all", section.held_out
+    require(set(held) < set(rows), "identify.held_out", ", ".join(map(str, held)), some)
+    used = [_measured(section, row) for mode, row in rows.items() if mode not in held]
+    return rows, used, structure.inputs(section.learn, "identify.learn")
 
 
 def _rows(section: Identify) -> tuple[ModeRows, ...]:

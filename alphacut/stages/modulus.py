@@ -115,7 +115,7 @@ def theta_of(radius: AnyRadius) -> Array:
 
 
 @dataclass(frozen=True)
-class Campaign:
+class CellCampaign:
     """Samples that the sections of a case ask for.
 
     Args:
@@ -216,14 +216,14 @@ class Campaign:
         return dict(solve(self.radius, self.cell, self.model(estimate=True)).error)
 
 
-def stage(campaign: Campaign) -> Stage:
+def stage(campaign: CellCampaign) -> Stage:
     """The stage of a round cell's samples."""
     plan, alpha = campaign.modulus.plan, campaign.modulus.alpha
     inputs = [campaign.identity, campaign.inputs, campaign.stated_fraction, plan, alpha]
     return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run, has_samples=True)
 
 
-def stage_result(result: Cuts, campaign: Campaign) -> StageResult:
+def stage_result(result: Cuts, campaign: CellCampaign) -> StageResult:
     """α-cuts of every quantity (alpha, bound), where reached, all samples, and a document."""
     import xarray
 
@@ -282,6 +282,16 @@ def _largest(result: Cuts, kind: str) -> dict[str, float]:
     }
 
 
+def require_levels(alpha: tuple[float, ...], key: str) -> None:
+    """Requires levels of a modulus that a structure takes.
+
+    Raises:
+        RefusedError: They do not go from 0 to 1, and are not 1 alone.
+    """
+    complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
+    require(complete, key, list(alpha), "levels from 0 to 1, or 1 alone")
+
+
 def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     """The fuzzy modulus in Pa; between two levels the wider cut holds.
 
@@ -291,8 +301,7 @@ def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     require("E" in data, key, "without E", "a modulus.nc of this program")
     alpha, ends = data["alpha"].values, data["E"].transpose("alpha", "bound").values
     require(ends.min() > 0, key, f"{ends.min() / GPA:.3g} GPa", "a modulus above 0")
+    require_levels(tuple(alpha.tolist()), key)
     if tuple(alpha) == (1.0,):
         return Crisp(float(ends.mean()))
-    whole = (alpha[0], alpha[-1]) == (0, 1)
-    require(whole, key, alpha.tolist(), "levels from 0 to 1, or 1 alone")
     return outer_steps(alpha, ends[:, 0], ends[:, 1])

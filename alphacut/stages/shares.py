@@ -24,7 +24,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import NESTED
 from alphacut.stages.envelope import EnvelopeTask
-from alphacut.stages.modulus import OUTPUTS, Campaign
+from alphacut.stages.modulus import OUTPUTS, CellCampaign
 from alphacut.stages.store import Stage, StageResult, Work
 
 ACCURACY = 2e-3
@@ -32,7 +32,7 @@ ACCURACY = 2e-3
 
 
 def stage(
-    campaign: Campaign | None, structure: Structure | None, task: EnvelopeTask | None
+    campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
 ) -> Stage:
     """The stage of the shares of a cell's inputs, and of those of the richest study."""
     cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
@@ -42,7 +42,10 @@ def stage(
 
 
 def compute_shares(
-    campaign: Campaign | None, structure: Structure | None, task: EnvelopeTask | None, work: Work
+    campaign: CellCampaign | None,
+    structure: Structure | None,
+    task: EnvelopeTask | None,
+    work: Work,
 ) -> StageResult:
     """Shares of each input in the widths of E, ν and peaks, where there are two inputs or more.
 
@@ -63,7 +66,7 @@ def _by_input(shares: Shares, values: Array) -> dict[str, float]:
     return dict(zip(shares.names, map(float, values), strict=True))
 
 
-def of_cell(campaign: Campaign) -> Shares:
+def of_cell(campaign: CellCampaign) -> Shares:
     """Shares of the cell's inputs in the widths of E and ν, shape (inputs, levels, 2).
 
     They are by the series where it has a formula.

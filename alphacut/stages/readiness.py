@@ -1,0 +1,109 @@
+"""What a run reads and refuses before it computes: `check` passes what `run` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from alphacut.case.content import Content
+from alphacut.case.structure import STAND_IN, Structure
+from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
+from alphacut.fuzzy.refused import FailedError
+from alphacut.questions.question import Motion
+from alphacut.stages import envelope, identify, image, suite
+from alphacut.stages.cell import model_of
+from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.modulus import CellCampaign, require_levels
+from alphacut.stochastic.sections import Simulated
+
+STEPS = 3
+"""Steps of the motion that a method is tried with."""
+
+
+def require_runnable(content: Content) -> None:
+    """Builds everything that the stages of a case read, and tries the methods that it names.
+
+    Raises:
+        RefusedError: A stage would refuse a file, a model or a value.
+    """
+    stages = content.stages
+    if "microstructure" in stages and content.microstructure is not None:
+        study = content.microstructure.study(spheres=content.has_spheres)
+        if not isinstance(study.source, Simulated):
+            study.source.read()
+    if "modulus" in stages:
+        _require_material(content)
+    if "envelope" in stages:
+        _require_motion(content)
+
+
+def _require_material(content: Content) -> None:
+    """Builds the model of the cell, and the samples it is asked for, or judges its image."""
+    if "envelope" in content.stages and not content.has_own_modulus:
+        require_levels(content.modulus.alpha, "modulus.alpha")
+    if content.picture is not None:
+        image.study_of(content.picture)
+    elif "microstructure" not in content.stages:
+        _ = campaign_of(content).propagation
+    elif content.round is not None:
+        model_of(content.round, content.mesh, content.modulus)
+
+
+def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> CellCampaign:
+    """Samples of a round cell, by a solver with options of PETSc."""
+    sections = (*content.round_cell, content.mesh, content.modulus)
+    return CellCampaign(*sections, petsc or {}, content.stated_fraction)
+
+
+def _require_motion(content: Content) -> None:
+    """Tries the method of each study on a few steps, and what questions ask of the structure."""
+    section = content.structure_section
+    if section is None or content.envelope is None:
+        return
+    structure, alpha = section.structure(_modulus(content)), content.envelope.alpha
+    if content.identify is not None:
+        identify.require_learnable(content.identify, structure, alpha)
+    if content.records is not None:
+        records = suite.suite(content.records, content.envelope, structure)
+        structure = suite.under(structure, records[0])
+    for task in envelope.tasks(content.envelope, content.study):
+        _require_envelope(task, structure)
+    (task,) = envelope.tasks(content.envelope, ())
+    motion = Motion(structure, task.fuzzy, alpha, task.duration, task.section.step)
+    for question in content.questions.values():
+        question.require_answerable(motion)
+
+
+def _modulus(content: Content) -> FuzzyNumber | None:
+    """A modulus that stands in for that of a stage, fuzzy where that will be."""
+    if "modulus" not in content.stages:
+        return None
+    value = STAND_IN.modal
+    is_fuzzy = content.picture is not None or "microstructure" in content.stages
+    if not is_fuzzy:
+        inputs = campaign_of(content).inputs.values()
+        is_fuzzy = any(number.support.width > 0 for number in inputs)
+    crisp = content.modulus.alpha == (1.0,) or not is_fuzzy
+    return Crisp(value) if crisp else Triangular(0.99 * value, value, 1.01 * value)
+
+
+def _require_envelope(task: EnvelopeTask, structure: Structure) -> None:
+    """Tries the method of a task on a few steps; what fails by its numbers is left to the run."""
+    structure.inputs(task.fuzzy)
+    steps = min(STEPS, round(task.duration / task.section.step))
+    short = replace(task, duration=steps * task.section.step, limited=())
+    try:
+        short.envelope_of(structure)
+    except (FailedError, ArithmeticError):
+        return
+
+
+def overhangs(content: Content, structure: Structure) -> Iterator[str]:
+    """Sentences on a record that goes on after the end of a motion."""
+    linear = structure.linear
+    if linear is None or linear.ground is None or content.envelope is None:
+        return
+    lasts = linear.ground.step * (len(linear.ground.acceleration) - 1)
+    longest = max(task.duration for task in envelope.tasks(content.envelope, content.study))
+    if lasts > longest * (1 + 1e-9):
+        yield f"the record lasts {lasts:g} s, and the motion is computed for {longest:g} s"

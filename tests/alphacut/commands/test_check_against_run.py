@@ -1,0 +1,151 @@
+"""What `check` passes `run` takes: cases with random changes, by a printed seed."""
+
+import os
+import random
+import re
+
+import numpy as np
+import pytest
+
+from alphacut.entry import main
+from tests.alphacut.small import CELL, FRAME, written
+
+QUESTIONS = """
+[tolerances]
+limits = ["q1 <= 20 mm"]
+[decision]
+limits = ["q1 <= 12 mm"]
+[probability]
+limits = ["q1 <= 12 mm"]
+random = ["E"]
+samples = 10
+"""
+BOTH = CELL.replace('["modulus"]', '["modulus", "envelope"]') + re.sub(
+    r'modulus = "\[22.*\n', "", "[frame]" + FRAME.partition("[frame]")[2]
+)
+IDENTIFY = FRAME.replace("alpha = [0, 0.5, 1]", "alpha = [0.2, 1]") + (
+    '[identify]\nmeasured = "modes.csv"\nlearn = ["E"]\n'
+)
+IMAGE = """
+title = "Image"
+stages = ["modulus"]
+[cell]
+image = "image.npy"
+pixel = "1 µm"
+threshold = [100]
+modulus = ["20 GPa", "[75, 80, 85] GPa"]
+poisson = 0.3
+[modulus]
+alpha = [0, 1]
+"""
+PARTICLES = """
+title = "Particles"
+stages = ["microstructure"]
+[microstructure]
+seed = 1
+[microstructure.circles]
+file = "circles.csv"
+size = ["10 mm", "10 mm"]
+"""
+TEXTS = {
+    "frame": FRAME + QUESTIONS,
+    "both": BOTH,
+    "identify": IDENTIFY,
+    "image": IMAGE,
+    "circles": PARTICLES,
+}
+CHANGES = {
+    "frame": [
+        "tolerances.most=1.5", "tolerances.most=20", "envelope.method=proof",
+        "envelope.method=search", "envelope.method=quasi-monte-carlo", "envelope.alpha=[0.5, 1]",
+        "envelope.alpha=[1]", "envelope.integrator=midpoint", "envelope.integrator=rk4",
+        "envelope.tolerance=0.1 N", "envelope.tolerance=1 %", 'frame.outputs=["q1", "a1"]',
+        'frame.outputs=["base_shear"]', 'frame.outputs=["q1", "q1"]', "frame.damping_ratio=[2, 3, 4] %",
+        'decision.limits=["a1 <= 1 m/s^2"]', 'probability.random=["E", "m1"]', "frame.masses=[0.1, 9, 9] t",
+        "envelope.step=0.03 s", "frame.accelerogram=record.csv", 'probability.random=["d"]',
+        "frame.modulus=24 GPa", "frame.displacements=0 mm",
+    ],
+    "both": [
+        "modulus.alpha=[1]", "modulus.alpha=[0.5, 1]", "cell.inclusion_modulus=80 GPa",
+        "cell.particles=spheres", "modulus.method=auto", "radius.a2=0.2", "modulus.plan=signed",
+        "modulus.plan=general", 'envelope.fuzzy=["m"]', "frame.lengths=40 m",
+    ],
+    "identify": [
+        'identify.learn=["m"]', "identify.held_out=[1]", "identify.held_out=[4]",
+        "envelope.alpha=[0, 1]", "identify.shape_deviation=0.02", 'identify.learn=["E", "m"]',
+        "identify.frequency_deviation=0.03", 'envelope.fuzzy=["m"]', 'identify.learn=["l"]',
+    ],
+    "image": [
+        "cell.threshold=[300]", "cell.threshold=[130]", "cell.labels=[50, 150]",
+        "modulus.alpha=[1]", 'cell.pixel=["1 µm", "2 µm"]', "cell.smooth=true", "cell.level=true",
+    ],
+    "circles": [
+        "microstructure.limits=[0.1, 0.9]", 'microstructure.circles.size=["1 mm", "1 mm"]',
+        'microstructure.circles.size=["20 mm", "20 mm"]', "microstructure.seed=2",
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder with the files that the cases name."""
+    rng = np.random.default_rng(3)
+    (tmp_path / "modes.csv").write_text("mode,frequency [Hz]\n1,0.73\n1,0.74\n1,0.735\n")
+    (tmp_path / "record.csv").write_text(
+        "time [s],acceleration [m/s^2]\n" + "".join(f"{0.1 * k:g},{k % 3}\n" for k in range(60))
+    )
+    y, x = np.mgrid[:24, :24]
+    inside = (x - 12) ** 2 + (y - 12) ** 2 < 49
+    np.save(tmp_path / "image.npy", np.where(inside, 150.0, 50.0) + rng.normal(0, 2, (24, 24)))
+    places = [(a, b) for a in range(10) for b in range(10)]
+    rows = (f"{a + 0.5},{b + 0.5},{0.2 + 0.02 * ((3 * a + b) % 8)}\n" for a, b in places)
+    (tmp_path / "circles.csv").write_text("x [mm],y [mm],r [mm]\n" + "".join(rows))
+    return tmp_path
+
+
+def test_what_check_passes_run_takes(place, capfd):
+    seed = int(os.environ.get("SEED", random.randrange(10**9)))
+    trials, passed = int(os.environ.get("TRIALS", "3")), 0
+    for trial in range(seed, seed + trials):
+        draw = random.Random(trial)
+        kind = draw.choice(sorted(TEXTS))
+        changes = draw.sample(CHANGES[kind], draw.choice([1, 1, 2]))
+        if kind == "image" and any("labels" in change for change in changes):
+            continue
+        words = [str(written(place, TEXTS[kind])), *(f"--set={change}" for change in changes)]
+        checked = main(["check", *words, "--quiet"])
+        capfd.readouterr()
+        passed += checked == 0
+        if checked == 0:
+            ran = main(["run", *words, "--quiet", "--no-figures", f"--out={place}/{trial}"])
+            _, err = capfd.readouterr()
+            print(kind, changes, checked, ran, err)
+            assert ran != 2, (trial, kind, changes, err)
+        else:
+            print(kind, changes, checked)
+    print(f"seed {seed}: {passed} of {trials} passed check")
+
+
+REFUSED = {
+    "frame": ("tolerances.most=20", "tolerances.most"),
+    "both": ("modulus.alpha=[0.5, 1]", "modulus.alpha"),
+    "identify": ("envelope.alpha=[0, 1]", "envelope.alpha"),
+    "image": ("cell.threshold=[300]", "threshold"),
+    "circles": ('microstructure.circles.size=["1 mm", "1 mm"]', "circles.csv, row"),
+}
+
+
+@pytest.mark.parametrize(("kind", "change", "key"), [(k, *v) for k, v in REFUSED.items()])
+def test_check_refuses_what_run_would(place, capfd, kind, change, key):
+    words = [str(written(place, TEXTS[kind])), "--set", change]
+    assert main(["check", *words]) == 2
+    assert key in capfd.readouterr().err
+
+
+def test_a_record_longer_than_the_motion_is_said(place, capfd):
+    words = [str(written(place, FRAME)), "--set", "frame.accelerogram=record.csv"]
+    sentence = "the record lasts 5.9 s, and the motion is computed for 2 s"
+    assert main(["check", *words]) == 0
+    assert sentence in capfd.readouterr().out
+    assert main(["run", *words, "--no-figures", "--quiet", f"--out={place}/out"]) == 0
+    assert sentence in capfd.readouterr().err
