@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import nan
 from pathlib import Path
@@ -144,18 +144,20 @@ def run(
     return built - started, process_time() - built, solutions
 
 
-def compare(timings: Sequence[Timing]) -> Iterator[str]:
-    """Print the table; gives each fault in a sentence."""
-    first = timings[0]
+def compare(timings: Iterable[Timing]) -> Iterator[str]:
+    """Print the table line by line; gives each fault in a sentence."""
+    first = None
     print(f"{'options':18} {'unknowns':>9} {'setup s':>8} {'solve s':>8} {'times':>6} iterations")
     for row in timings:
+        first = first or row
         if row.outcome != "converges":
-            print(f"{row.solver:18} {row.unknowns:9} {row.outcome}")
+            print(f"{row.solver:18} {row.unknowns:9} {row.outcome}", flush=True)
             continue
         times = row.seconds / first.seconds
         print(
             f"{row.solver:18} {row.unknowns:9} {row.setup:8.3f} {row.solve:8.3f} {times:6.1f}"
-            f" {row.iterations:10}"
+            f" {row.iterations:10}",
+            flush=True,
         )
         if abs(row.modulus / first.modulus - 1) > SAME:
             yield f"E of {row.solver} is {row.modulus:.10g} Pa, not {first.modulus:.10g} Pa"
@@ -199,8 +201,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 faults.append(f"{name} with {layers} layers takes {count} iterations")
         write(rows, RESULTS / "cell_iterations.csv")
     else:
-        timings = [timing(solver, options.mesh_size, options.layers) for solver in options.solvers]
-        faults = list(compare(timings))
+        timings: list[Timing] = []
+
+        def measured() -> Iterator[Timing]:
+            for solver in options.solvers:
+                timings.append(timing(solver, options.mesh_size, options.layers))
+                yield timings[-1]
+
+        faults = list(compare(measured()))
         rows = [asdict(one) for one in timings]
         write(rows, RESULTS / "cell_solvers.csv")
     print(f"made in {perf_counter() - started:.0f} s")
