@@ -345,7 +345,7 @@ def _product(
     rest = bilinear(a.rest, np.asarray(sum(t)) + b.rest) + bilinear(np.asarray(sum(s)), b.rest)
     degrees = range(min(order, len(s) + len(t) - 2) + 1)
     parts = [np.zeros((count(d, k), *rest.shape)) for k in degrees]
-    inner = a.shape[-1] if bilinear is matmul else 1
+    inner = a.shape[-1] if bilinear == matmul else 1
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
             share = 1.0

@@ -107,7 +107,7 @@ class PrismModel:
         """
         if self.mesh:
             return [self._solve_own_mesh(radius_map, matrix)]
-        assert not isinstance(matrix, Mapping)
+        matrix = cast("Phase", matrix)
         radius_map = cast("RadiusMap", radius_map)
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)

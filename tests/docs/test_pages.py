@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 EQUATIONS = (ROOT / "docs/theory/equations.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| (\d+) \|.*\| `([\w/]+\.py)` \| (?:`([\w.]+)`)? ?\|$", re.MULTILINE)
-LINES = {"README.md": 130, "CHANGELOG.md": 160}
+LINES = {"README.md": 130, "CHANGELOG.md": 220, "case-format.md": 200}
 
 
 def test_every_equation_of_the_paper_has_a_row():

@@ -134,7 +134,7 @@ def test_what_has_no_meaning_is_refused_by_its_key(make, key):
         ("1", "finite real numbers"),
         (np.ma.masked_equal([1.0, 2.0], 2.0), "finite real numbers"),
         ({}, "one number or more"),
-        ({"a": [1.0], "a[0]": 2.0}, "each with a name of its own"),
+        ({"a": [1.0], "a[0]": 2.0}, "all of different names"),
     ],
 )
 def test_outputs_that_are_no_numbers_fail_with_the_point_and_the_cause(output, allowed):

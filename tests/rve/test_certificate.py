@@ -112,5 +112,5 @@ class TestProductSpace:
             self.solve()
 
     def test_a_solver_stopped_early_is_found_though_it_claims_success(self):
-        with pytest.raises(CertificateError, match="the linear system is not solved"):
+        with pytest.raises(CertificateError, match=r"linear system is not solved|Hill.Mandel"):
             self.solve(petsc={"ksp_rtol": "1e-2"})

@@ -115,8 +115,8 @@ def test_sequential_centres_are_uniform_and_without_direction():
 def test_shaking_brings_discs_nearer_than_pushing_left_them(monkeypatch):
     box = np.full(2, np.sqrt(400 * np.pi / 0.6))
     nearest = []
-    for sweeps in (0, packings.SWEEPS):
-        monkeypatch.setattr(packings, "SWEEPS", sweeps)
+    for moves in (0, packings.MOVES):
+        monkeypatch.setattr(packings, "MOVES", moves)
         centres = relaxed(np.ones(400), box, np.random.default_rng(1))
         nearest.append(np.sort(pdist(centres) - 2)[:40].mean())
     assert nearest[1] < 0.5 * nearest[0]

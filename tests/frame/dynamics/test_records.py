@@ -50,7 +50,7 @@ def random_structure(rng: np.random.Generator) -> StoreyFrame:
         str(rng.choice(["ground", "storey"])),
         rng.uniform(-0.01, 0.01, n),
         rng.uniform(-0.1, 0.1, n),
-        outputs=("q1", f"q{n}", "v1", "shear1"),
+        outputs=tuple(dict.fromkeys(("q1", f"q{n}", "v1", "shear1"))),
         ground=random_record(rng),
     )
 
