@@ -102,7 +102,7 @@ def test_corners_bound_a_monotone_function_at_little_cost():
     inputs = {f"x{i}": Triangular(0.0, 0.3, 1.0) for i in range(4)}
     result = propagate(lambda **x: sum(np.exp(v) for v in x.values()), inputs, vectorised=True)
     assert result.nature is Nature.ESTIMATED
-    assert result.evaluations == 20 * 4 + 1 + 2 * 2 * 4 + 2 * 4 + 1
+    assert result.evaluations == 20 * 4 + 1 + 2 * 2 * 4 + 4 * 2**4 + 1
     assert "differences of each input keep their sign at 24 points" in result.notes[0]
     np.testing.assert_allclose(result.upper[0, 0], 4 * np.e, rtol=1e-14)
 
@@ -112,9 +112,10 @@ def test_corners_bound_a_monotone_function_at_little_cost():
     [
         lambda x, y: (x - 0.02) ** 2 + y,  # turns beside a corner
         lambda x, y: x + y - 0.5 * (x + y > 1.7),  # jumps beside one
+        lambda x, y: x + 2 * y + 5 * (x - y > 0.95),  # jumps beside another corner
         lambda x, y: x + y + 3 * np.maximum(1 - ((x - 0.4) ** 2 + (y - 0.6) ** 2) / 0.04, 0) ** 2,
     ],
-    ids=["hump", "jump", "spike"],
+    ids=["hump", "jump", "jump elsewhere", "spike"],
 )
 def test_corners_that_do_not_suffice_are_seen(function):
     result = propagate(function, SQUARE, alpha=[0.0], vectorised=True)
