@@ -21,7 +21,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter, median_filter, minimum_filter, uniform_filter
+from scipy.ndimage import (
+    maximum_filter,
+    median_filter,
+    minimum_filter,
+    percentile_filter,
+    uniform_filter,
+)
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.refused import RefusedError, require
@@ -37,6 +43,10 @@ _NOISE_QUANTILE = 0.9  # of the residuals; rounding makes up to half of them zer
 _EXACT = 1e-9  # of the grey values: noise that is rounding
 _LEAST_PILE, _STEEPEST = 0.01, 3.0  # share at an end, and over that of the next value, if clipped
 _FLAT = 0.95  # of a class at one value; where particles meet, a blurred image has others
+_MAX_FLAT, _FLAT_GAP = 3, 0.05  # greys of a clean class, and least gap over the contrast
+MIN_IMPULSES = 0.01
+"""Share of pixels that are impulses from which on they count; noise alone has 0.003."""
+_AROUND, _MOST_AROUND = 7, (15, 85)  # pixels around, and percentiles; a line has 7 of 49 pixels
 _MIN_PIXELS = 50  # of a class whose grey values are checked for clipping
 _PATCH, _REACH = 5, 7  # pixels of a neighbourhood, and to those that it is compared with
 _NOISE_SAMPLES = 4  # of added noise, to measure how much of it smoothing leaves
@@ -54,7 +64,8 @@ class Segmentation:
         levels: Grey value of each class under mean light.
         light: What the light adds to each pixel, of mean zero, shape (rows, columns).
         noise: Standard deviation of the rest, in grey values.
-        moved: What smoothing may have moved each grey value by, or left of its noise.
+        moved: What smoothing may have moved each grey value by, or left of its noise; infinite
+            at impulses and scratches.
     """
 
     grey: Array
@@ -102,9 +113,11 @@ class Segmentation:
             RefusedError: More is open than `most` of the smallest class's area.
         """
         share = self.open / float(self.fractions.min())
+        impulses = float(np.mean(np.isinf(self.moved)))
         value = (
             f"in doubt on {share:.1%} of the smallest phase, by noise of {self.noise:.3g} and"
             f" drift of light of {self.drift:.3g} grey levels"
+            + (f", and by impulses or scratches on {impulses:.1%}" if impulses else "")
         )
         cure = "smooth = true takes noise away, level = true the drift of light"
         require(share <= most, "threshold", value, f"up to {most:.0%}", cure)
@@ -126,7 +139,8 @@ def segmented(
         RefusedError: A class has no pixel, or grey values are clipped.
     """
     values, borders = np.asarray(grey, float), tuple(map(float, thresholds))
-    _refuse_clipped(values, borders)
+    impulses = _impulses(_classified(values, borders))
+    _refuse_clipped(values, borders, ~impulses)
     moved: Array | float = 0.0
     if level:
         values = values - _classified(values, borders).light
@@ -136,21 +150,41 @@ def segmented(
         again = np.abs(values - _smoothed(values, noise))
         moved = np.maximum(again, _remaining_noise(rough, values, noise))
     result = _classified(values, borders)
+    moved = np.where(impulses, np.inf, moved)
     return Segmentation(values, borders, result.levels, result.light, result.noise, moved)
 
 
-def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
+def _impulses(image: Segmentation) -> Mask:
+    """Pixels that neither a class nor the noise explains, as salt, pepper and scratches.
+
+    They lie beyond the noise of the level of each class, and beyond that of most pixels around
+    them, which pixels of a blurred border do not. None where they are less than `MIN_IMPULSES`.
+    """
+    grey = image.grey - image.light
+    band = CONFIDENT * image.noise + _EXACT * float(np.abs(grey).max())
+    strange = np.abs(grey[..., None] - image.levels).min(axis=-1) > band
+    low, high = (percentile_filter(grey, q, _AROUND, mode="wrap") for q in _MOST_AROUND)
+    impulses = strange & ((grey < low - band) | (grey > high + band))
+    return np.asarray(impulses & (impulses.mean() >= MIN_IMPULSES))
+
+
+def _refuse_clipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
     """Refuses grey values that were cut off at an end.
+
+    Args:
+        values: Grey values.
+        borders: Values that part the classes.
+        sound: Pixels that are no impulses.
 
     Raises:
         RefusedError: They were.
     """
     labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
-    far = _far(labels, _BORDER)
+    far = _far(labels, _BORDER) & sound
     classes = [values[far & (labels == k)] for k in range(len(borders) + 1)]
     classes = [grey for grey in classes if grey.size >= _MIN_PIXELS]
-    flat = [float(np.mean(grey == np.median(grey))) >= _FLAT for grey in classes]
-    for end in (float(values.min()), float(values.max())):
+    flat = [_is_flat(grey, float(np.ptp(values[sound]))) for grey in classes]
+    for end in (float(values[sound].min()), float(values[sound].max())):
         for grey, even in zip(classes, flat, strict=True):
             distance, counts = np.unique(np.abs(grey - end), return_counts=True)
             pile = counts[0] / grey.size if distance[0] == 0 else 0.0
@@ -160,6 +194,15 @@ def _refuse_clipped(values: Array, borders: tuple[float, ...]) -> None:
                 what = f"{pile:.0%} of a phase at the end of the grey values, {end:g}"
                 cure = "take the image before its contrast was raised, or give cell.labels"
                 raise RefusedError("image", what, "grey values that are not clipped", cure)
+
+
+def _is_flat(grey: Array, contrast: float) -> bool:
+    """True for a class of a clean image: one grey value, or a few that are far from each other."""
+    places, counts = np.unique(grey, return_counts=True)
+    most = np.sort(places[np.argsort(-counts)[:_MAX_FLAT]])
+    shares = np.sort(counts)[::-1] / grey.size
+    far = (np.diff(most) >= _FLAT_GAP * contrast).all()
+    return bool(shares[0] >= _FLAT or (far and shares[:_MAX_FLAT].sum() >= _FLAT))
 
 
 def _classified(values: Array, borders: tuple[float, ...]) -> Segmentation:

@@ -101,3 +101,42 @@ def test_an_image_of_two_values_is_taken_as_it_is():
     judged = segmented(255 * (cover >= 0.5), [128])
     assert judged.open == 0
     assert judged.fractions[1] == np.mean(cover >= 0.5)
+
+
+def salt_and_pepper(grey, rng):
+    places = rng.random(grey.shape) < 0.03
+    grey[places] = rng.choice([0.0, 255.0], places.sum())
+    return places
+
+
+def scratches(grey, rng):
+    places = np.zeros(grey.shape, bool)
+    places[:, rng.choice(np.arange(5, SIZE, 10), 3, replace=False)] = True
+    grey[places] = 250.0
+    return places
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+@pytest.mark.parametrize("spoilt", [salt_and_pepper, scratches])
+def test_impulses_and_scratches_are_in_doubt(spoilt, noise):
+    rng = np.random.default_rng(5)
+    grey, _ = picture(rng, noise=noise)
+    before = segmented(grey, [110]).open
+    places = spoilt(grey, rng)
+    first, last = segmented(grey, [110]).ranges()
+    assert (first < last)[places].mean() > 0.9
+    assert (first < last)[~places].mean() < before + 0.02
+    grey[rng.random(grey.shape) < 0.06] = 255
+    with pytest.raises(RefusedError, match="impulses or scratches on"):
+        segmented(grey, [110]).require()
+
+
+def test_clean_lines_of_one_pixel_and_three_greys_are_not_called_clipped():
+    lines, three = np.full((2, 60, 60), 50.0)
+    lines[::7] = lines[20:40, 20:40] = 150.0
+    three[10:30, 10:40], three[40:50] = 150.0, 200.0
+    for grey in (lines, three):
+        result = segmented(grey, [100])
+        result.require()
+        assert result.open == 0
+        assert result.fractions[1] == np.mean(grey > 100)
