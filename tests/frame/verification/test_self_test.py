@@ -1,5 +1,8 @@
 """A guaranteed envelope that is wrong is refused by the result, whatever made it wrong."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
 
@@ -95,6 +98,42 @@ def test_tables_of_the_dual_off_by_a_hundredth_raise(monkeypatch):
     monkeypatch.setattr(level, "tables", smaller)
     with pytest.raises(FailedError, match="the proof is wrong"):
         motion(frame(), INPUTS, method=DualProof(gap=1e-3))
+
+
+WITHOUT_LEADING_TERM = """
+import numpy as np
+from alphacut.frame import Accelerogram, DualProof, StoreyFrame, envelope
+from alphacut.frame.response import duhamel
+from alphacut.fuzzy import Triangular
+from alphacut.fuzzy.refused import FailedError
+right = duhamel.step_integrals
+
+def faulty(sigma, h, out):
+    right(sigma, h, out)
+    out[0] -= FAULT * h  # the first term of the series of J_0
+
+duhamel.step_integrals = faulty
+record = Accelerogram(0.05, np.array([0.0, 2.0, -1.0, 3.0, 1.0]))
+frame = StoreyFrame(masses=(1e3,), stiffness=(1e5,), damping_ratio=0.05, ground=record)
+motion = {"duration": 0.4, "step": 0.05, "alpha": (0.0,), "progress": False}
+try:
+    inputs, proof = {"k1": Triangular(9.9e4, 1e5, 1.01e5)}, DualProof(0.1, slabs=1, steps=2)
+    print(envelope(frame, inputs, method=proof, **motion).facts["motions_tested"])
+except FailedError as failure:
+    print(failure)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fault", "words"), [("0", "33"), ("1", "the proof is wrong: q1")])
+def test_integrals_of_a_step_without_their_leading_term_raise(fault, words):
+    """The dual proof's bounds and what they attain share these integrals; the motion does not."""
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": "1"
+    }  # compiled kernels would not see the fault
+    script = [sys.executable, "-c", WITHOUT_LEADING_TERM.replace("FAULT", fault)]
+    told = subprocess.run(script, env=environment, capture_output=True, text=True, check=True)
+    assert words in told.stdout
 
 
 def test_names_output_time_inputs_and_difference(monkeypatch):
