@@ -92,11 +92,6 @@ class Box:
         values, errors = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(errors)
 
-    def reached(self, unit: Array, node: Rows, output: Rows, side: Rows | int) -> Array:
-        """What ± outputs exceed at nodes for unit coordinates (S, d), their rounding counted."""
-        value, error = self.attained_with_error(unit, node, output)
-        return np.asarray(side * value - error)
-
     def centre_motion(self) -> tuple[Array, Array, Array]:
         """Motion at the centre, its rounding, and how far it strays from straight lines.
 

@@ -99,7 +99,7 @@ class Pencil:
                 part = part - convolve(scaled, mass.parts[m - a], (a, m - a), d, np.multiply)
             parts.append(part)
             sizes[m] = np.minimum(sizes[m], np.abs(part).sum(0) + rounding[m - 1])
-        return cls(sizes, *parts, rounding)
+        return cls(sizes, parts[0], parts[1], rounding)
 
     def loss(self, o: Rows, distance: Array, sign: float) -> float:
         """Bound of how far the block o, scaled by distances, of its sign × T falls over the box."""

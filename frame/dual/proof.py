@@ -139,7 +139,7 @@ class DualProof:
         at = np.broadcast_to(low, (*both.shape, len(low))).copy()
         shares = np.zeros((*both.shape[1:], len(low)))
         least = Ends((np.abs(value) - error).max(0), (np.abs(value) + error).max(0))
-        found = PartBounds(both + margin, both - margin, at, stray, shares)
+        found = PartBounds(both + margin, both - margin, at, stray, shares, 2 * error)
         return replace(found, least_peaks=least)
 
 
@@ -178,8 +178,10 @@ class _Bounding:
             self._at_peaks(self._bound)
         inner = np.full(self.outer.shape, -np.inf)
         node, output, side = np.nonzero(self.needed)
-        side = np.where(side, 1, -1)
-        inner[self.needed] = self.box.reached(self.unit[self.needed], node, output, side)
+        value, error = self.box.attained_with_error(self.unit[self.needed], node, output)
+        inner[self.needed] = np.where(side, value, -value) - error
+        attained_error = np.zeros(self.outer.shape[:2])
+        np.maximum.at(attained_error, (node, output), 2 * error)
         self.top = np.maximum(self.top, inner.max(0))
         n, active = len(self.box.low), self.box.active
         self.remaining = np.empty((2, *self.top.shape, n))
@@ -197,6 +199,7 @@ class _Bounding:
             self.box.inputs(self.unit),
             between,
             shares,
+            attained_error,
             remaining=self.remaining,
             pruned=self.pruned,
             least_peaks=least,

@@ -187,8 +187,10 @@ def _parts(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
         The phases; exp(σ x), (P,); J_n, (P, 4); rounding, as shares of ρ and of a, and |exp(σ x)|,
         (P, 3).
     """
-    turns, parts = np.empty(len(phases), np.complex128), np.empty((len(phases), 4), np.complex128)
-    rounding, rate = np.empty((len(phases), 3)), abs(sigma.real) + abs(sigma.imag)
+    turns: Array = np.empty(len(phases), np.complex128)
+    parts: Array = np.empty((len(phases), 4), np.complex128)
+    rounding: Array = np.empty((len(phases), 3))
+    rate = abs(sigma.real) + abs(sigma.imag)
     for j in range(len(phases)):
         x = phases[j]
         turns[j] = np.exp(sigma * x)

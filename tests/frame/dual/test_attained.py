@@ -9,7 +9,7 @@ from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
-from alphacut.fuzzy import Crisp
+from alphacut.fuzzy import Crisp, Interval
 from tests.frame.response.test_duhamel import exact_response
 
 IDLE = 0.01
@@ -120,3 +120,16 @@ def test_equal_frequencies_do_not_lift_the_rounding():
     exact = np.sum(np.sin(np.sqrt(centre) * time[:, None]) / np.sqrt(centre), 1)
     assert (np.abs(value[:, 0] - exact) <= error[:, 0] + 4e-16).all()
     assert error.max() < 1e-12
+
+
+def test_rounding_of_attained_bounds_is_declared():
+    """A storey that is stiffer by 1e6 is read as a difference of nearly equal displacements."""
+    rng = np.random.default_rng(0)
+    masses, springs = rng.uniform(1e4, 5e4, 3), np.array([5e7, 7e13, 8e7])
+    frame = StoreyFrame(
+        masses=masses, stiffness=springs, damping_ratio=0.05, ground=RECORD, outputs=("shear2",)
+    )
+    inputs = {"k1": Interval(4.9e7, 5.1e7), "m2": Interval(0.98 * masses[1], 1.02 * masses[1])}
+    given = {"duration": 0.4, "step": 0.02, "alpha": (0,), "progress": False}
+    found = envelope(frame, inputs, method=DualProof(), **given)
+    assert found.attained_error.max() > 1e-9 * np.abs(found.upper).max()
