@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse
-from alphacut.rve.result import Homogenised, StressCurve, effective_modulus
+from alphacut.rve.result import HomogenisedStiffness, StressCurve, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 
@@ -20,7 +20,7 @@ __all__ = [
     "STRAIN",
     "Cell",
     "Ellipse",
-    "Homogenised",
+    "HomogenisedStiffness",
     "Phase",
     "PrismModel",
     "ProductSpace",

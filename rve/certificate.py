@@ -11,7 +11,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.bounds import bulk_bounds_of_phases, reuss_of_phases, voigt_of_phases
 from alphacut.rve.cell import AnyPhase, Phase
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 
 ROUND_OFF = 1e-9
 ALGEBRAIC = 1e-7
@@ -54,7 +54,7 @@ def require(checks: Mapping[str, float], *, discretisation: float = ROUND_OFF) -
     return dict(checks)
 
 
-def certified(result: Homogenised) -> Homogenised:
+def certified(result: HomogenisedStiffness) -> HomogenisedStiffness:
     """A result, with its cell and stiffness, with the certificate within its declared error.
 
     Raises:

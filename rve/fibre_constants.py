@@ -29,7 +29,7 @@ from alphacut.rve.series.longitudinal import longitudinal_shear
 from alphacut.stochastic import ThetaRule, gauss_rule
 
 if TYPE_CHECKING:
-    from alphacut.rve.result import Homogenised
+    from alphacut.rve.result import HomogenisedStiffness
 
 CONSTANTS = ("E_T", "E_L", "nu_LT", "G_T", "G_L", "K_T")
 _FINE, _COARSER = 32, 24  # nodes in θ
@@ -49,7 +49,7 @@ class FibreConstants:
     errors: dict[str, float]
 
 
-def fibre_constants(result: Homogenised) -> FibreConstants:
+def fibre_constants(result: HomogenisedStiffness) -> FibreConstants:
     """Constants of a result that knows its cell, of round particles and isotropic phases.
 
     Raises:

@@ -59,7 +59,7 @@ class StressCurve:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Homogenised:
+class HomogenisedStiffness:
     """Effective behaviour of one cell with what it cost.
 
     Args:
@@ -88,7 +88,7 @@ class Homogenised:
     cell: Cell | None = None
     average: str = AXES
 
-    def averaged(self, average: str) -> Homogenised:
+    def averaged(self, average: str) -> HomogenisedStiffness:
         """The same cell with E and ν of another average.
 
         Raises:
@@ -109,8 +109,9 @@ class Homogenised:
         """E and ν with the declared error, the model and its cost."""
         cost = self.seconds.get("total", 0.0)
         return (
-            f"Homogenised(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g} ({self.convention}),"
-            f" relative error of E {self.estimated_error:.2g}, by {self.method}, {cost:.2g} s)"
+            f"HomogenisedStiffness(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}"
+            f" ({self.convention}), relative error of E {self.estimated_error:.2g},"
+            f" by {self.method}, {cost:.2g} s)"
         )
 
     @property

@@ -12,7 +12,7 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
 from alphacut.report.results import ISOTROPIC, fibre_label
 from alphacut.report.tables import text_table
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.stages import cell
 
 KEYS = {
@@ -65,7 +65,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     return 0
 
 
-def difference(first: Homogenised, second: Homogenised, tolerance: float) -> float:
+def difference(
+    first: HomogenisedStiffness, second: HomogenisedStiffness, tolerance: float
+) -> float:
     """Relative difference of E from that of a second method.
 
     Raises:
@@ -93,7 +95,7 @@ def export(radius: AnyRadius, phases: RoundCell, mesh: Mesh, path: Path) -> Docu
     return {"file": str(path), "nodes": write_cell(fields, path)}
 
 
-def summary(result: Homogenised, document: Document) -> str:
+def summary(result: HomogenisedStiffness, document: Document) -> str:
     """The result as a table, every number with its declared error."""
     errors = document["declared_error"] or {"E_GPa": 0.0, "nu": 0.0, "stress_GPa": {}}
     stress, off = document["stress_GPa"], errors["stress_GPa"]

@@ -18,7 +18,7 @@ from alphacut.rve import bounds as plane
 from alphacut.rve.cell import STRAIN, Cell, Phase
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.mesh.outline import circle
-from alphacut.rve.result import Homogenised, effective_modulus
+from alphacut.rve.result import HomogenisedStiffness, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import bounds as space
 from alphacut.rve.spheres.cubic import hill_average
@@ -33,13 +33,13 @@ SPHERES = 1e-5
 """Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
 SLACK = 5e-3
 """Relative distance of E from the bounds that is allowed: packings meet a fraction to 0.5 %."""
-Solve = Callable[..., Sequence[Homogenised]]
+Solve = Callable[..., Sequence[HomogenisedStiffness]]
 """A model of the cell: from radius map, matrix and inclusions to one result for each of these."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness in words."""
 
 
-def averaged(model: Solve, *cell: object) -> list[Homogenised]:
+def averaged(model: Solve, *cell: object) -> list[HomogenisedStiffness]:
     """Results whose E and ν are those of the isotropic average of the plane stiffness."""
     return [result.averaged("isotropic") for result in model(*cell)]
 
@@ -106,7 +106,7 @@ def modal_cell(radius: AnyRadius, cell: RoundCell) -> Cell:
     return cell_at(values, radius, cell)
 
 
-def solve(radius: AnyRadius, cell: RoundCell, model: Solve) -> Homogenised:
+def solve(radius: AnyRadius, cell: RoundCell, model: Solve) -> HomogenisedStiffness:
     """The cell's result at the modal values of its inputs."""
     modal = modal_cell(radius, cell)
     return model(modal.radius, modal.matrix, [modal.inclusion])[0]
@@ -157,7 +157,7 @@ def _young(bulk: float, shear: float) -> float:
     return float(hill_average(np.array([bulk, shear, shear]))[0])
 
 
-def document(result: Homogenised) -> Document:
+def document(result: HomogenisedStiffness) -> Document:
     """The result for ``--json``; moduli and stresses in GPa."""
     s11, s12 = result.curve.mean
     return {
@@ -184,7 +184,7 @@ def document(result: Homogenised) -> Document:
     }
 
 
-def fibres(result: Homogenised) -> Document:
+def fibres(result: HomogenisedStiffness) -> Document:
     """Constants of fibres with their declared errors, moduli in GPa; none of other particles."""
     if isinstance(result, HomogenisedSpheres) or result.cell is None or not result.cell.square:
         return {}
@@ -195,7 +195,7 @@ def fibres(result: Homogenised) -> Document:
     return fibres
 
 
-def declared_errors(result: Homogenised) -> Document | None:
+def declared_errors(result: HomogenisedStiffness) -> Document | None:
     """Declared absolute errors of E, ν and the mean stresses; None where there are none."""
     if not result.errors:
         return None

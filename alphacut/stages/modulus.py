@@ -28,7 +28,7 @@ from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.stages.cell import (
     GPA,
     Solve,
@@ -94,7 +94,7 @@ class CellTask:
         results = self.model(first.radius, first.matrix, inclusions)
         return [self._outputs(result) for result in results]
 
-    def _outputs(self, result: Homogenised) -> dict[str, float | Array]:
+    def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
         curve = result.curve
         fibres = fibre_constants(result).values if self.cell.fibres else {}
         return {

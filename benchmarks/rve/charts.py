@@ -17,7 +17,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from benchmarks.rows import write
@@ -26,7 +26,7 @@ from benchmarks.rve.solvers import MATRIX, PAPER, PARTICLE, SOLVERS
 RESULTS = Path(__file__).parents[1] / "results"
 PLANES = ((0.6, 4), (0.45, 5), (0.3, 6), (0.2, 8), (0.14, 9))  # mesh size, nodes in θ
 PRISMS = ((0.5, 4), (0.3, 6), (0.2, 9), (0.15, 12), (0.1, 12), (0.07, 12), (0.05, 12))  # layers
-Way = Callable[[], Homogenised]
+Way = Callable[[], HomogenisedStiffness]
 
 
 @dataclass(frozen=True)

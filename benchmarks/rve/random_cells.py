@@ -24,7 +24,7 @@ from alphacut.rve.cell import Cell, Phase, VoigtPhase
 from alphacut.rve.mesh.outline import Ellipse, circle
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.stochastic import HermiteMap
@@ -98,7 +98,7 @@ def draw_slices(rng: np.random.Generator, cell: Cell) -> SlicesModel:
     return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline)
 
 
-def judged(own: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
+def judged(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> Iterator[Judgement]:
     """Every number of a result beside that of the truth, whose declared error is added."""
     slack = truth.largest_error
     yield Judgement("E", own.estimated_error + slack, abs(own.modulus / truth.modulus - 1))
@@ -116,7 +116,7 @@ def judged(own: Homogenised, truth: Homogenised) -> Iterator[Judgement]:
     yield Judgement("stiffness", own.largest_error + slack, float(entries))
 
 
-def solved(model: PrismModel, cell: Cell) -> Homogenised:
+def solved(model: PrismModel, cell: Cell) -> HomogenisedStiffness:
     """The cell by prisms, on a finer mesh where the one drawn folds over."""
     try:
         return model.solve(cell.radius, cell.matrix, [cell.inclusion])[0]

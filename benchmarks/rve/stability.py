@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stochastic import HermiteMap, RadiusMap, TruncatedNormal
 
@@ -28,7 +28,7 @@ MATRIX, PARTICLE = Phase(20e9), Phase(80e9)
 PAPER_MAP = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)  # modal values of the paper, section 4.1
 ROUND_OFF = 1e-11
 
-Solve = Callable[[RadiusMap, Phase, Phase], Homogenised]
+Solve = Callable[[RadiusMap, Phase, Phase], HomogenisedStiffness]
 
 
 def crisp(radius: float) -> HermiteMap:
@@ -77,7 +77,7 @@ EDGES = (
 def models(*, small: bool) -> dict[str, Solve]:
     """Name → model at a resolution that suits a test (`small`) or the table."""
 
-    def series(radius_map: RadiusMap, matrix: Phase, particle: Phase) -> Homogenised:
+    def series(radius_map: RadiusMap, matrix: Phase, particle: Phase) -> HomogenisedStiffness:
         return SeriesModel().solve(radius_map, matrix, [particle])[0]
 
     def slices(order: int, size: float) -> Solve:
@@ -162,7 +162,7 @@ def table(*, small: bool) -> Iterator[Row]:
 
         def prism(
             radius_map: RadiusMap, matrix: Phase, particle: Phase, layers: int = layers
-        ) -> Homogenised:
+        ) -> HomogenisedStiffness:
             return PrismModel(mesh_size=0.25, layers=layers).solve(radius_map, matrix, [particle])[
                 0
             ]

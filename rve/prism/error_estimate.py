@@ -14,7 +14,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
-from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 
@@ -22,7 +22,7 @@ _ACCURACY = 1e-9  # of the series
 _POINTS = 14  # of slices in θ
 
 
-def judged(result: Homogenised) -> Homogenised:
+def judged(result: HomogenisedStiffness) -> HomogenisedStiffness:
     """The result with its declared errors.
 
     Args:
@@ -43,7 +43,7 @@ def judged(result: Homogenised) -> Homogenised:
     return replace(result, errors={"space": error})
 
 
-def _exact(cell: Cell) -> Homogenised:
+def _exact(cell: Cell) -> HomogenisedStiffness:
     """Result of another model of the cell, far more accurate than wedges are."""
     matrix, inclusion = cell.matrix, cell.inclusion
     if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):

@@ -31,7 +31,7 @@ from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.own_mesh import own_mesh_problem, require_own_mesh
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
-from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import require_compressible, require_mesh_size, require_parts
 from alphacut.rve.solver.krylov import Solutions, solve
 from alphacut.rve.solver.options import SolverOptions
@@ -90,7 +90,7 @@ class PrismModel:
         radius_map: RadiusMap | ThetaLaw,
         matrix: AnyPhase | Mapping[str, AnyPhase],
         inclusions: Sequence[AnyPhase] = (),
-    ) -> list[Homogenised]:
+    ) -> list[HomogenisedStiffness]:
         """One result for each of `inclusions`, in their order, on one mesh.
 
         On a mesh of one's own, `solve(law, {name: phase})` gives one result, of the law of θ and
@@ -135,7 +135,7 @@ class PrismModel:
             seconds = {}
         return results
 
-    def _solve_own_mesh(self, law: object, phases: object) -> Homogenised:
+    def _solve_own_mesh(self, law: object, phases: object) -> HomogenisedStiffness:
         """The result on a mesh of one's own."""
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
@@ -149,7 +149,7 @@ class PrismModel:
         whole = stress @ np.linalg.inv(loads).T
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
         checks = _checks(strains, stiffness, loads, named.phases) | {"residual": solved.residual}
-        return Homogenised(
+        return HomogenisedStiffness(
             curve,
             self.name,
             str(self.options),
@@ -243,12 +243,12 @@ class PrismModel:
             means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
         return means, solved
 
-    def _result(self, strains: SliceStrains, cell: Cell, residual: float) -> Homogenised:
+    def _result(self, strains: SliceStrains, cell: Cell, residual: float) -> HomogenisedStiffness:
         """The result with its certificate and its declared errors."""
         stress, loads = strains.stress(cell.stiffness), self.loads(cell)
         whole = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
-        result = Homogenised(curve, self.name, str(self.options), cell=cell)
+        result = HomogenisedStiffness(curve, self.name, str(self.options), cell=cell)
         if self.estimate:
             result = judged(result)
         allowed = 2 * result.largest_error if result.errors else self._roughly

@@ -14,7 +14,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.certificate import certified
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.means import Mean, settled_means
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import CellModuli
@@ -49,7 +49,7 @@ class SeriesModel:
 
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
-    ) -> list[Homogenised]:
+    ) -> list[HomogenisedStiffness]:
         """One result for each of `inclusions`, in their order.
 
         Raises:
@@ -70,10 +70,10 @@ class SeriesModel:
     def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
         return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
 
-    def _result(self, mean: Mean, cell: Cell, seconds: float) -> Homogenised:
+    def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedStiffness:
         """The certified result of one inclusion."""
         return certified(
-            Homogenised(
+            HomogenisedStiffness(
                 curve=mean.curve,
                 method=self.name,
                 unknowns=mean.terms,

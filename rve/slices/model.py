@@ -18,7 +18,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import STRAIN, AnyPhase, Cell, axial_moduli, square_moduli
 from alphacut.rve.certificate import certified
 from alphacut.rve.mesh.outline import Outline, circle, is_round
-from alphacut.rve.result import Homogenised, StressCurve
+from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import (
     require_compressible,
     require_continuous,
@@ -71,7 +71,7 @@ class SlicesModel:
 
     def solve(
         self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
-    ) -> list[Homogenised]:
+    ) -> list[HomogenisedStiffness]:
         """One result for each of `inclusions`, in their order.
 
         Raises:
@@ -95,7 +95,7 @@ class SlicesModel:
             moduli = square_moduli(stiffness)
             error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
             curve = StressCurve.of(rule, stiffness[nodes])
-            result = Homogenised(
+            result = HomogenisedStiffness(
                 curve=curve,
                 method=self.name,
                 solver="cholesky",

@@ -14,7 +14,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Phase
 from alphacut.rve.certificate import ROUND_OFF, mean, order_checks, require
-from alphacut.rve.result import Homogenised
+from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.spheres.bounds import hashin_shtrikman, space_stiffness
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, hill_shear
 
@@ -22,11 +22,11 @@ VOLUME_OF_UNIT_SPHERE = np.pi / 6  # over the cell's volume at r = 1: fraction =
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HomogenisedSpheres(Homogenised):
+class HomogenisedSpheres(HomogenisedStiffness):
     """Effective behaviour of the simple cubic array with what it cost.
 
-    As `Homogenised`, but `curve.stiffness` has shape (n, 6, 6), and `errors` and `moduli` are those
-    of K, (C11 − C12)/2 and C44.
+    As `HomogenisedStiffness`, but `curve.stiffness` has shape (n, 6, 6), and `errors` and `moduli`
+    are those of K, (C11 − C12)/2 and C44.
     """
 
     @property
