@@ -21,7 +21,7 @@ from alphacut.commands.options import (
 from alphacut.fuzzy.campaign.campaign import CampaignError
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
-from alphacut.io.problem import BadInput, Problem, missing
+from alphacut.io.problem import BadInput, InputProblem, missing
 from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import stoppable, uninterrupted
 
@@ -96,9 +96,12 @@ def main(
     with stoppable() as signals:
         try:
             return _run(sys.argv[1:] if arguments is None else arguments, program, names)
-        except (BadInput, RefusedError) as error:
-            for problem in error.problems if isinstance(error, BadInput) else [Problem.of(error)]:
+        except BadInput as error:
+            for problem in error.problems:
                 say(str(problem))
+            return 2
+        except RefusedError as error:
+            say(str(InputProblem.of(error)))
             return 2
         except KeyboardInterrupt:
             number = (*signals, signal.SIGINT)[0]

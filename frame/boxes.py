@@ -16,7 +16,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arrays import Rows
-from alphacut.fuzzy.knowledge.joint import joined_inputs as fuzzy_inputs
+from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.refused import RefusedError, require, require_numbers
 from alphacut.fuzzy.result import Nature
 
@@ -161,7 +161,7 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
         ValueError: An input is no number, or as `Boxes`.
     """
     require_numbers("alpha", alpha)
-    levels, numbers = np.asarray(alpha, float), fuzzy_inputs(inputs)
+    levels, numbers = np.asarray(alpha, float), joined_inputs(inputs)
     cuts = np.array(
         [[number.cut(a) for number in numbers.values()] for a in levels], float
     ).reshape(len(levels), len(numbers), 2)

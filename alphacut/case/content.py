@@ -16,7 +16,7 @@ from alphacut.case.material import (
     RoundCell,
 )
 from alphacut.case.matrices import MatricesSection
-from alphacut.case.motion import Envelope, Identify, Study
+from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, Pendulum, Structure
@@ -24,12 +24,12 @@ from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.questions.decision import Decision
 from alphacut.questions.fragility import Fragility
-from alphacut.questions.probability import Probability
+from alphacut.questions.probability import ProbabilitySection
 from alphacut.questions.question import Question
-from alphacut.questions.tolerances import Tolerances
+from alphacut.questions.tolerances import TolerancesSection
 
 Stage = Literal["microstructure", "modulus", "envelope"]
-QUESTIONS: tuple[type[Question], ...] = (Probability, Decision, Tolerances, Fragility)
+QUESTIONS: tuple[type[Question], ...] = (ProbabilitySection, Decision, TolerancesSection, Fragility)
 """Questions that a case may put to its motion, each a section as well."""
 
 
@@ -51,11 +51,11 @@ class Content(Section):
     matrices: MatricesSection | None = None
     records: RecordsSection | None = None
     study: tuple[Study, ...] = ()
-    envelope: Envelope | None = None
+    envelope: EnvelopeSection | None = None
     identify: Identify | None = None
-    probability: Probability | None = None
+    probability: ProbabilitySection | None = None
     decision: Decision | None = None
-    tolerances: Tolerances | None = None
+    tolerances: TolerancesSection | None = None
     fragility: Fragility | None = None
 
     @property

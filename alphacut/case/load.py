@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from alphacut.case.content import Content
 from alphacut.case.keys import every_key, sections
 from alphacut.fuzzy.refused import RefusedError, printable, require
-from alphacut.io.problem import BadInput, Problem, nearest, suggestion
+from alphacut.io.problem import BadInput, InputProblem, nearest, suggestion
 from alphacut.stochastic.particles.csv_columns import text_of
 
 KINDS = {
@@ -85,10 +85,10 @@ def _parsed(path: Path, text: str) -> dict[str, object]:
         line = int(where[1]) if where else next(long, len(lines))
         shown = lines[line - 1].strip() if len(lines) >= line > 0 else ""
         what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
-        raise BadInput(Problem(shown or "the file", what, file=str(path), line=line)) from None
+        raise BadInput(InputProblem(shown or "the file", what, file=str(path), line=line)) from None
 
 
-def _problems(error: ValidationError) -> Iterator[Problem]:
+def _problems(error: ValidationError) -> Iterator[InputProblem]:
     """The problem of each error that Pydantic reports; what is misspelt is not missing too."""
     details = [(_key(one["loc"]), one) for one in error.errors(include_url=False)]
     extra = {key: _meant(key) for key, one in details if one["type"] == "extra_forbidden"}
@@ -98,7 +98,7 @@ def _problems(error: ValidationError) -> Iterator[Problem]:
             close = extra[key].removeprefix(f"{_section(key)}.")
             known = ", ".join(_names(key))
             cure = f"did you mean {close}?" if close else ""
-            yield Problem(key, f"is an unknown {kind}", "", "" if close else known, cure)
+            yield InputProblem(key, f"is an unknown {kind}", "", "" if close else known, cure)
         elif key not in extra.values():
             yield _problem(key, detail)
 
@@ -123,10 +123,10 @@ def _meant(key: str) -> str:
     return elsewhere.get(nearest(name, elsewhere), "")
 
 
-def _problem(key: str, detail: ErrorDetails) -> Problem:
+def _problem(key: str, detail: ErrorDetails) -> InputProblem:
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
-        return replace(Problem.of(cause), key=cause.key or key)
+        return replace(InputProblem.of(cause), key=cause.key or key)
     what, value, cure = "", _written(detail["input"]), ""
     allowed = str(cause or KINDS.get(detail["type"], detail["msg"]))
     if detail["type"] == "missing":
@@ -135,7 +135,7 @@ def _problem(key: str, detail: ErrorDetails) -> Problem:
     if detail["type"] == "literal_error":
         allowed = str(detail["ctx"]["expected"]).replace("'", '"')
         cure = suggestion(str(detail["input"]), re.findall(r'"([^"]+)"', allowed))
-    return Problem(key, what, value, allowed, cure)
+    return InputProblem(key, what, value, allowed, cure)
 
 
 def _key(place: tuple[int | str, ...]) -> str:
@@ -150,8 +150,8 @@ def _written(value: object) -> str:
 
 
 def _located(
-    problem: Problem, path: Path, lines: Mapping[str, int], changed: Sequence[str]
-) -> Problem:
+    problem: InputProblem, path: Path, lines: Mapping[str, int], changed: Sequence[str]
+) -> InputProblem:
     """The problem with its file and line; one in an array, or of a missing key, points above it."""
     key = problem.key
     while key and key not in lines and key not in changed:

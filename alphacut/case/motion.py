@@ -77,7 +77,7 @@ class Study(Section):
     )
 
 
-class Envelope(Section):
+class EnvelopeSection(Section):
     """Fuzzy forward dynamics."""
 
     fuzzy: Names = Field(

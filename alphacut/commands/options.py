@@ -14,7 +14,7 @@ from alphacut.case.load import Case, load
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import alone, as_json, rank, require_writable, say, write_text
 from alphacut.io.manifest import MANIFEST, ResultsFolder
-from alphacut.io.problem import BadInput, Problem, suggestion
+from alphacut.io.problem import BadInput, InputProblem, suggestion
 from alphacut.stages.store import StageStore
 
 PETSC_PREFIX = "-rve_"
@@ -43,7 +43,7 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raises the complaint of argparse as a problem."""
         command = self.prog.removeprefix("alphacut").strip()
-        raise BadInput(Problem(command, f"{message}; see --help"))
+        raise BadInput(InputProblem(command, f"{message}; see --help"))
 
     def refuse(self, word: str) -> NoReturn:
         """Raises the problem of a word that is no option of this command."""

@@ -16,9 +16,9 @@ from alphacut.io.files import Document, alone, as_json, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary
 from alphacut.io.provenance import FORMAT, command, door, versions
-from alphacut.report.page import report as page_of
+from alphacut.report.page import render_page
 from alphacut.report.tables import run_text, write_tables
-from alphacut.stages.chain import Chain
+from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stages.store import StageStore, put_text
 
@@ -50,7 +50,7 @@ def computed(case: Case, store: StageStore, petsc: Mapping[str, str], *, figures
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
-        results = Chain(Results(case.content), store, petsc, figures, executor).run()
+        results = Pipeline(Results(case.content), store, petsc, figures, executor).run()
         names = drawn(results, store, executor) if figures else []
     document: Document = {
         "format_version": FORMAT,
@@ -83,7 +83,7 @@ def add_page(parser: argparse.ArgumentParser) -> None:
 def report(options: argparse.Namespace, out: TextIO) -> int:
     """Writes the page, and the tables where they are requested."""
     folder = ResultsFolder.opened(Path(options.folder))
-    page = page_of(folder)
+    page = render_page(folder)
     path = Path(options.out) if options.out else folder.path / PAGE
     if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
         with alone("FOLDER", folder.path):

@@ -14,9 +14,9 @@ from alphacut.io.netcdf import read_dataset
 from alphacut.io.quantity import between
 from alphacut.report.results import ISOTROPIC, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
-from alphacut.stages.chain import Chain
 from alphacut.stages.identify import learned
 from alphacut.stages.modulus import number_of
+from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stochastic.microstructure_summary import fragment
 
@@ -24,7 +24,7 @@ from alphacut.stochastic.microstructure_summary import fragment
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the map, writes it and prints the section [radius]."""
     with opened(options) as (case, store):
-        numbers = Chain(Results(case.content), store).particles().document
+        numbers = Pipeline(Results(case.content), store).particles().document
     text = fragment(numbers)
     answer(options, numbers | {"fragment": text}, out, text)
     return 0
@@ -34,7 +34,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the modulus of a round cell or of an image."""
     with opened(options) as (case, store):
         results = Results(case.content)
-        Chain(results, store, options.petsc).material()
+        Pipeline(results, store, options.petsc).material()
     document, words = results.document(), {"modulus": summary, "image": image}
     for name in document.keys() & words.keys():
         text = text_table(*tables(document)[name]) + words[name](document[name])
@@ -77,9 +77,9 @@ def envelope(options: argparse.Namespace, out: TextIO) -> int:
     if options.modulus:
         number = number_of(read_dataset(Path(options.modulus), "--modulus"), "--modulus")
     with opened(options) as (case, store):
-        chain = Chain(Results(case.content), store)
-        chain.motion(chain.structure(number), studies=False)
-    document = chain.results.document()
+        pipeline = Pipeline(Results(case.content), store)
+        pipeline.motion(pipeline.structure(number), studies=False)
+    document = pipeline.results.document()
     answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0
 

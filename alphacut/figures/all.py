@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from alphacut.case.content import QUESTIONS
 from alphacut.export.mesh import draw_mesh
 from alphacut.figures import envelope, follower, frame, material
-from alphacut.figures.style import save, style
+from alphacut.figures.style import report_style, save
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.cell import modal_cell
@@ -106,7 +106,7 @@ def draw_all(results: Results, executor: Executor | None, work: Work) -> StageRe
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:
     """Draws every figure whose place leaves the rest `part`; names of their files."""
-    with style():
+    with report_style():
         return [
             str(path.relative_to(folder))
             for name, make in list(drawings(results))[part::PARTS]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.figures import style as look
+from alphacut.figures import style
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
@@ -35,21 +35,21 @@ def drawings(
 
 def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure:
     """Nested bands between lower and upper envelope, the error of the lowest, the modal motion."""
-    drawn, axes = look.figure()
+    drawn, axes = style.figure()
     shown = dataset.sel(output=output)
     alpha, time = dataset["alpha"].values, dataset["time"].values
-    for level, shade in enumerate(look.colours(alpha)[:-1]):
+    for level, shade in enumerate(style.colours(alpha)[:-1]):
         band = shown.isel(alpha=level)
         axes.fill_between(time, band["lower"], band["upper"], color=shade, lw=0)
     for side in ("lower", "upper"):
-        axes.plot(time, shown.isel(alpha=-1)[side], color=look.INK, lw=0.8)
-        axes.plot(time, shown.isel(alpha=0)[side], color=look.INK, lw=0.3)
+        axes.plot(time, shown.isel(alpha=-1)[side], color=style.INK, lw=0.8)
+        axes.plot(time, shown.isel(alpha=0)[side], color=style.INK, lw=0.3)
     nature = str(dataset.attrs["nature"])
     words = nature + error_band(axes, time, shown.isel(alpha=0), nature)
     time_axes(axes, time, output)
     title = f"{Output(output).words}; fuzzy: {', '.join(task.fuzzy)}; {words}"
-    look.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
-    look.alpha_legend(axes, alpha)
+    style.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
+    style.alpha_legend(axes, alpha)
     return drawn
 
 
@@ -59,7 +59,7 @@ def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str) -> 
         return ""
     error = lowest["error"]
     for end in (lowest["lower"] - error, lowest["upper"] + error):
-        axes.plot(time, end, color=look.GREY, lw=0.7, ls="--")
+        axes.plot(time, end, color=style.GREY, lw=0.7, ls="--")
     unit = Output(str(lowest["output"].values)).unit
     return f", ± {engineering(float(error.max()), unit, digits=2)} (dashed)"
 
@@ -69,7 +69,7 @@ def time_axes(axes: Axes, time: Array, output: str) -> None:
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time t (s)")
     name = Output(output).words.removesuffix(f" ({output})")
-    look.prefix_axis(axes, name, Output(output).unit)
+    style.prefix_axis(axes, name, Output(output).unit)
 
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
@@ -86,14 +86,14 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
-    drawn, axes = look.figure()
-    axes.plot(flow.time, curves.T, color=look.BLUE, lw=0.5, alpha=0.5)
+    drawn, axes = style.figure()
+    axes.plot(flow.time, curves.T, color=style.BLUE, lw=0.5, alpha=0.5)
     shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
     for side in ("lower", "upper"):
-        axes.plot(flow.time, shown[side], color=look.INK, lw=1.3)
+        axes.plot(flow.time, shown[side], color=style.INK, lw=1.3)
     time_axes(axes, flow.time, output)
     level = f"α = {float(dataset['alpha']):g}"
-    look.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
+    style.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
     return drawn
 
 
@@ -104,7 +104,7 @@ def identified(document: Document) -> Figure:
         document: As of `stages.identify.learned`.
     """
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
-    drawn, axes = look.figure(height=0.9 + 0.32 * len(names))
+    drawn, axes = style.figure(height=0.9 + 0.32 * len(names))
     places = np.arange(len(names), dtype=float)[::-1]
     prior = np.array([document["prior"][name] for name in names], float)
     unit = prior.mean(axis=1)[:, None]
@@ -112,13 +112,13 @@ def identified(document: Document) -> Figure:
         np.array([[one["lower"], one["upper"]] for one in document["inputs"].values()])
         / unit[..., None]
     )
-    wide: look.Look = {"height": 0.7, "color": look.GREY, "alpha": 0.45, "label": "before"}
+    wide: style.Look = {"height": 0.7, "color": style.GREY, "alpha": 0.45, "label": "before"}
     axes.barh(places, np.ptp(prior / unit, axis=1), left=(prior / unit)[:, 0], lw=0, **wide)
     for row, level in enumerate(alpha):
         words = f"after, α = {level:g}" if row in (0, len(alpha) - 1) else None
-        bar: look.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": words}
+        bar: style.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": words}
         low, high = ends[:, 0, row], ends[:, 1, row]
-        axes.barh(places, high - low, left=low, lw=0, color=look.BLUE, **bar)
+        axes.barh(places, high - low, left=low, lw=0, color=style.BLUE, **bar)
     axes.set_yticks(places, names)
     axes.set_xlabel("value over the middle of what it was before")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.structure import Frame
-from alphacut.figures import style as look
+from alphacut.figures import style
 from alphacut.fuzzy.arrays import Array
 from alphacut.stages.cell import GPA
 from alphacut.stages.store import StageResult
@@ -46,19 +46,19 @@ def distribution(radius: HermiteMap, at: Array) -> Array:
 
 def p_box(section: RadiusMapSection) -> Figure:
     """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
-    drawn, axes = look.figure()
+    drawn, axes = style.figure()
     corners = maps(section, 0.0)
     low = min(radius.extremes()[0] for radius in corners)
     high = max(radius.extremes()[1] for radius in corners)
     at = np.asarray(np.linspace(low, high, 600), float)
     family = np.array([distribution(radius, at) for radius in corners])
     axes.fill_between(
-        at, family.min(0), family.max(0), color=look.PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"
+        at, family.min(0), family.max(0), color=style.PURPLE, alpha=0.15, lw=0, label="p-box, α = 0"
     )
-    axes.plot(at, family.min(0), color=look.INK, lw=1)
-    axes.plot(at, family.max(0), color=look.INK, lw=1)
+    axes.plot(at, family.min(0), color=style.INK, lw=1)
+    axes.plot(at, family.max(0), color=style.INK, lw=1)
     modal = distribution(modal_map(section), at)
-    axes.plot(at, modal, color=look.PURPLE, lw=1.8, label="modal map")
+    axes.plot(at, modal, color=style.PURPLE, lw=1.8, label="modal map")
     axes.set_xlabel("reduced radius r$_n$ = r/a")
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
@@ -79,16 +79,16 @@ def cone(section: RadiusMapSection) -> Figure:
         r * np.cos(angle),
         r * np.sin(angle),
         np.broadcast_to(theta[:, None], (80, 80)),
-        color=look.PURPLE,
+        color=style.PURPLE,
         alpha=0.65,
         lw=0,
     )
     for level in np.linspace(theta[0], theta[-1], 5):
-        axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=look.GREY, lw=0.8)
+        axes.plot([-1, 1, 1, -1, -1], [-1, -1, 1, 1, -1], level, color=style.GREY, lw=0.8)
         x, y = radius(level) * np.cos(angle), radius(level) * np.sin(angle)
-        axes.plot(x, y, level, color=look.INK, lw=0.8)
+        axes.plot(x, y, level, color=style.INK, lw=0.8)
     for x, y in itertools.product((-1, 1), (-1, 1)):
-        axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=look.GREY, lw=0.8)
+        axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=style.GREY, lw=0.8)
     axes.set_xlabel("x$_1$/a")
     axes.set_ylabel("x$_2$/a")
     axes.set_zlabel("θ")
@@ -117,27 +117,27 @@ def levels_of_samples(dataset: xarray.Dataset) -> Array:
 
 def stress_curves(dataset: xarray.Dataset) -> Figure:
     """Fig. 16: homogenised stress 11 over θ, a curve for each fuzzy sample."""
-    drawn, axes = look.figure()
+    drawn, axes = style.figure()
     alpha = dataset["alpha"].values
-    shades = dict(zip(alpha, [*look.colours(alpha)[:-1], look.INK], strict=True))
+    shades = dict(zip(alpha, [*style.colours(alpha)[:-1], style.INK], strict=True))
     membership = levels_of_samples(dataset)
     theta, curves = dataset["theta"].values, dataset["curve11"].values / GPA
     for sample in np.argsort(membership, kind="stable"):
         axes.plot(theta, curves[sample], color=shades[membership[sample]], lw=0.8)
     axes.set_xlabel("θ")
     axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
-    look.title(axes, f"{len(curves)} samples")
-    look.alpha_legend(axes, alpha)
+    style.title(axes, f"{len(curves)} samples")
+    style.alpha_legend(axes, alpha)
     return drawn
 
 
 def mean_stress(dataset: xarray.Dataset) -> Figure:
     """Fig. 17: mean homogenised stress 11 of every sample, rearranged into α-cuts."""
-    drawn, axes = look.figure()
+    drawn, axes = style.figure()
     means, levels = dataset["s11_sample"].values / GPA, levels_of_samples(dataset)
-    axes.plot(means, levels, ".", color=look.ORANGE, ms=4, zorder=4, label="samples")
-    look.shaded_cuts(axes, dataset["alpha"].values, *(dataset["s11"].values / GPA).T)
-    look.membership_axes(axes, "mean homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
+    axes.plot(means, levels, ".", color=style.ORANGE, ms=4, zorder=4, label="samples")
+    style.shaded_cuts(axes, dataset["alpha"].values, *(dataset["s11"].values / GPA).T)
+    style.membership_axes(axes, "mean homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
     axes.legend(loc="upper left")
     return drawn
 
@@ -146,36 +146,41 @@ def fuzzy_modulus(result: StageResult, frame: Frame | None) -> Figure:
     """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes, and below it fuzzy ν."""
     import matplotlib.pyplot as plt
 
-    size = (look.WIDTH, 1.75 * look.HEIGHT)
+    size = (style.WIDTH, 1.75 * style.HEIGHT)
     drawn, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
     dataset, average = result.arrays, result.document["average"]
     alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
-    look.shaded_cuts(axes, alpha, *ends.T)
+    style.shaded_cuts(axes, alpha, *ends.T)
     if frame is not None and frame.modulus is not None:
         cuts = np.array([frame.modulus.cut(level) for level in (0.0, 1.0)]) / GPA
-        line: look.Look = {"color": look.BLUE, "lw": 1.2, "ls": "--", "label": "quoted in the case"}
-        axes.plot(look.outline(*cuts.T), [0, 1, 1, 0], **line)
-        axes.plot([], [], color=look.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
+        line: style.Look = {
+            "color": style.BLUE,
+            "lw": 1.2,
+            "ls": "--",
+            "label": "quoted in the case",
+        }
+        axes.plot(style.outline(*cuts.T), [0, 1, 1, 0], **line)
+        axes.plot([], [], color=style.INK, marker="o", ms=3.5, lw=1.2, label="computed here")
         axes.legend(loc="upper left")
-    look.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
-    look.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
-    look.membership_axes(below, "effective Poisson's ratio ν of the same")
+    style.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
+    style.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
+    style.membership_axes(below, "effective Poisson's ratio ν of the same")
     return drawn
 
 
 def membership(dataset: xarray.Dataset) -> Figure:
     """Fig. 19: membership function of a convex fuzzy parameter and one of its α-cuts."""
-    drawn, axes = look.figure()
+    drawn, axes = style.figure()
     alpha, (left, right) = dataset["alpha"].values, dataset["E"].values.T / GPA
     lower, upper = (float(np.interp(SHOWN_LEVEL, alpha, side)) for side in (left, right))
-    axes.plot(look.outline(left, right), look.outline(alpha, alpha), color=look.INK, lw=1.5)
-    axes.plot([lower, upper], [SHOWN_LEVEL] * 2, color=look.ORANGE, lw=3, solid_capstyle="butt")
-    axes.vlines([lower, upper], 0, SHOWN_LEVEL, color=look.ORANGE, lw=0.8, ls=":")
+    axes.plot(style.outline(left, right), style.outline(alpha, alpha), color=style.INK, lw=1.5)
+    axes.plot([lower, upper], [SHOWN_LEVEL] * 2, color=style.ORANGE, lw=3, solid_capstyle="butt")
+    axes.vlines([lower, upper], 0, SHOWN_LEVEL, color=style.ORANGE, lw=0.8, ls=":")
     words, spot = f"α-cut at {SHOWN_LEVEL:g}: {lower:.2f} … {upper:.2f}", (lower + upper) / 2
-    axes.annotate(words, (spot, SHOWN_LEVEL + 0.03), ha="center", color=look.ORANGE)
-    beside: look.Look = {"xytext": (8, -2), "textcoords": "offset points", "va": "center"}
+    axes.annotate(words, (spot, SHOWN_LEVEL + 0.03), ha="center", color=style.ORANGE)
+    beside: style.Look = {"xytext": (8, -2), "textcoords": "offset points", "va": "center"}
     axes.annotate("core", ((left[-1] + right[-1]) / 2, 1.0), **beside)
-    look.membership_axes(axes, "fuzzy parameter, here E (GPa)")
+    style.membership_axes(axes, "fuzzy parameter, here E (GPa)")
     return drawn
 
 
@@ -183,12 +188,12 @@ def image(dataset: xarray.Dataset) -> Figure:
     """Phases as greys to the left, α-cuts of E to the right."""
     import matplotlib.pyplot as plt
 
-    drawn, (picture, cuts) = plt.subplots(1, 2, figsize=(look.WIDTH, 3.4), width_ratios=(1, 1.4))
+    drawn, (picture, cuts) = plt.subplots(1, 2, figsize=(style.WIDTH, 3.4), width_ratios=(1, 1.4))
     picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
     picture.set_xticks([])
     picture.set_yticks([])
-    look.title(picture, "phases as segmented")
+    style.title(picture, "phases as segmented")
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
-    look.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
-    look.membership_axes(cuts, "Young's modulus E, plane strain (GPa)")
+    style.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
+    style.membership_axes(cuts, "Young's modulus E, plane strain (GPa)")
     return drawn

@@ -11,13 +11,13 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import whole_file
 from alphacut.io.quantity import MINUS, axis_prefix
-from alphacut.stochastic.figures import style as look
+from alphacut.stochastic.figures import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INK, BLUE, ORANGE, GREY = look.INK, look.BLUE, look.ORANGE, look.GREY
+INK, BLUE, ORANGE, GREY = style.INK, style.BLUE, style.ORANGE, style.GREY
 PURPLE = "#7b3294"  # differs from Okabe's and Ito's blue and orange in lightness
 WIDTH, HEIGHT = 7.2, 3.8  # inches
 Colour = tuple[float, float, float, float]
@@ -25,9 +25,9 @@ Look = dict[str, Any]
 """Keywords of a drawing function of Matplotlib."""
 
 
-def style() -> AbstractContextManager[None]:
+def report_style() -> AbstractContextManager[None]:
     """The project's look, for the figures drawn inside the block."""
-    return look.style({"axes.edgecolor": INK, "axes.labelcolor": INK})
+    return style.figure_style({"axes.edgecolor": INK, "axes.labelcolor": INK})
 
 
 def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:

@@ -34,7 +34,7 @@ WHOLE = ("whole results of a run", f"make it anew by {RUN}")
 
 
 @dataclass(frozen=True)
-class Part:
+class StageFiles:
     """Files of a stage.
 
     Args:
@@ -57,7 +57,7 @@ class ResultsFolder:
     """
 
     path: Path
-    parts: dict[str, Part] = field(default_factory=dict)
+    parts: dict[str, StageFiles] = field(default_factory=dict)
     is_lost: bool = False
 
     @classmethod
@@ -78,7 +78,7 @@ class ResultsFolder:
             return cls(path, is_lost=True)
         try:
             require_known(document, file)
-            parts = {name: Part(*part) for name, part in document["stages"].items()}
+            parts = {name: StageFiles(*part) for name, part in document["stages"].items()}
             whole = document["checksum"] == _checksum(parts) and all(map(is_plain, _names(parts)))
         except (LookupError, TypeError, AttributeError):
             return cls(path, is_lost=True)
@@ -174,7 +174,7 @@ class ResultsFolder:
 
     def list_files(self, stage: str, fingerprint: str, digests: Mapping[str, str]) -> None:
         """Writes the manifest with the files of a stage by their digests."""
-        self.parts[stage] = Part(fingerprint, dict(digests))
+        self.parts[stage] = StageFiles(fingerprint, dict(digests))
         self._write()
 
     def clear(self) -> None:
@@ -255,12 +255,12 @@ def require_known(facts: Mapping[str, object], path: Path) -> None:
     require(version == FORMAT, str(path), f"of format {version}", f"files of format {FORMAT}", cure)
 
 
-def _names(parts: Mapping[str, Part]) -> Iterator[str]:
+def _names(parts: Mapping[str, StageFiles]) -> Iterator[str]:
     """Names of all files."""
     return (name for part in parts.values() for name in part.files)
 
 
-def _checksum(parts: Mapping[str, Part]) -> str:
+def _checksum(parts: Mapping[str, StageFiles]) -> str:
     """Checksum of a manifest's list."""
     listed = {stage: [part.fingerprint, dict(part.files)] for stage, part in parts.items()}
     return digest_of(json.dumps(listed, sort_keys=True).encode())

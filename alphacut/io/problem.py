@@ -11,7 +11,7 @@ from alphacut.fuzzy.refused import RefusedError, fitted, printable
 
 
 @dataclass(frozen=True)
-class Problem:
+class InputProblem:
     """One thing wrong with a case file or a command line.
 
     Args:
@@ -53,8 +53,8 @@ class Problem:
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit
     """An input that cannot be used; carries every problem of it."""
 
-    def __init__(self, problems: Problem | Sequence[Problem]) -> None:
-        self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
+    def __init__(self, problems: InputProblem | Sequence[InputProblem]) -> None:
+        self.problems = (problems,) if isinstance(problems, InputProblem) else tuple(problems)
         super().__init__("\n".join(map(str, self.problems)))
 
 

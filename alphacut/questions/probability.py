@@ -13,8 +13,7 @@ from alphacut.case.types import Quantity
 from alphacut.figures import style
 from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
 from alphacut.frame.questions.peaks import ANY
-from alphacut.frame.questions.probability import CONFIDENCE, probabilities
-from alphacut.frame.questions.probability import Probability as Bounds
+from alphacut.frame.questions.probability import CONFIDENCE, Probability, probabilities
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
@@ -40,17 +39,17 @@ def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Arr
     return draw
 
 
-def _document(name: str, one: Bounds, limits: dict[str, float]) -> Document:
+def _document(name: str, answer: Probability, limits: dict[str, float]) -> Document:
     return {
         "limit": limits.get(name, 1.0),
         "unit": "" if name == ANY else Output(name).unit,
-        "lower": one.lower,
-        "upper": one.upper,
-        "error": one.error,
-        "interval": {"lower": one.interval[0], "upper": one.interval[1]},
+        "lower": answer.lower,
+        "upper": answer.upper,
+        "error": answer.error,
+        "interval": {"lower": answer.interval[0], "upper": answer.interval[1]},
         "nature": str(Nature.ATTAINED),
-        "evaluations": one.evaluations,
-        "curve": {"limit": one.limits, "lower": one.curve[0], "upper": one.curve[1]},
+        "evaluations": answer.evaluations,
+        "curve": {"limit": answer.limits, "lower": answer.curve[0], "upper": answer.curve[1]},
     }
 
 
@@ -74,7 +73,7 @@ def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
     axes.set_title(f"limit {words} ({'dashed' if near else 'far off'})", loc="left", fontsize=10)
 
 
-class Probability(Question):
+class ProbabilitySection(Question):
     """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
 
     key = "probability"

@@ -36,7 +36,7 @@ def _row(name: str, one: Document, document: Document) -> Row:
     return f"tolerance of {name}", kept, document["nature"], ends if kept != "–" else ""
 
 
-class Tolerances(Question):
+class TolerancesSection(Question):
     """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
 
     key = "tolerances"

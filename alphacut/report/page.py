@@ -19,7 +19,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import damaged, dataset_of, read_summary, require_same_run
-from alphacut.io.problem import Problem
+from alphacut.io.problem import InputProblem
 from alphacut.report.results import (
     ANSWERS,
     Row,
@@ -62,7 +62,7 @@ FIGURES: dict[str, str] = _TABLES["figures"] | {one.key: one.caption for one in 
 WORDS: dict[str, str] = _TABLES["words"]
 
 
-def report(folder: ResultsFolder) -> str:
+def render_page(folder: ResultsFolder) -> str:
     """The page for the results in a folder.
 
     Raises:
@@ -203,7 +203,7 @@ class Page:
                 try:
                     picture = base64.b64encode(self.folder.content(self.left.pop(stem))).decode()
                 except RefusedError as error:
-                    say(f"warning: a figure is left out: {Problem.of(error)}")
+                    say(f"warning: a figure is left out: {InputProblem.of(error)}")
                     continue
                 yield "figure", caption(stem, paper=self.paper), picture
 

@@ -14,13 +14,13 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
 from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
-from alphacut.rve import bounds as plane
+from alphacut.rve import bounds
 from alphacut.rve.cell import STRAIN, Cell, Phase
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.mesh.outline import circle
 from alphacut.rve.result import HomogenisedStiffness, effective_modulus
 from alphacut.rve.series.model import SeriesModel
-from alphacut.rve.spheres import bounds as space
+from alphacut.rve.spheres import space_bounds
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
 from alphacut.rve.spheres.series.model import SphereSeriesModel
@@ -133,11 +133,11 @@ def references(radius: AnyRadius, cell: RoundCell, stated: float | None = None) 
     beside = {} if stated is None else {"fraction_of_case": stated}
     fraction, share = float(share), share if stated is None else np.asarray(stated)
     if spheres:
-        ends = space.hashin_shtrikman(share, matrix, inclusion).T
-        moduli = [_young(*k) for k in (*ends, space.mori_tanaka(share, matrix, inclusion))]
+        ends = space_bounds.hashin_shtrikman(share, matrix, inclusion).T
+        moduli = [_young(*k) for k in (*ends, space_bounds.mori_tanaka(share, matrix, inclusion))]
     else:
-        ends = plane.hashin_shtrikman(share, matrix, inclusion).T
-        whole, _, shear = plane.mori_tanaka(share, matrix, inclusion)
+        ends = bounds.hashin_shtrikman(share, matrix, inclusion).T
+        whole, _, shear = bounds.mori_tanaka(share, matrix, inclusion)
         moduli = [_across(*k) for k in (*ends, (whole / 2, shear))]
     return {
         "fraction": fraction,
@@ -208,7 +208,7 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA}}
 
 
-def require_bounds(ends: tuple[float, float], bounds: Document, particles: str) -> None:
+def require_bounds(ends: tuple[float, float], references: Document, particles: str) -> None:
     """Requires E of spheres within the Hashin–Shtrikman bounds of the fraction that a case states.
 
     A map may hold another fraction, where cells as tight as no cube are cut off, and an average
@@ -216,18 +216,18 @@ def require_bounds(ends: tuple[float, float], bounds: Document, particles: str) 
 
     Args:
         ends: Least and greatest E at the modal inputs, in Pa.
-        bounds: Of `references`.
+        references: Bounds and fractions, as function `references` gives them.
         particles: Of the cell.
 
     Raises:
         RefusedError: E lies outside by more than `SLACK`.
     """
-    if particles != "spheres" or "fraction_of_case" not in bounds:
+    if particles != "spheres" or "fraction_of_case" not in references:
         return
-    low, high = (GPA * end for end in bounds["hashin_shtrikman_E_GPa"])
-    fraction = bounds["fraction_of_case"]
+    low, high = (GPA * end for end in references["hashin_shtrikman_E_GPa"])
+    fraction = references["fraction_of_case"]
     if ends[1] < low * (1 - SLACK) or ends[0] > high * (1 + SLACK):
-        value = f"{ends[0] / GPA:.5g} GPa, of a map that holds {bounds['fraction']:.4g}"
+        value = f"{ends[0] / GPA:.5g} GPa, of a map that holds {references['fraction']:.4g}"
         limits = f"Hashin–Shtrikman's {low / GPA:.5g} … {high / GPA:.5g} GPa at {fraction:g}"
         cure = f"set cell.fraction = {fraction:g} in place of [microstructure] or [radius]"
         raise RefusedError("E of spheres", value, limits, cure)

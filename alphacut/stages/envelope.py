@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from alphacut import frame
-from alphacut.case.motion import Envelope, Study, Tolerance
+from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import Peaks, peaks, tightest
 from alphacut.frame.structures.quantities import Output
@@ -44,7 +44,7 @@ class EnvelopeTask:
     name: str
     fuzzy: tuple[str, ...]
     duration: float
-    section: Envelope
+    section: EnvelopeSection
     figures: Mapping[str, str] = field(default_factory=dict)
     limited: tuple[str, ...] = ()
 
@@ -60,7 +60,7 @@ class EnvelopeTask:
         require(own.unit in {"", *units}, "envelope.tolerance", value, allowed)
         return own
 
-    def is_motion_of(self, section: Envelope) -> bool:
+    def is_motion_of(self, section: EnvelopeSection) -> bool:
         """True if it has the inputs and the duration of [envelope]."""
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
@@ -170,7 +170,7 @@ def peaks_of(document: Document, alpha: Sequence[float]) -> Peaks:
 
 
 def tasks(
-    section: Envelope, studies: Sequence[Study], limited: tuple[str, ...] = ()
+    section: EnvelopeSection, studies: Sequence[Study], limited: tuple[str, ...] = ()
 ) -> tuple[EnvelopeTask, ...]:
     """The envelopes of a case: its studies, or the one of [envelope].
 

@@ -6,8 +6,13 @@ from dataclasses import replace
 
 from alphacut.case.motion import Identify
 from alphacut.case.structure import Structure
-from alphacut.frame.identify import Identified, MeasuredMode, RefutedError, measured_mode
-from alphacut.frame.identify import identify as identified
+from alphacut.frame.identify import (
+    Identified,
+    MeasuredMode,
+    RefutedError,
+    identify,
+    measured_mode,
+)
 from alphacut.frame.identify.identify import widest
 from alphacut.frame.structures.quantities import of_storey_frame
 from alphacut.fuzzy import FuzzyNumber
@@ -34,7 +39,7 @@ def learned(
     rows, used, prior = require_learnable(section, structure, alpha)
     assert structure.frame is not None
     try:
-        after = identified(structure.frame, prior, used, alpha=alpha)
+        after = identify(structure.frame, prior, used, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
     known = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)

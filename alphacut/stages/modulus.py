@@ -23,7 +23,7 @@ from alphacut.fuzzy import (
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.refused import require
-from alphacut.fuzzy.result import Bounds as Cuts
+from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.provenance import source_digest, versions
@@ -163,7 +163,7 @@ class CellCampaign:
         return {"sections": sections, "source": source}
 
     @property
-    def propagation(self) -> Callable[..., Cuts]:
+    def propagation(self) -> Callable[..., Bounds]:
         """The function from fuzzy inputs and a plan to the α-cuts of all outputs."""
         numbers = inputs_of(self.radius, self.cell)
         crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
@@ -208,7 +208,7 @@ class CellCampaign:
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
-    def errors(self, result: Cuts) -> dict[str, float]:
+    def errors(self, result: Bounds) -> dict[str, float]:
         """Relative error of E by source: the largest of all samples, or that of the modal one."""
         errors = {name: error for name, error in _largest(result, "error").items() if error}
         if errors or self.modulus.method != "prism":
@@ -223,7 +223,7 @@ def stage(campaign: CellCampaign) -> Stage:
     return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run, has_samples=True)
 
 
-def stage_result(result: Cuts, campaign: CellCampaign) -> StageResult:
+def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
     """α-cuts of every quantity (alpha, bound), where reached, all samples, and a document."""
     import xarray
 
@@ -271,7 +271,7 @@ def stage_result(result: Cuts, campaign: CellCampaign) -> StageResult:
     return StageResult(document, xarray.Dataset(variables, coordinates))
 
 
-def _largest(result: Cuts, kind: str) -> dict[str, float]:
+def _largest(result: Bounds, kind: str) -> dict[str, float]:
     """Largest of each error or property of the certificate over all samples."""
     assert result.samples is not None
     values = result.samples.values

@@ -9,7 +9,7 @@ from math import ceil, pi
 
 import numpy as np
 
-from alphacut.case.motion import Envelope
+from alphacut.case.motion import EnvelopeSection
 from alphacut.case.records import NamedRecording, RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
@@ -77,7 +77,7 @@ def nominal_mode(structure: Structure) -> Nominal:
 
 
 def suite(
-    section: RecordsSection, envelope: Envelope, structure: Structure
+    section: RecordsSection, envelope: EnvelopeSection, structure: Structure
 ) -> tuple[SuiteRecord, ...]:
     """The records of a suite, in the order of the case."""
     mode = nominal_mode(structure)
@@ -85,7 +85,7 @@ def suite(
 
 
 def _record(
-    section: RecordsSection, envelope: Envelope, named: NamedRecording, mode: Nominal
+    section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: Nominal
 ) -> SuiteRecord:
     ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
     measures = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame import Accelerogram, DualProof, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.structures.quantities import Output
-from alphacut.frame.structures.storey import chain
+from alphacut.frame.structures.storey import chain_matrix
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.fuzzy.arrays import Array
 from benchmarks.relations.relation import ROUNDED, Chance, Relation
@@ -142,7 +142,7 @@ class Frame:
         made, n = self._structure(), len(self.masses)
         floors = np.eye(n)
         mass = [(f"m{z + 1}", np.outer(e, e)) for z, e in enumerate(floors)]
-        springs = [(f"k{z + 1}", chain(e)) for z, e in enumerate(floors)]
+        springs = [(f"k{z + 1}", chain_matrix(e)) for z, e in enumerate(floors)]
         damping = [(name, made.rayleigh[0] * array) for name, array in mass]
         damping += [(name, made.rayleigh[1] * array) for name, array in springs]
         ratio = len(self.damping) == 1

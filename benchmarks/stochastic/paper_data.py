@@ -61,11 +61,11 @@ def draw(rows: Sequence[tuple[str, AreaWeighted]], folder: Path) -> None:
     """Distribution functions of r_n of every reading, and the paper's fitted map."""
     import matplotlib.pyplot as plt
 
-    from alphacut.stochastic.figures.style import save, style
+    from alphacut.stochastic.figures.style import figure_style, save
 
     paper = HermiteMap(ENDS[0], 0.1, ENDS[1], 0.1692)  # below eq. 12
     theta, grid = np.linspace(-3, 3, 400), np.linspace(0.05, 1.0, 400)
-    with style():
+    with figure_style():
         drawn, axes = plt.subplots(figsize=(7.2, 4.4))
         for name, sample in rows:
             axes.plot(grid, sample.cdf(grid), lw=1.2, label=name)

@@ -18,11 +18,11 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
-from alphacut.frame.certificate.remainder import Part, largest_growth, parts, suprema
+from alphacut.frame.certificate.ratio_damping import LoewnerBounds, RatioDamping
+from alphacut.frame.certificate.remainder import MotionPart, largest_growth, parts, suprema
 from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures import polynomial_dependence as dependence
+from alphacut.frame.structures import polynomial_dependence
 from alphacut.frame.structures.linear import evaluate
 
 MOST_NUMBERS = 60_000_000
@@ -48,7 +48,7 @@ def proved_error(model: ModalModel) -> Array:
     for _, sample in samples:
         _require_affordable(grid, sample)
     structure = _expanded(grid, partial(_structure, model))
-    stiffness, mass = Comparison(structure["stiffness"]), Comparison(structure["mass"])
+    stiffness, mass = LoewnerBounds(structure["stiffness"]), LoewnerBounds(structure["mass"])
     deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
     for part, sample in samples:
         defect = _expanded(grid, sample)
@@ -73,7 +73,7 @@ def proved_error(model: ModalModel) -> Array:
 
 
 def _reading(
-    rows: Array, stiffness: Comparison, mass: Comparison, ratio: RatioDamping | None
+    rows: Array, stiffness: LoewnerBounds, mass: LoewnerBounds, ratio: RatioDamping | None
 ) -> Array:
     """Share of a deviation of unit energy that each output reads, shape (m,)."""
     size = len(stiffness.factor)
@@ -88,7 +88,7 @@ def _reading(
 def _grid(model: ModalModel) -> LowerGrid:
     """Points on which all defects are known by their values."""
     ends = zip(model.boxes.lower[0].tolist(), model.boxes.upper[0].tolist(), strict=True)
-    exponents = dependence.degrees(
+    exponents = polynomial_dependence.degrees(
         model.flow.system, dict(zip(model.boxes.names, ends, strict=True))
     )
     return LowerGrid(tuple(exponents[name] for name in model.boxes.names), 2 * model.degree)
@@ -122,18 +122,18 @@ def _expanded(grid: LowerGrid, sample: Sample) -> dict[str, Array]:
 
 def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
     """The matrices that measure what the motion misses."""
-    system = dependence.without_ratio(model.flow.system)  # whose damping is a polynomial
+    system = polynomial_dependence.without_ratio(model.flow.system)  # whose damping is a polynomial
     points = model.boxes.to_physical(unit)
     matrices, rows = evaluate(system, model.flow.names, points, derivatives=False)
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
 
 
 def _defects(
-    model: ModalModel, part: Part, states: Polynomial, ratio: RatioDamping | None, unit: Array
+    model: ModalModel, part: MotionPart, states: Polynomial, ratio: RatioDamping | None, unit: Array
 ) -> dict[str, Array]:
     """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
     system, points = model.flow.system, model.boxes.to_physical(unit)
-    bare = system if ratio is None else dependence.without_ratio(system)
+    bare = system if ratio is None else polynomial_dependence.without_ratio(system)
     matrices, rows = evaluate(bare, model.flow.names, points, derivatives=False)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
     q, v = (
@@ -154,6 +154,6 @@ def _defects(
     if ratio is not None:
         more, own = ratio.defects(unit, points, speed, M, K)
         defects |= {**own, "dynamic": defects["dynamic"] + more}
-        for place, floor in dependence.accelerations(system).items():
+        for place, floor in polynomial_dependence.accelerations(system).items():
             defects["outputs"][..., place] += more[..., floor] / M[:, None, floor, floor]
     return defects

@@ -23,10 +23,10 @@ from alphacut.frame.calculus.polynomial import Polynomial, fit
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.modal.fitting import analyse, fit_points
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures import polynomial_dependence as dependence
+from alphacut.frame.structures import polynomial_dependence
 
 
-class Comparison:
+class LoewnerBounds:
     """Symmetric matrix A(p) against its mean A₀ = L Lᵀ: lowest A₀ ≤ A(p) ≤ highest A₀.
 
     Args:
@@ -54,7 +54,7 @@ class Comparison:
             )
         self.factor, self.lowest, self.highest = factor, 1 - spread, 1 + spread
 
-    def least(self, other: Comparison) -> float:
+    def least(self, other: LoewnerBounds) -> float:
         """Lower bound over the box of the eigenvalues of A against another matrix B."""
         middle = float(
             np.linalg.eigvalsh(
@@ -65,7 +65,7 @@ class Comparison:
         )
         return self.lowest / other.highest * middle
 
-    def most(self, other: Comparison) -> float:
+    def most(self, other: LoewnerBounds) -> float:
         """Upper bound over the box of the eigenvalues of A against another matrix B."""
         between = np.linalg.solve(other.factor, self.factor)
         return self.highest / other.lowest * float(np.linalg.norm(between, 2)) ** 2
@@ -103,7 +103,7 @@ class RatioDamping:
     @classmethod
     def of(cls, model: ModalModel) -> Self | None:
         """Damping of a model by its ratio; None without one."""
-        ratio = dependence.common_ratio(model.flow.system)
+        ratio = polynomial_dependence.common_ratio(model.flow.system)
         if ratio is None:
             return None
         value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else ratio
@@ -138,7 +138,7 @@ class RatioDamping:
         own = speed @ K - squared[..., None] * (speed @ M)
         return force, {"own": own, "root": squared - frequency**2, "speed": speed}
 
-    def read(self, stiffness: Comparison, mass: Comparison) -> Array:
+    def read(self, stiffness: LoewnerBounds, mass: LoewnerBounds) -> Array:
         """Bound of the damping force over a floor's mass, over ‖v‖ in the norm of M, (m,)."""
         fastest = np.sqrt(stiffness.most(mass))
         return np.asarray(2 * self.largest * fastest / self.root_masses)
@@ -148,13 +148,13 @@ class RatioDamping:
         """√m of the floor whose acceleration an output is, least over the box; else ∞, (m,)."""
         system, boxes = self.model.flow.system, self.model.boxes
         roots = np.full(len(self.model.outputs), np.inf)
-        for place, floor in dependence.accelerations(system).items():
+        for place, floor in polynomial_dependence.accelerations(system).items():
             name, fuzzy = f"m{floor + 1}", dict(zip(boxes.names, boxes.lower[0], strict=True))
             roots[place] = np.sqrt(fuzzy.get(name, system.parameters[name]))
         return roots
 
     def missed(
-        self, defect: dict[str, Array], mode: int, stiffness: Comparison, mass: Comparison
+        self, defect: dict[str, Array], mode: int, stiffness: LoewnerBounds, mass: LoewnerBounds
     ) -> float:
         """Bound of what the polynomial force misses of a mode's damping, in the norm of M⁻¹."""
         root = np.sqrt(_least(self.squared)[mode])

@@ -53,7 +53,7 @@ def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class MotionPart:
     """The free or the forced part of a modal model.
 
     Args:
@@ -74,7 +74,7 @@ class Part:
     forced: bool = False
 
 
-def parts(model: ModalModel, growth: Array) -> list[Part]:
+def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
     """Free part of a model, and the forced one under a load; `growth` bounds Re λ_k, (n,)."""
     time = model.time[:, None]
     powers = time ** np.arange(4)[:, None, None]
@@ -82,7 +82,7 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
         growth == 0, time, np.expm1(growth * time) / np.where(growth == 0, 1.0, growth)
     )
     free = [
-        Part(
+        MotionPart(
             model.coefficient,
             powers * np.exp(growth * time),
             elapsed,
@@ -106,7 +106,9 @@ def parts(model: ModalModel, growth: Array) -> list[Part]:
     )
     return [
         *free,
-        Part(model.load.share, waves, elapsed, push[:, 0], model.load.truncation, forced=True),
+        MotionPart(
+            model.load.share, waves, elapsed, push[:, 0], model.load.truncation, forced=True
+        ),
     ]
 
 

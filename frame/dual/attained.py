@@ -136,7 +136,7 @@ def _residual(shape: Array, matrix: Array, diagonal: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Waves:
+class AttainedWaves:
     """Responses e of all modes to one source, at a node for each of N points, each (N, n).
 
     Args:
@@ -154,7 +154,7 @@ class Waves:
 
 def _wave(
     source: str, sigma: Array, turn: Array, order: Array, rho: tuple[Array, ...], most: Array
-) -> Waves:
+) -> AttainedWaves:
     """Responses of derivative `order` (N,) from ρ, ρ′ and the rounding of ρ, each (N, n).
 
     `most` holds bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).
@@ -169,7 +169,7 @@ def _wave(
     if source == "start":
         of_quotient = turn * (1 + quotient) / omega
         largest = size**order * most[0][:, None]
-        return Waves(
+        return AttainedWaves(
             G.real + quotient * G.imag,
             (1 + quotient) * error,
             turn * (1 + quotient) * steep + of_quotient * np.abs(G),
@@ -177,7 +177,7 @@ def _wave(
         )
     side = -1.0 if source == "load" else 1.0
     largest = size**order * most[0][:, None]
-    return Waves(
+    return AttainedWaves(
         side * G.imag / omega,
         error / omega,
         turn * (steep / omega + np.abs(G) / omega**2),
@@ -227,7 +227,7 @@ def _error(
     point: Rows,
     read: tuple[Array, Array],
     share: tuple[Array, Array],
-    wave: Waves,
+    wave: AttainedWaves,
 ) -> Array:
     """Bound of the rounding of Σ r c e, shape (N,)."""
     (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet
-from alphacut.frame.structures.storey import StoreyFrame, chain
+from alphacut.frame.structures.storey import StoreyFrame, chain_matrix
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 
@@ -78,7 +78,9 @@ class Chain:
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
     """Squared angular frequencies (S, n) and shapes (S, floor, mode) of chains (S, n)."""
     root = np.sqrt(mass)
-    values, vectors = np.linalg.eigh(chain(stiffness) / root[..., :, None] / root[..., None, :])
+    values, vectors = np.linalg.eigh(
+        chain_matrix(stiffness) / root[..., :, None] / root[..., None, :]
+    )
     return values, vectors / root[..., None]
 
 

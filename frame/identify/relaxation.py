@@ -21,7 +21,7 @@ from scipy.sparse import csr_array, hstack
 
 from alphacut.frame.identify.chain import Chain, chain_modes, eigenvalue_ranges
 from alphacut.frame.identify.measured import ModeCut
-from alphacut.frame.structures.storey import chain as chain_matrix
+from alphacut.frame.structures.storey import chain_matrix
 from alphacut.fuzzy.arrays import Array
 
 Linear = dict[int, float]

@@ -210,15 +210,15 @@ class StoreyFrame:
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state, at S parameter sets (eq. 23)."""
         mass, links = self._of_floors("m{}", p).map(diagonal), self.springs(p)
-        elastic = links.map(chain)
-        placed = chain if self.damper_placement == "storey" else diagonal
+        elastic = links.map(chain_matrix)
+        placed = chain_matrix if self.damper_placement == "storey" else diagonal
         damping = self._of_floors("d{}", p).map(placed)
         for name, part in (("rayleigh_mass", mass), ("rayleigh_stiffness", elastic)):
             if p[name].value.any() or p[name].first.any():
                 damping = damping + p[name][:, None, None] * part
         stiffness = elastic
         if self.gravity:
-            stiffness = elastic - self.softening(p).map(chain)
+            stiffness = elastic - self.softening(p).map(chain_matrix)
         if self.ratios:
             ratios = [p[name] for name in self.ratios]
             damping = damping + modal_damping(mass, stiffness, ratios)
@@ -289,7 +289,7 @@ class StoreyFrame:
         return concatenate(columns, -1)
 
 
-def chain(links: Array) -> Array:
+def chain_matrix(links: Array) -> Array:
     """Matrices (…, n, n) of chains fixed at their lower end, from their links' coefficients."""
     at, matrix = np.arange(links.shape[-1]), diagonal(links)
     matrix[..., at[:-1], at[:-1]] += links[..., 1:]

@@ -12,8 +12,8 @@ from typing import cast
 import numpy as np
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import form as elasticity
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
+from alphacut.rve.form import strain
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.own_mesh import own_mesh_problem, require_law
 from alphacut.rve.prism.problem import PrismProblem
@@ -66,7 +66,7 @@ class ProductSpace:
     @staticmethod
     def strain(u: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
         """In-plane strain (ε11, ε22, 2 ε12) of displacements (eq. 5)."""
-        return elasticity.strain(u)
+        return strain(u)
 
     def assemble_matrix(self, form: ufl.Form) -> PETSc.Mat:
         """Reduced matrix Pᵀ A P of a bilinear form in `space`."""

@@ -15,8 +15,8 @@ from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Phase
 from alphacut.rve.certificate import ROUND_OFF, mean, order_checks, require
 from alphacut.rve.result import HomogenisedStiffness
-from alphacut.rve.spheres.bounds import hashin_shtrikman, space_stiffness
 from alphacut.rve.spheres.cubic import cubic_moduli, hill_average, hill_shear
+from alphacut.rve.spheres.space_bounds import hashin_shtrikman, space_stiffness
 
 VOLUME_OF_UNIT_SPHERE = np.pi / 6  # over the cell's volume at r = 1: fraction = π r³/6
 

@@ -19,7 +19,16 @@ from alphacut.stochastic.figures.cells import (
     draw_overlay,
     draw_two_point,
 )
-from alphacut.stochastic.figures.style import BLUE, GREY, INK, ORANGE, PALE, save, style, two_panels
+from alphacut.stochastic.figures.style import (
+    BLUE,
+    GREY,
+    INK,
+    ORANGE,
+    PALE,
+    figure_style,
+    save,
+    two_panels,
+)
 from alphacut.stochastic.microstructure import Microstructure
 from alphacut.stochastic.microstructure_summary import to_dataset
 from alphacut.stochastic.particles.image import SectionImage
@@ -43,7 +52,7 @@ def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
     figures = of_map(result)
     if result.study.shape == DISCS:
         figures |= of_discs(result)
-    with style():
+    with figure_style():
         return {name: save(figure(), folder / name) for name, figure in sorted(figures.items())}
 
 

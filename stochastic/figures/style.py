@@ -32,7 +32,7 @@ SETTINGS: dict[str, Any] = {
 
 
 @contextmanager
-def style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
+def figure_style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
     """Context in which figures have this style; `more` are other settings of Matplotlib."""
     import matplotlib as mpl
 

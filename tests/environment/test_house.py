@@ -38,7 +38,9 @@ def test_what_the_counts_look_for_would_be_seen():
     assert signatures_with_any(tree) == ["f"]
     assert words.vague_names(tree) == ["found"]
     assert words.odd_docstrings(tree) == ["What f is."]
-    assert house.raising(ast.parse("raise ValueError(1)\nraise\nProblem('a')\nrequire(x)\n")) == 3
+    assert (
+        house.raising(ast.parse("raise ValueError(1)\nraise\nInputProblem('a')\nrequire(x)\n")) == 3
+    )
     long = "One word " + "and more " * 20 + "ends. Short one."
     assert [words.words(text) for text in words.sentences(long)] == [43, 2]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-from alphacut.rve.spheres.bounds import bulk_and_shear
+from alphacut.rve.spheres.space_bounds import bulk_and_shear
 
 
 def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:

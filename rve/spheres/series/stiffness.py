@@ -10,10 +10,10 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.truncation import CellModuli, Truncation
-from alphacut.rve.spheres.bounds import bulk_and_shear
 from alphacut.rve.spheres.cubic import cubic_voigt
 from alphacut.rve.spheres.series.scattering import scattering
 from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
+from alphacut.rve.spheres.space_bounds import bulk_and_shear
 
 
 def unknowns(degree: int) -> int:

@@ -57,7 +57,7 @@ def study(nature, **more):
 @pytest.mark.parametrize(("nature", "lines"), [("estimated", 2), ("guaranteed", 0)])
 def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     data = study(nature, error=0.25 * np.ones((2, 11, 1)))
-    with style.style():
+    with style.report_style():
         _, axes = style.figure()
         words = envelope.error_band(
             axes, data["time"].values, data.sel(output="q1").isel(alpha=0), nature
@@ -98,7 +98,7 @@ def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
         },
         {"alpha": [0.0, 1.0], "bound": ["lower", "upper"]},
     )
-    with style.style():
+    with style.report_style():
         picture, cuts = material.image(data).axes
     assert picture.images[0].get_array().shape == (4, 4)
     ends = np.concatenate([line.get_xdata() for line in cuts.lines])

@@ -134,7 +134,7 @@ def test_a_fourth_question_touches_one_file_and_one_table(tmp_path):
     table = tmp_path / "alphacut" / "case" / "content.py"
     text, name = table.read_text(encoding="utf-8"), "from alphacut.questions.tolerances import"
     text = text.replace(name, f"from alphacut.questions.mean import Mean\n{name}")
-    text = text.replace("(Probability, ", "(Probability, Mean, ")
+    text = text.replace("(ProbabilitySection, ", "(ProbabilitySection, Mean, ")
     text = text.replace("    decision: D", "    mean: Mean | None = None\n    decision: D")
     table.write_text(text, encoding="utf-8")
     case = tmp_path / "case.toml"

@@ -11,7 +11,7 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.manifest import ResultsFolder
-from alphacut.report.page import report
+from alphacut.report.page import render_page
 from alphacut.report.results import (
     answers,
     drivers,
@@ -35,20 +35,20 @@ def changed(results, folder, **keys):
 
 
 def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results):
-    page = report(ResultsFolder.opened(results))
+    page = render_page(ResultsFolder.opened(results))
     assert not re.search(r'(src|href)="(?!data:)', page)
     drawn = [name for name in summary_of(results)["figures"] if name.endswith(".png")]
     assert page.count("data:image/png;base64,") == len(drawn) > 5
 
 
 def test_texts_of_the_case_are_no_markup(results):
-    page = report(ResultsFolder.opened(results))
+    page = render_page(ResultsFolder.opened(results))
     assert "<script>alert" not in page
     assert "Two floors &lt;script&gt;" in page
 
 
 def test_every_question_has_its_answer_on_the_page(results):
-    page = report(ResultsFolder.opened(results))
+    page = render_page(ResultsFolder.opened(results))
     for words in ("Can or must limits be exceeded?", "How far may tolerances go?", "How probable"):
         assert page.count(words) == 1
 
@@ -57,7 +57,7 @@ def test_a_script_in_a_drawing_does_not_reach_the_page(results, tmp_path):
     copy = changed(results, tmp_path)
     for drawing in (copy.path / "figures").glob("*.svg"):
         drawing.write_text("<svg><script>stolen()</script></svg>", encoding="utf-8")
-    assert "stolen" not in report(copy)
+    assert "stolen" not in render_page(copy)
 
 
 OUTSIDE = ["../secret", "/etc/secret", "..", "a/b", "", "x-" * 100]
@@ -69,7 +69,7 @@ def test_a_name_that_leads_out_of_the_folder_is_refused(results, tmp_path, key, 
     study = summary_of(results)["envelopes"]["all"]
     copy = changed(results, tmp_path, **{key: {name: study}})
     with pytest.raises(RefusedError, match="damaged"):
-        report(copy)
+        render_page(copy)
 
 
 def peaks_of(**ends):

@@ -17,7 +17,7 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary, require_same_run
 from alphacut.stages import envelope, modulus
-from alphacut.stages.chain import Chain
+from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, StageResult, StageStore
 from tests.alphacut.small import CELL, FRAME, SMALLER, written
@@ -114,7 +114,7 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
         'masses = ["[9, 10, 11] t"]', '[frame]\nmasses = ["[9, 10, 11] t"]'
     )
     content = load(written(tmp_path, text)).content
-    results = Chain(Results(content), store_in(tmp_path / "out")).run()
+    results = Pipeline(Results(content), store_in(tmp_path / "out")).run()
     number = modulus.number_of(results.modulus.arrays)
     assert results.structure.numbers["E"] == number
     assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
@@ -132,7 +132,7 @@ def test_the_case_reaches_few_files(tmp_path):
         if code.co_qualname == "CellTask.__call__" and not before:
             before.append(len(files))
         held = sys._getframe(1).f_locals.values()
-        if any(isinstance(x, Case | Content | Chain | Results) for x in held):
+        if any(isinstance(x, Case | Content | Pipeline | Results) for x in held):
             files.append(name)
         return None
 

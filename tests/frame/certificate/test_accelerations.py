@@ -7,7 +7,7 @@ from scipy.linalg import expm, sqrtm
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
 from alphacut.frame.certificate.model_error import _expanded, _grid, _structure
-from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
+from alphacut.frame.certificate.ratio_damping import LoewnerBounds, RatioDamping
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.fuzzy import Interval
 
@@ -55,7 +55,7 @@ def test_the_damping_force_over_a_mass_is_bounded_closely() -> None:
     assert ratio is not None
     grid = _grid(model)
     parts = _expanded(grid, lambda unit: _structure(model, unit))
-    bound = ratio.read(*(Comparison(parts[name]) for name in ("stiffness", "mass")))
+    bound = ratio.read(*(LoewnerBounds(parts[name]) for name in ("stiffness", "mass")))
     reached = np.zeros(2)
     for k1, m2 in rng.uniform([9e5, 7e3], [11e5, 9e3], (40, 2)):
         M, K = np.diag([1e4, m2]), np.array([[k1 + 6e5, -6e5], [-6e5, 6e5]])

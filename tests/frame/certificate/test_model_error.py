@@ -23,7 +23,7 @@ from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate import model_error
 from alphacut.frame.certificate.model_error import proved_error
-from alphacut.frame.certificate.ratio_damping import Comparison, RatioDamping
+from alphacut.frame.certificate.ratio_damping import LoewnerBounds, RatioDamping
 from alphacut.frame.certificate.remainder import largest_growth, parts
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.ground_response import left_out
@@ -138,7 +138,7 @@ def test_what_a_damping_ratio_leaves_out_is_bounded_tightly(squared, root) -> No
     force, own = law.defects(np.zeros((1, 1)), np.zeros((1, 1)), speed, M, K)
     missed = speed[0, 0] @ D[0] - force[0, 0]
     true = float(np.sqrt(missed @ np.linalg.solve(M[0], missed)))
-    bound = law.missed(own, 0, Comparison(K), Comparison(M))
+    bound = law.missed(own, 0, LoewnerBounds(K), LoewnerBounds(M))
     assert 1 - 1e-9 <= bound / true <= 1.8
 
 
@@ -210,7 +210,7 @@ def test_comparison_holds_over_the_box() -> None:
     rng = np.random.default_rng(5)
     mean, part = np.diag([2.0, 3.0, 4.0]), rng.uniform(-0.3, 0.3, (2, 3, 3))
     coefficients = np.stack([mean, *(part + part.swapaxes(-1, -2)) / 2])
-    found = Comparison(coefficients)
+    found = LoewnerBounds(coefficients)
     x = rng.standard_normal((5, 3))
     for u, v in rng.uniform(-1, 1, (200, 2)):
         A = coefficients[0] + u * coefficients[1] + v * coefficients[2]

@@ -20,7 +20,7 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.fenicsx import MPI, PETSc, cholesky, compiled, fem, petsc, ufl
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.settings import HALVES, require_mesh_size
-from alphacut.rve.spheres.bounds import bulk_and_shear
+from alphacut.rve.spheres.space_bounds import bulk_and_shear
 
 with uninterrupted():
     try:

@@ -6,15 +6,15 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.certificate import CertificateError
-from alphacut.rve.spheres.bounds import (
+from alphacut.rve.spheres.cubic import cubic_moduli, cubic_voigt, hill_average
+from alphacut.rve.spheres.result import certified_spheres
+from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.rve.spheres.space_bounds import (
     bulk_and_shear,
     hashin_shtrikman,
     mori_tanaka,
     space_stiffness,
 )
-from alphacut.rve.spheres.cubic import cubic_moduli, cubic_voigt, hill_average
-from alphacut.rve.spheres.result import certified_spheres
-from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.stochastic import HermiteMap
 
 MATRIX, STIFF, MAP = Phase(20e9), Phase(80e9), HermiteMap(0.1337, 0.1, 0.8663, 0.1692)

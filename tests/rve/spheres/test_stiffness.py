@@ -7,10 +7,10 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.series.truncation import SeriesError
-from alphacut.rve.spheres.bounds import bulk_and_shear, hashin_shtrikman, space_stiffness
 from alphacut.rve.spheres.result import volume_fraction
 from alphacut.rve.spheres.series import stiffness as series
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness
+from alphacut.rve.spheres.space_bounds import bulk_and_shear, hashin_shtrikman, space_stiffness
 
 MATRIX = Phase(20e9)
 

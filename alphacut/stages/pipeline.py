@@ -36,7 +36,7 @@ from alphacut.stages.store import Stage, StageResult, StageStore, Work
 
 
 @dataclass
-class Chain:
+class Pipeline:
     """A run of the stages of a case.
 
     Args:
