@@ -71,10 +71,10 @@ def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document
     except ContradictionError as error:
         put_text(folder, "contradiction.csv", columns_text(error.table))
         raise
-    rows: list[list[float]] = points.tolist()
-    wanted: list[list[float]] = trial.named().tolist()
-    places = {tuple(point): k for k, point in enumerate(rows)}
-    named = [places[tuple(point)] for point in wanted if tuple(point) in places]
+    # + 0.0 leaves no zero negative
+    places = {point.tobytes(): k for k, point in enumerate(points + 0.0)}
+    wanted = (point.tobytes() for point in trial.named() + 0.0)
+    named = [places[point] for point in wanted if point in places]
     files: dict[str, dict[str, Array]] = {
         f"{name}_motions.csv": motions_table(trial, [motions[k] for k in named]),
         f"{name}_inputs.csv": {

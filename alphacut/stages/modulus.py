@@ -301,7 +301,8 @@ def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     require("E" in data, key, "without E", "a modulus.nc of this program")
     alpha, ends = data["alpha"].values, data["E"].transpose("alpha", "bound").values
     require(ends.min() > 0, key, f"{ends.min() / GPA:.3g} GPa", "a modulus above 0")
-    require_levels(tuple(alpha.tolist()), key)
-    if tuple(alpha) == (1.0,):
+    levels = tuple(float(level) for level in alpha)
+    require_levels(levels, key)
+    if levels == (1.0,):
         return Crisp(float(ends.mean()))
     return outer_steps(alpha, ends[:, 0], ends[:, 1])

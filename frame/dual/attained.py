@@ -60,7 +60,7 @@ class Modal:
     stiffness_error: Array
     mass_error: Array
     rows: Array
-    order: Array
+    order: Rows
     accelerated: Array
 
     def read(self, point: Rows, output: Rows) -> tuple[Array, Array]:
@@ -153,7 +153,7 @@ class AttainedWaves:
 
 
 def _wave(
-    source: str, sigma: Array, turn: Array, order: Array, rho: tuple[Array, ...], most: Array
+    source: str, sigma: Array, turn: Array, order: Rows, rho: tuple[Array, ...], most: Array
 ) -> AttainedWaves:
     """Responses of derivative `order` (N,) from ρ, ρ′ and the rounding of ρ, each (N, n).
 

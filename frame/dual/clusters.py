@@ -64,13 +64,14 @@ def subspaces(centre: Centre, used: Rows, wanted: int) -> Subspaces:
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
     """
-    weight = (np.arange(len(centre.basis)) < centre.modes) * 1.0
+    weight = (np.arange(len(centre.basis)) < centre.modes).astype(float)
     heavy = form_variation(centre.mass, weight)
     stiff = form_variation(centre.stiffness, np.diag(centre.stiffness.value) ** -0.5)
     slopes = _slopes(centre)
     if not (heavy < 1 and stiff < 1):
-        along = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
-        raise UnprovedError("the structure may lose its stiffness", "take narrower inputs", along)
+        steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
+        what = "the structure may lose its stiffness"
+        raise UnprovedError(what, "take narrower inputs", steepest)
     blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes))
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
     slack = gamma(100 * len(weight))  # of norms
@@ -92,7 +93,7 @@ def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
     Raises:
         UnprovedError: The structure can move rigidly, or is unstable, in the middle.
     """
-    massive = mass.size().any(1)
+    massive = np.asarray(mass.size().any(1))
     M, K, n = mass.value, stiffness.value, len(massive)
     a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
     own, turn = np.linalg.eigh(K[np.ix_(b, b)])
@@ -101,16 +102,16 @@ def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
     light = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
     squared, turned = np.linalg.eigh(light @ (K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow) @ light.T)
     _require_stiff(squared, squared)
-    basis = np.zeros((n, n))
-    basis[np.ix_(a, range(len(a)))] = light.T @ turned
-    basis[np.ix_(b, range(len(a)))] = follow @ light.T @ turned
-    basis[np.ix_(b, range(len(a), n))] = turn * np.sqrt(squared[-1] / own)
+    basis: Array = np.zeros((n, n))
+    basis[a, : len(a)] = light.T @ turned
+    basis[b, : len(a)] = follow @ light.T @ turned
+    basis[b, len(a) :] = turn * np.sqrt(squared[-1] / own)
     used = np.union1d(mass.present(), stiffness.present())
     used = used if len(used) else np.arange(1)
     heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
-    weight = (np.arange(n) < len(a)) * 1.0
-    centre = Centre(_diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value)), basis, len(a))
-    return centre, used
+    weight = (np.arange(n) < len(a)).astype(float)
+    diagonals = _diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value))
+    return Centre(*diagonals, basis, len(a)), used
 
 
 def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
@@ -137,9 +138,9 @@ def _slopes(centre: Centre) -> Array:
 
 def _couplings(centre: Centre, some: Rows) -> Array:
     """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
-    block = (slice(None), *np.ix_(some, some))
+    stiff, heavy = (x.part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass))
     mean = (centre.squared[some, None] + centre.squared[some]) / 2
-    return np.asarray(centre.stiffness.part(1)[block] - mean * centre.mass.part(1)[block])
+    return np.asarray(stiff - mean * heavy)
 
 
 def _nearness(centre: Centre, slopes: Array) -> Array:
@@ -147,9 +148,8 @@ def _nearness(centre: Centre, slopes: Array) -> Array:
 
     At 1 their series meet a point where both are equal, for complex inputs within the unit discs.
     """
-    moved: Array = np.zeros((centre.modes, centre.modes))
-    for slope, coupling in zip(slopes.T, _couplings(centre, np.arange(centre.modes)), strict=True):
-        moved += np.abs(slope[:, None] - slope) + 2 * np.abs(coupling)
+    couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
+    moved = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
     distance = np.abs(centre.squared[:, None] - centre.squared)
     near = moved / np.maximum(distance, 1e-9 * centre.squared)
     near[np.diag_indices_from(near)] = 0.0
@@ -160,7 +160,8 @@ def _from_below(
     centre: Centre, slopes: Array, wanted: int
 ) -> tuple[list[Block], tuple[int, int] | None]:
     """Blocks of the lowest modes; modes that are nearest one another where it ends before."""
-    near, blocks, free = _nearness(centre, slopes), list[Block](), np.arange(centre.modes)
+    near, blocks = _nearness(centre, slopes), list[Block]()
+    free: Rows = np.arange(centre.modes)
     while len(free) and free[0] < wanted:
         modes = _component(near > NEAR, free[:1], free)
         while (found := sharpest(modes, rotation(centre, modes), centre)) is None:

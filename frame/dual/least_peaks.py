@@ -40,7 +40,8 @@ def least_peak(level: Level, output: int) -> tuple[float, Array]:
     lead = int(np.abs(motion).max((1, 2)).argmax())
     middle = [_middle(data.ends[k], int(data.points[0])) for k in range(len(motion))]
     others = sum(motion[k][:, middle[k]] for k in range(len(motion)) if k != lead)
-    lowest, at = np.inf, np.zeros(data.linear.shape[1])
+    lowest = np.inf
+    at: Array = np.zeros(data.linear.shape[1])
     for cell in _cells(data.ends[lead]):
         expected = motion[lead][:, _middle(cell, int(data.points[0]))] + others
         value, u = _largest_least(sides, cell, lead, expected)
@@ -49,7 +50,7 @@ def least_peak(level: Level, output: int) -> tuple[float, Array]:
     return max(lowest, 0.0), at
 
 
-def _middle(ends: Array, columns: int) -> int:
+def _middle(ends: Array | Rows, columns: int) -> int:
     """Point of a table in the middle of first and last places along ω and q (4,)."""
     return int((ends[2] + ends[3]) // 2 * columns + (ends[0] + ends[1]) // 2)
 

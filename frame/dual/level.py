@@ -81,7 +81,7 @@ def _responses(
     grid: Grid,
     ground: Accelerogram | None,
     time: Array,
-    sources: tuple[str, ...],
+    sources: Sequence[str],
     orders: Sequence[int],
 ) -> dict[int, tuple[Array, Array, Array]]:
     """Responses over a grid (sources, T, Q W), their error and stray (sources, T), by order."""
@@ -349,8 +349,8 @@ def _scaled(x: TaylorModel, radius: float) -> tuple[Array, ...]:
     lists = monomials(x.inputs, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
     rest = np.asarray(x.rest + gamma(8) * x.size())
-    linear, quadratic, cubic = (x.part(degree) for degree in (1, 2, 3))
-    return linear / radius, quadratic[order] / radius, cubic / radius, rest / radius
+    linear, quadratic, cubic = x.part(1), x.part(2)[order], x.part(3)
+    return tuple(np.asarray(y / radius) for y in (linear, quadratic, cubic, rest))
 
 
 def _blocks(nodes: Rows) -> list[Rows]:

@@ -133,7 +133,8 @@ def _known_by(
 ) -> Rest:
     """Modes of which sums and the ranges of ω and g/ω are known."""
     orders = sorted({int(order) for order in structure.order})
-    ranges = response_ranges(*ends, *excitation, orders)
+    (omega, quotient), (ground, time, sources) = ends, excitation
+    ranges = response_ranges(omega, quotient, ground, time, sources, orders)
     return _least(structure, _bounds(sums, structure, found), ranges)
 
 
@@ -243,22 +244,18 @@ def _least(
     structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
 ) -> Rest:
     """The bound of each source and output whose doubt is least at its largest."""
-    middle, half, stray = (
-        np.stack([part(ranges[int(order)]) for order in structure.order], 2)
-        for part in (
-            lambda x: (x.low + x.high) / 2,
-            lambda x: (x.high - x.low) / 2,
-            lambda x: x.stray,
-        )
-    )  # (powers, sources, m, T)
+    of_outputs = [ranges[int(order)] for order in structure.order]
+    low, high, stray = (  # (powers, sources, m, T)
+        np.stack(arrays, 2)
+        for arrays in zip(*((x.low, x.high, x.stray) for x in of_outputs), strict=True)
+    )
+    middle, half = (low + high) / 2, (high - low) / 2
     middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]
     doubts = np.stack([doubt.size() for _, doubt in bounds])
     best = (doubts * half.max(-1)).argmin(0)
-    chosen = [(best == k) * 1.0 for k in range(len(bounds))]
-    share, doubt = (
-        sum((pair[i] * mask for pair, mask in zip(bounds, chosen, strict=True)), 0.0)
-        for i in range(2)
-    )
+    share, doubt = bounds[0][0] * 0.0, bounds[0][1] * 0.0
+    for k, pair in enumerate(bounds):
+        share, doubt = share + pair[0] * (best == k), doubt + pair[1] * (best == k)
     s, o = np.indices(best.shape)
     strays = (doubts[..., None] * stray).min(0).sum(0)
     return Rest(share, doubt, middle[best, s, o], half[best, s, o], strays.T)

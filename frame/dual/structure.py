@@ -17,7 +17,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.frame.structures.matrix import Factor, MatrixStructure, Terms, value_of
 from alphacut.frame.structures.storey import StoreyFrame
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 Inputs = Mapping[str, TaylorModel]
 
@@ -43,7 +43,7 @@ class Classical:
     stiffness: TaylorModel
     rows: Array
     factor: TaylorModel
-    order: Array
+    order: Rows
     start: TaylorModel
     pattern: Array
     rayleigh: TaylorModel

@@ -40,7 +40,7 @@ def modes_wanted(
     squared, n = centre.squared, centre.modes
     read = (structure.rows @ centre.basis)[:, :n] * structure.factor.value[:, None]
     given = excited.value[:, :n]
-    light = (structure.rows @ centre.basis)[:, n:].any(1)
+    light = np.any((structure.rows @ centre.basis)[:, n:], axis=1)
     a, b = structure.rayleigh.value
     decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
     omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
@@ -61,8 +61,8 @@ def modes_wanted(
                 half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2
                 each.append(np.sqrt(row * share) * half.max(1))
             doubt[:, o] += np.min(each[light[o] :], axis=0)
-    enough = (doubt <= allowed).all(1)
-    return int(enough.argmax()) if enough.any() else n
+    enough = np.flatnonzero((doubt <= allowed).all(1))
+    return int(enough[0]) if len(enough) else n
 
 
 def _motion(source: str, sigma: Array, ground: Accelerogram | None, time: Array) -> Array:

@@ -197,7 +197,7 @@ def _parts(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
         step_integrals(sigma, x, parts[j])
         rounding[j, 0] = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * x)
         rounding[j, 1], rounding[j, 2] = error_of_integrals(sigma, x), abs(turns[j])
-    return phases, turns, parts, rounding  # type: ignore[return-value]
+    return phases, turns, parts, rounding
 
 
 @njit(cache=True)
