@@ -59,6 +59,19 @@ class Phase:
         unit = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
         return e / ((1 + nu) * (1 - 2 * nu)) * unit
 
+    @property
+    def bulk_and_shear(self) -> Array:
+        """K of three dimensions and G, shape (2,), in Pa."""
+        e, nu = self.modulus, self.poisson
+        return np.array([e / (3 * (1 - 2 * nu)), e / (2 * (1 + nu))])
+
+    @property
+    def stiffness_parts(self) -> Array:
+        """What K and G give to the stiffness, shape (2, 3, 3), in Pa."""
+        bulk = np.zeros((3, 3))
+        bulk[:2, :2] = self.bulk_and_shear[0]
+        return np.array([bulk, self.stiffness - bulk])
+
 
 @dataclass(frozen=True)
 class VoigtPhase:
@@ -89,6 +102,11 @@ class VoigtPhase:
     def stiffness(self) -> Array:
         """Plane-strain stiffness in Voigt order, (3, 3), in Pa (eq. 6)."""
         return np.array(self.rows)
+
+    @property
+    def stiffness_parts(self) -> Array:
+        """No part of a bulk modulus, and all the stiffness, shape (2, 3, 3), in Pa."""
+        return np.array([np.zeros((3, 3)), self.stiffness])
 
 
 AnyPhase = Phase | VoigtPhase
@@ -144,6 +162,19 @@ def square_moduli(stiffness: Array) -> Array:
     """C11 + C12, C11 − C12 and C33 of the square-symmetric part, shape (…, 3)."""
     mean, lateral = (stiffness[..., 0, 0] + stiffness[..., 1, 1]) / 2, stiffness[..., 0, 1]
     return np.stack([mean + lateral, mean - lateral, stiffness[..., 2, 2]], axis=-1)
+
+
+def moduli_of_energies(energies: Array, loads: Array) -> Array:
+    """The three moduli from energies of `LOADS` or `THREE_LOADS`, nan where a load is missing.
+
+    Args:
+        energies: Mean of σ_a : ε_a for each load a, shape (…, loads), in Pa.
+        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+    """
+    moduli = np.full((*energies.shape[:-1], 3), np.nan)
+    for k, place in enumerate((0, 2, 1)[: len(loads)]):
+        moduli[..., place] = energies[..., k] / (loads[k] @ loads[k])
+    return moduli
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:

@@ -12,6 +12,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.anisotropy import AVERAGES, AXES, plane_constants, require_average, shear_modulus
 from alphacut.rve.cell import STRAIN, Cell, square_moduli
+from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.stochastic import ThetaRule
 
 
@@ -75,6 +76,8 @@ class HomogenisedStiffness:
         checks: Certificate: name of each property to its measured violation, within its bound.
         cell: What was homogenised.
         average: What E and ν are of, a name in `anisotropy.AVERAGES`.
+        energies: Parts of the phases in the strain energy, of which loss factors are; None where
+            the model was not asked for them.
     """
 
     curve: StressCurve
@@ -87,6 +90,7 @@ class HomogenisedStiffness:
     checks: Mapping[str, float] = field(default_factory=dict)
     cell: Cell | None = None
     average: str = AXES
+    energies: PhaseEnergies | None = None
 
     def averaged(self, average: str) -> HomogenisedStiffness:
         """The same cell with E and ν of another average.

@@ -14,6 +14,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import STRAIN, Cell, Phase, axial_moduli
+from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
@@ -40,15 +41,27 @@ def judged(result: HomogenisedStiffness) -> HomogenisedStiffness:
     pairs = [_apart(*pair) for pair in zip(own, truth, strict=False)]
     apart = np.max(pairs, axis=0)  # nan where a modulus is not known
     error = np.asarray((1 + apart) * (1 + exact.modulus_errors) - 1)
-    return replace(result, errors={"space": error})
+    return replace(result, errors={"space": error}, energies=_judged_energies(result, exact))
+
+
+def _judged_energies(
+    result: HomogenisedStiffness, exact: HomogenisedStiffness
+) -> PhaseEnergies | None:
+    """Energies of the phases with their distance from the exact cell as declared errors."""
+    if result.energies is None or exact.energies is None:
+        return result.energies
+    values = result.energies.values
+    return PhaseEnergies(values, abs(values - exact.energies.values) + exact.energies.errors)
 
 
 def _exact(cell: Cell) -> HomogenisedStiffness:
     """Result of another model of the cell, far more accurate than wedges are."""
     matrix, inclusion = cell.matrix, cell.inclusion
     if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
-        return SeriesModel(accuracy=_ACCURACY).solve(cell.radius, matrix, [inclusion])[0]
-    model = SlicesModel(points=_POINTS, outline=cell.outline)
+        return SeriesModel(accuracy=_ACCURACY, energies=True).solve(
+            cell.radius, matrix, [inclusion]
+        )[0]
+    model = SlicesModel(points=_POINTS, outline=cell.outline, energies=True)
     return model.solve(cell.radius, matrix, [inclusion])[0]
 
 

@@ -19,13 +19,14 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import LOADS, THREE_LOADS, AnyPhase, Cell, Phase
+from alphacut.rve.cell import LOADS, THREE_LOADS, AnyPhase, Cell, Phase, moduli_of_energies
 from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.grading import REFINEMENTS
 from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.rve.mesh.triangulation import reference_radius
+from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.prism.error_estimate import judged
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
@@ -157,6 +158,7 @@ class PrismModel:
             iterations=solved.iterations,
             seconds={**seconds, "total": sum(seconds.values())},
             checks=require(checks, discretisation=ROUGH_MESH),
+            energies=energies_of(strains, named.phases, loads),
         )
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
@@ -248,7 +250,13 @@ class PrismModel:
         stress, loads = strains.stress(cell.stiffness), self.loads(cell)
         whole = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
-        result = HomogenisedStiffness(curve, self.name, str(self.options), cell=cell)
+        result = HomogenisedStiffness(
+            curve,
+            self.name,
+            str(self.options),
+            cell=cell,
+            energies=energies_of(strains, cell.phases, loads),
+        )
         if self.estimate:
             result = judged(result)
         allowed = 2 * result.largest_error if result.errors else self._roughly
@@ -259,6 +267,13 @@ class PrismModel:
     def _roughly(self) -> float:
         """Most that a mesh adds to the stiffness, where no error is declared."""
         return 0.1 * self.mesh_size ** (3 if self.interface == "conforming" else 1)
+
+
+def energies_of(strains: SliceStrains, phases: Sequence[AnyPhase], loads: Array) -> PhaseEnergies:
+    """Energies of the phases, with errors yet unknown."""
+    parts = strains.energy_parts([phase.stiffness_parts for phase in phases])
+    values = moduli_of_energies(parts, loads)
+    return PhaseEnergies(values, np.full(values.shape, np.nan))
 
 
 def _checks(

@@ -61,6 +61,15 @@ class SliceStrains:
         """Mean of σ_a : ε_b over cell and θ, shape (fields, fields), in Pa."""
         return np.asarray(np.einsum("pij,piajb->ab", np.array(stiffness), self.products))
 
+    def energy_parts(self, stiffness_parts: Sequence[Array]) -> Array:
+        """Mean of σ_a : ε_a by K and G of each phase, shape (phases, 2, fields), in Pa.
+
+        Args:
+            stiffness_parts: What K and G give to the phases' stiffness, (2, 3, 3) each.
+        """
+        parts = np.array(stiffness_parts)
+        return np.asarray(np.einsum("pxij,piaja->pxa", parts, self.products))
+
 
 class PrismProblem:
     """The product-space problem of one grid; map and phases are set anew for each sample.

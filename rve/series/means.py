@@ -88,7 +88,7 @@ def settled_means(
     known: dict[int, _Averages] = {}
     settled: dict[int, Mean] = {}
     while True:
-        counts = [count, _finer(count), _finer(_finer(count))]
+        counts = [count, finer_count(count), finer_count(finer_count(count))]
         for n in counts:
             if n not in known:
                 rule = make_rule(law, points=n)
@@ -119,6 +119,6 @@ def _mean(own: _Averages, judge: _Averages, in_theta: Array, k: int) -> Mean:
     )
 
 
-def _finer(count: int) -> int:
+def finer_count(count: int) -> int:
     """Nodes of the next finer rule: a third more."""
     return count + max(2, count // 3)

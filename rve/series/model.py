@@ -6,7 +6,7 @@ It refuses, with the error it would have, where particles nearly touch (r > 0.99
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import ClassVar
 
@@ -15,6 +15,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.certificate import certified
 from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.series.energies import mean_energies
 from alphacut.rve.series.means import Mean, settled_means
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import CellModuli
@@ -31,6 +32,7 @@ class SeriesModel:
             of one another.
         accuracy: Relative error allowed, of the series at each θ and, without `points`, of E by the
             rule in θ; from `LEAST` to 0.1.
+        energies: Whether to compute the energies of the phases, for loss factors.
 
     Raises:
         RefusedError: A value lies outside its range.
@@ -38,6 +40,7 @@ class SeriesModel:
 
     points: int | None = None
     accuracy: float = 1e-11
+    energies: bool = False
     name: ClassVar[str] = "series"
     LEAST: ClassVar[float] = 1e-12
 
@@ -65,7 +68,12 @@ class SeriesModel:
         means = settled_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
         seconds = perf_counter() - start
         cells = [Cell(matrix, inclusion, radius_map) for inclusion in inclusions]
-        return [self._result(*one, seconds) for one in zip(means, cells, strict=True)]
+        results = [self._result(*one, seconds) for one in zip(means, cells, strict=True)]
+        if not self.energies:
+            return results
+        energies = mean_energies(radius_map, matrix, inclusions, means)
+        pairs = zip(results, energies, strict=True)
+        return [replace(result, energies=energy) for result, energy in pairs]
 
     def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
         return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)

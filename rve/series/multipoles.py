@@ -38,10 +38,13 @@ LOADS = ("hydrostatic", "deviator", "shear")
 
 @dataclass(frozen=True)
 class Contrast:
-    """Factors of the interface conditions, one matrix and m inclusions, shape (m,)."""
+    """Factors of the interface conditions, one matrix and m inclusions, shape (m,).
 
-    kappa: float
-    mu: float
+    They are complex where the phases have losses: in the equations below nothing is conjugated.
+    """
+
+    kappa: complex
+    mu: complex
     kappa_i: Array
     mu_i: Array
 
@@ -52,6 +55,12 @@ class Contrast:
         kappa = np.array([3 - 4 * one.poisson for one in phases])
         mu = np.array([one.modulus / (2 * (1 + one.poisson)) for one in phases])
         return cls(float(kappa[0]), float(mu[0]), kappa[1:], mu[1:])
+
+    @classmethod
+    def of_moduli(cls, bulk: Array, shear: Array) -> Contrast:
+        """From K and G of the matrix and of m inclusions, shape (1 + m,): κ = 1 + 2 G/(K + G/3)."""
+        kappa = 1 + 2 * shear / (bulk + shear / 3)
+        return cls(kappa[0], shear[0], kappa[1:], shear[1:])
 
     @cached_property
     def ratio(self) -> Array:
@@ -156,7 +165,8 @@ def _system(
         shifted[..., :-1] = b_to_q[..., 1:] * (kind.b[1:] - 2)
     outer, inner = (mirror * f[:, None, None] for f in (contrast.outer, contrast.inner))
     coupling = (to_next + a_to_q + shifted)[:, None] + inner * (b_to_q @ to_p)[:, None]
-    source = np.zeros((len(radius), contrast.kappa_i.size, kind.a.size))
+    shape = len(radius), contrast.kappa_i.size, kind.a.size
+    source = np.zeros(shape, np.result_type(outer))
     if kind.a[0] == 1:
         source[..., 0] = mirror * contrast.outer * radius[:, None]
     else:  # the row of b_1 has a factor of its own

@@ -6,8 +6,10 @@ with radius r(θ).
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import product
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -18,6 +20,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import STRAIN, AnyPhase, Cell, axial_moduli, square_moduli
 from alphacut.rve.certificate import certified
 from alphacut.rve.mesh.outline import Outline, circle, is_round
+from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import (
     require_compressible,
@@ -26,9 +29,15 @@ from alphacut.rve.settings import (
     require_parts,
     require_points,
 )
-from alphacut.rve.slices.outline_slice import ACCURATE, JUDGE, OutlineSlice, second_size
+from alphacut.rve.slices.outline_slice import (
+    ACCURATE,
+    JUDGE,
+    OutlineSlice,
+    energies_with_errors,
+    second_size,
+)
 from alphacut.rve.slices.theta_error import DIGITS, theta_error
-from alphacut.stochastic import RadiusMap, gauss_rule
+from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 if TYPE_CHECKING:
     from alphacut.rve.slices.plane_cell import PlaneCell
@@ -52,6 +61,7 @@ class SlicesModel:
         mesh_size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
         points: Nodes in θ, at least 2.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
+        energies: Whether to compute the energies of the phases, for loss factors.
 
     Raises:
         RefusedError: A value lies outside its range.
@@ -61,6 +71,7 @@ class SlicesModel:
     mesh_size: float = 0.2
     points: int = 10
     outline: Outline = circle
+    energies: bool = False
     name = "slices"
 
     def __post_init__(self) -> None:
@@ -110,18 +121,46 @@ class SlicesModel:
                 cell=cell,
             )
             results.append(certified(result))
-        return results
+        if not self.energies:
+            return results
+        pairs = [energies_with_errors(one.energies, self.order) for one in slices]
+        values, errors = (np.array(x) for x in zip(*pairs, strict=True))
+        return [
+            replace(
+                result,
+                energies=self._mean_energies(result, radii, nodes, values[:, m], errors[:, m]),
+            )
+            for m, result in enumerate(results)
+        ]
+
+    def _mean_energies(
+        self, result: HomogenisedStiffness, radii: Array, nodes: Array, values: Array, errors: Array
+    ) -> PhaseEnergies:
+        """Means of energies at `radii`, (n, 2, 2, 3); those of the rule are at `nodes` of them."""
+        cell, rule = result.cell, ThetaRule(result.curve.theta, result.curve.weights)
+        assert cell is not None
+        moduli = values.sum(axis=(1, 2))
+
+        def missed(at_radii: Array) -> Array:
+            relative = theta_error(
+                cell.radius, rule, radii=radii, moduli=at_radii, phases=cell.phases
+            )
+            return relative * rule.mean(at_radii[nodes])
+
+        # moduli of stiffer phases, c + X ∂c/∂X, are averaged as well as moduli are
+        in_theta = [[missed(moduli + values[:, p, x]) for x in range(2)] for p in range(2)]
+        error = rule.mean(errors[nodes]) + np.array(in_theta) + missed(moduli)
+        return PhaseEnergies(rule.mean(values[nodes]), error)
 
     def _slice(
         self, radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> Slice | OutlineSlice:
         """One plane cell by what tells its error."""
         size, outline = self.mesh_size, self.outline
+        options = {"mesh_size": size, "outline": outline, "energies": self.energies}
         if is_round(outline):
-            return solve_slice(radius, matrix, inclusions, mesh_size=size, outline=outline)
-        return solve_outline_slice(
-            radius, matrix, inclusions, mesh_size=size, outline=outline, order=self.order
-        )
+            return solve_slice(radius, matrix, inclusions, **options)
+        return solve_outline_slice(radius, matrix, inclusions, order=self.order, **options)
 
 
 def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
@@ -149,12 +188,15 @@ class Slice:
         mesh_size: Edge length of the mesh, in halves of the cell's side.
         cancelled: Relative round-off that a stiff particle's forces leave of each inclusion where
             they cancel, shape (m, 1).
+        energies: Parts of the phases in the three moduli by order, shape (m, 2, 2, 3), in Pa; empty
+            where they were not asked for.
     """
 
     by_order: Array
     unknowns: Mapping[int, int]
     mesh_size: float
     cancelled: Array
+    energies: Mapping[int, Array] = field(default_factory=dict)
 
     def stiffness(self, order: int) -> Array:
         """By one order, shape (m, 3, 3), in Pa."""
@@ -196,6 +238,7 @@ def solve_slice(
     *,
     mesh_size: float,
     outline: Outline = circle,
+    energies: bool = False,
 ) -> Slice:
     """Solve one plane cell by orders 2, 3 and 4 on one mesh."""
     from alphacut.rve.mesh.curved import plane_mesh
@@ -203,12 +246,13 @@ def solve_slice(
 
     mesh = plane_mesh(radius, size=mesh_size, outline=outline)
     cells = {order: PlaneCell(mesh, order) for order in _ORDERS}
-    stiffness = [_stiffness(cell, matrix, inclusions) for cell in cells.values()]
+    stiffness, parts = _by_order(cells, matrix, inclusions, energies=energies)
     return Slice(
-        np.array(stiffness),
+        np.array([*stiffness.values()]),
         {order: cell.unknowns for order, cell in cells.items()},
         mesh_size,
         _cancelled(radius, matrix, inclusions),
+        parts,
     )
 
 
@@ -220,6 +264,7 @@ def solve_outline_slice(
     mesh_size: float,
     outline: Outline,
     order: int = ACCURATE,
+    energies: bool = False,
 ) -> OutlineSlice:
     """Solve one plane cell with a particle that is not round, on two meshes.
 
@@ -230,6 +275,7 @@ def solve_outline_slice(
         mesh_size: Edge length of the mesh of the result, in halves of the cell's side.
         outline: Of the particle.
         order: Of the result.
+        energies: Whether to compute the energies of the phases.
     """
     from alphacut.rve.mesh.curved import plane_mesh
     from alphacut.rve.slices.plane_cell import PlaneCell
@@ -237,17 +283,31 @@ def solve_outline_slice(
     mesh = plane_mesh(radius, size=mesh_size, outline=outline)
     second = plane_mesh(radius, size=second_size(mesh_size), outline=outline)
     cells = {one: PlaneCell(mesh, one) for one in {order, ACCURATE, JUDGE}}
+    stiffness, parts = _by_order(cells, matrix, inclusions, energies=energies)
+    judge = {JUDGE: PlaneCell(second, JUDGE)}
     return OutlineSlice(
-        by_order={one: _stiffness(cell, matrix, inclusions) for one, cell in cells.items()},
-        on_second_mesh=_stiffness(PlaneCell(second, JUDGE), matrix, inclusions),
+        by_order=stiffness,
+        on_second_mesh=_by_order(judge, matrix, inclusions)[0][JUDGE],
         unknowns={one: cell.unknowns for one, cell in cells.items()},
         round_off=_ROUND_OFF + _cancelled(radius, matrix, inclusions),
+        energies=parts,
     )
 
 
-def _stiffness(cell: PlaneCell, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:
-    """Homogenised stiffness for all inclusions, shape (m, 3, 3), in Pa."""
-    return np.array([cell.stiffness((matrix.stiffness, one.stiffness)) for one in inclusions])
+def _by_order(
+    cells: Mapping[int, PlaneCell],
+    matrix: AnyPhase,
+    inclusions: Sequence[AnyPhase],
+    *,
+    energies: bool = False,
+) -> tuple[dict[int, Array], dict[int, Array]]:
+    """Stiffness, (m, 3, 3), and energies if wanted, (m, 2, 2, 3), for all inclusions by order."""
+    stiffness, parts = defaultdict(list), defaultdict(list)
+    for (order, cell), inclusion in product(cells.items(), inclusions):
+        stiffness[order].append(cell.stiffness((matrix.stiffness, inclusion.stiffness)))
+        if energies:
+            parts[order].append(cell.phase_energies((matrix, inclusion)))
+    return tuple({order: np.array(x) for order, x in of.items()} for of in (stiffness, parts))
 
 
 def _cancelled(radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:

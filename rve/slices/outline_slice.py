@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,6 +18,7 @@ size ends to matter. Where it would lie above, the second mesh is twice as fine.
 ORDER_SAFETY = 1.6
 """True error of order 4 over its distance from order 5: 1.02 … 1.59 of 216 moduli (ellipses and
 stars, contrasts 1e-3 … 1e3, mesh sizes 0.15, 0.3, 0.6)."""
+NOISE = 1e-12  # of an energy, over the modulus
 MESH_SAFETY = 1.1
 """The same over the distance from order 5 on the finer mesh: 1.00 … 1.07."""
 
@@ -36,12 +37,15 @@ class OutlineSlice:
         on_second_mesh: By order `JUDGE`, shape (m, 3, 3).
         unknowns: Of the linear system, by order.
         round_off: Relative error by rounding of each inclusion, shape (m, 1).
+        energies: Parts of the phases in the three moduli by order, shape (m, 2, 2, 3), in Pa; empty
+            where they were not asked for.
     """
 
     by_order: Mapping[int, Array]
     on_second_mesh: Array
     unknowns: Mapping[int, int]
     round_off: Array
+    energies: Mapping[int, Array] = field(default_factory=dict)
 
     def stiffness(self, order: int) -> Array:
         """By one order, shape (m, 3, 3), in Pa."""
@@ -72,3 +76,13 @@ def _distance(first: Array, second: Array, *, square: bool) -> Array:
     """Largest relative distance of each modulus along either axis, shape (m, 3)."""
     ratio = axial_moduli(first, square=square) / axial_moduli(second, square=square)
     return np.asarray((np.maximum(ratio, 1 / ratio) - 1).max(axis=1))
+
+
+def energies_with_errors(energies: Mapping[int, Array], order: int) -> tuple[Array, Array]:
+    """Energies by an order and their declared errors, shape (m, 2, 2, 3) each.
+
+    The distance from the highest other order, which is far from both where that is the lower one.
+    """
+    values, other = energies[order], energies[max(set(energies) - {order})]
+    error = ORDER_SAFETY * abs(values - other)
+    return values, error + NOISE * values.sum(axis=(1, 2), keepdims=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.cell import AREA
-from alphacut.rve.fenicsx import MPI, basix, cholesky, fem, mesh_of
+from alphacut.rve.cell import AREA, THREE_LOADS, AnyPhase, moduli_of_energies
+from alphacut.rve.fenicsx import MPI, PETSc, basix, cholesky, fem, mesh_of
 from alphacut.rve.form import CellForm, measure_of
 from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
 from alphacut.rve.mesh.jacobian import quadrature_degree
@@ -67,9 +69,43 @@ class PlaneCell:
                 f" {solved.residual:.1e}; {RESIDUAL:g} is allowed",
                 "check the moduli, or take the series",
             )
+        self._fields = solved.vectors
         uniform = -self._affine().T @ np.stack(forces, axis=-1)
         gained = [[load.dot(x) for x in solved.vectors] for load in loads]
         return np.asarray((uniform - gained) / AREA)  # ⟨σ⟩ by Hill–Mandel
+
+    def phase_energies(self, phases: tuple[AnyPhase, AnyPhase]) -> Array:
+        """Parts of K and G of the phases in the three moduli, shape (2, 2, 3), in Pa.
+
+        They are of the fields of the last `stiffness`, which was of these phases.
+        """
+        energies = np.zeros((2, 2, 3))
+        fields = [self._field(strain) for strain in THREE_LOADS]
+        for kind in range(2):
+            self._form.set_phases([phase.stiffness_parts[kind] for phase in phases])
+            for k in range(2):
+                of_loads = self._energies(fields, slice(k, k + 1))
+                energies[k, kind] = moduli_of_energies(of_loads, THREE_LOADS)
+        return energies
+
+    def _field(self, strain: Array) -> PETSc.Vec:
+        """Fluctuation of a macroscopic strain (3,) from those of unit strains."""
+        field = self._fields[0].duplicate()
+        field.set(0.0)
+        field.maxpy(strain.tolist(), self._fields)
+        return field
+
+    def _energies(self, fields: Sequence[PETSc.Vec], phase: slice) -> Array:
+        """Mean of ε_a : C ε_a in a phase, C as set, for each of `THREE_LOADS`, in Pa."""
+        self._matrix.zeroEntries()
+        self._form.add_stiffness(self._matrix, phase)
+        energies, affine = [], self._affine()
+        for strain, field in zip(THREE_LOADS, fields, strict=True):
+            force = self._form.load(strain, phase)
+            load = reduced(force, self._local, self.unknowns, self.unknowns)
+            uniform = -(affine @ strain) @ force
+            energies.append(uniform - 2 * load.dot(field) + field.dot(self._matrix * field))
+        return np.array(energies) / AREA
 
     def _affine(self) -> Array:
         """Displacements of the unit strains (11, 22, 12 with 2 ε12 = 1), shape (nodes · 2, 3)."""

@@ -1,0 +1,96 @@
+"""Loss factors of the cell from those of its phases.
+
+A phase with losses has the moduli K (1 + i η_K) and G (1 + i η_G), and the cell has the elastic
+stiffness at these (correspondence principle: Hashin, J. Appl. Mech. 32, 630, 1965). To first order
+the loss factor of an effective modulus c is Σ η ∂ln c/∂ln X over all K and G of the phases. By Hill
+and Mandel's lemma X ∂C/∂X is the part of X in the strain energy (Ungar and Kerwin, J. Acoust. Soc.
+Am. 34, 954, 1962).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve.cell import AnyPhase, Phase
+from alphacut.rve.phase_energies import CONSTANTS, first_order
+from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.series.energies import complex_moduli
+
+MAX_FIRST_ORDER = 0.1
+"""Loss factor of a phase above which the series takes complex moduli."""
+ROUND_OFF = 1e-12
+
+
+@dataclass(frozen=True)
+class LossFactors:
+    """Effective loss factors by the names of `CONSTANTS`, and their declared absolute errors."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+
+
+def phase_losses(phase: AnyPhase, loss: float, bulk_loss: float | None = None) -> Array:
+    """Loss factors of K and of G, shape (2,), from that of Young's modulus.
+
+    1/E = 1/(9 K) + 1/(3 G) loses the mean of both by energy. Without a loss of the bulk modulus ν
+    is real, and all moduli have the same.
+
+    Args:
+        phase: The material.
+        loss: Of Young's modulus, tan δ of a pull.
+        bulk_loss: Of the bulk modulus, where it is another.
+
+    Raises:
+        RefusedError: The shear modulus would have a negative loss, or the phase is not isotropic.
+    """
+    if bulk_loss is None:
+        return np.array([loss, loss])
+    if not isinstance(phase, Phase):
+        raise RefusedError("loss of the bulk modulus", bulk_loss, "none beside a stiffness")
+    nu = phase.poisson
+    shear_loss = (3 * loss - (1 - 2 * nu) * bulk_loss) / (2 * (1 + nu))
+    if shear_loss < 0:
+        most = f"up to {3 * loss / (1 - 2 * nu):.4g}, where the shear modulus loses nothing"
+        raise RefusedError("loss of the bulk modulus", bulk_loss, most)
+    return np.array([bulk_loss, shear_loss])
+
+
+def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
+    """Loss factors of E, G and K of a result that knows the energies of its phases.
+
+    They are of first order; where a phase has more than `MAX_FIRST_ORDER`, those of the series are
+    of complex moduli.
+
+    Args:
+        result: Of any model.
+        losses: Of K and G of each phase, shape (phases, 2).
+
+    Raises:
+        RefusedError: The model was not asked for the energies.
+    """
+    if result.energies is None:
+        raise RefusedError("energies", None, "a model with energies=True")
+    values, errors = first_order(result.energies, losses, result.constants_of)
+    beyond = np.ptp(losses) ** 2 * values
+    if losses.max() > MAX_FIRST_ORDER and result.method == "series":
+        values, beyond = _by_complex_moduli(result, losses), np.zeros(3)
+    errors = errors + beyond + ROUND_OFF * abs(values)
+    return LossFactors(
+        *(dict(zip(CONSTANTS, map(float, x), strict=True)) for x in (values, errors))
+    )
+
+
+def _by_complex_moduli(result: HomogenisedStiffness, losses: Array) -> Array:
+    """Loss factors of E, G, K of the series at complex moduli of the phases, shape (3,)."""
+    cell, curve = result.cell, result.curve
+    assert cell is not None
+    moduli = np.array([phase.bulk_and_shear for phase in cell.phases]) * (1 + 1j * losses)
+    radii = cell.radius(curve.theta)
+    mean = curve.weights @ complex_moduli(radii, *moduli.T, harmonics=result.unknowns)[:, 0]
+    young, poisson = result.constants_of(mean)
+    constants = np.array([young, young / (2 * (1 + poisson)), mean[0]])
+    return np.asarray(constants.imag / constants.real)

@@ -1,0 +1,90 @@
+"""Loss factors of the cell: shares of energy, against complex moduli and between models."""
+
+import numpy as np
+import pytest
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import Ellipse, Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
+from alphacut.rve.loss_factors import loss_factors, phase_losses
+from alphacut.rve.phase_energies import first_order
+from alphacut.stochastic import HermiteMap
+
+RADIUS = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+MATRIX, PARTICLE = Phase(20e9, 0.3), Phase(80e9, 0.2)
+LOSSES = np.array([[0.01, 0.02], [0.005, 0.003]])
+MODELS = [
+    SeriesModel(energies=True),
+    SlicesModel(3, 0.5, 6, energies=True),
+    PrismModel(0.5, 4, stiffness=True),
+]
+
+
+def solved(model, matrix=MATRIX, particle=PARTICLE):
+    return model.solve(RADIUS, matrix, [particle])[0].averaged("isotropic")
+
+
+def test_the_shares_of_the_paper_s_cell_are_those_of_differences_of_its_modulus():
+    result = SeriesModel(energies=True).solve(RADIUS, MATRIX, [Phase(80e9, 0.3)])[0]
+    of_phases = [
+        result.averaged(x).energies.shares(result.averaged(x).constants_of)[0][..., 0].sum(1)
+        for x in ("axes", "isotropic")
+    ]
+    assert np.allclose(of_phases, [[0.90141, 0.09859], [0.87617, 0.12383]], atol=1e-5)
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
+def test_models_agree_within_their_errors_and_keep_the_modulus(model):
+    exact, result = solved(MODELS[0]), solved(model)
+    work = result.energies.values.sum(axis=(0, 1))
+    assert np.allclose(work, result.moduli, rtol=1e-11, atol=0)
+    truth, found = loss_factors(exact, LOSSES), loss_factors(result, LOSSES)
+    for name, value in found.values.items():
+        assert abs(value - truth.values[name]) <= found.errors[name] < 0.02 * value
+    same = loss_factors(result, np.full((2, 2), 0.02)).values
+    assert np.allclose([*same.values()], 0.02, rtol=1e-12, atol=0)
+    if model.name != "prism":
+        without = type(model)(**{**vars(model), "energies": False})
+        assert solved(without).modulus == result.modulus
+
+
+def test_the_first_order_misses_complex_moduli_by_the_square_of_the_losses():
+    result, losses = solved(MODELS[0]), np.array([[0.48, 0.44], [0.12, 0.16]])
+    gaps = []
+    for scale in (1, 0.5, 0.25):
+        exact = loss_factors(result, losses * scale)  # above a tenth, by complex moduli
+        values, _ = first_order(result.energies, losses * scale, result.constants_of)
+        gaps.append(abs(values / [*exact.values.values()] - 1))
+    slopes = np.log2(np.array(gaps[:-1]) / gaps[1:])
+    assert (abs(slopes - 2) < 0.1).all()
+    assert (gaps[0] < np.ptp(losses) ** 2).all()
+
+
+@pytest.mark.parametrize("contrast", [1e-9, 1e9])
+def test_pores_and_rigid_particles_lose_nothing_whatever_their_loss(contrast):
+    result = solved(MODELS[0], particle=Phase(20e9 * contrast, 0.2))
+    loss = loss_factors(result, np.array([[0.02, 0.02], [0.09, 0.09]]))
+    assert np.allclose([*loss.values.values()], 0.02, rtol=1e-6)
+
+
+def test_ellipses_of_an_orthotropic_material_agree_in_slices_and_prisms():
+    particle = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0), (5e9, 0, 30e9)))
+    outline, radius = Ellipse(2.0, 30.0), HermiteMap(0.2, 0.1, 0.6, 0.1)
+    losses = np.array([[0.02, 0.02], [0.005, 0.005]])
+    slices, prism = (
+        loss_factors(model.solve(radius, MATRIX, [particle])[0].averaged("isotropic"), losses)
+        for model in (
+            SlicesModel(3, 0.5, 6, outline=outline, energies=True),
+            PrismModel(0.4, 4, outline=outline),
+        )
+    )
+    for name, value in prism.values.items():
+        assert abs(value - slices.values[name]) <= prism.errors[name] + slices.errors[name]
+
+
+def test_the_loss_of_young_s_modulus_is_the_mean_of_bulk_and_shear_by_energy():
+    bulk, shear = phase_losses(MATRIX, 0.02, 0.005)
+    moduli = MATRIX.bulk_and_shear * np.array([1 + 1e-9j * bulk, 1 + 1e-9j * shear])
+    young = 1 / (1 / (9 * moduli[0]) + 1 / (3 * moduli[1]))
+    assert young.imag / young.real * 1e9 == pytest.approx(0.02, rel=1e-6)
+    with pytest.raises(RefusedError, match=r"up to 0\.15"):
+        phase_losses(MATRIX, 0.02, 0.2)
