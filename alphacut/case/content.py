@@ -6,6 +6,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from alphacut.case.limits import (
+    DecisionSection,
+    FragilitySection,
+    ProbabilitySection,
+    QuestionSection,
+    TolerancesSection,
+)
 from alphacut.case.material import (
     AnyRadius,
     Cell,
@@ -22,15 +29,8 @@ from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.questions.decision import Decision
-from alphacut.questions.fragility import Fragility
-from alphacut.questions.probability import ProbabilitySection
-from alphacut.questions.question import Question
-from alphacut.questions.tolerances import TolerancesSection
 
 Stage = Literal["microstructure", "modulus", "envelope"]
-QUESTIONS: tuple[type[Question], ...] = (ProbabilitySection, Decision, TolerancesSection, Fragility)
-"""Questions that a case may put to its motion, each a section as well."""
 
 
 class Content(Section):
@@ -54,15 +54,15 @@ class Content(Section):
     envelope: EnvelopeSection | None = None
     identify: Identify | None = None
     probability: ProbabilitySection | None = None
-    decision: Decision | None = None
+    decision: DecisionSection | None = None
     tolerances: TolerancesSection | None = None
-    fragility: Fragility | None = None
+    fragility: FragilitySection | None = None
 
     @property
-    def questions(self) -> dict[str, Question]:
+    def questions(self) -> dict[str, QuestionSection]:
         """Sections of questions to the motion, by their keys."""
-        every = {question.key: getattr(self, question.key) for question in QUESTIONS}
-        return {key: section for key, section in every.items() if section is not None}
+        sections = (self.probability, self.decision, self.tolerances, self.fragility)
+        return {section.key: section for section in sections if section is not None}
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:

@@ -9,9 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.case.content import QUESTIONS
 from alphacut.export.mesh import draw_mesh
-from alphacut.figures import envelope, follower, frame, material
+from alphacut.figures import answers, envelope, follower, frame, material
 from alphacut.figures.style import report_style, save
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.provenance import NESTED, version_of
@@ -32,9 +31,9 @@ def drawings(results: Results) -> Iterator[Drawing]:
     yield from _structure(results)
     if results.learned is not None and "refuted" not in results.learned:
         yield "update-inputs", partial(envelope.identified, results.learned)
-    for question in QUESTIONS:
-        if question.key in results.answers:
-            yield question.key, partial(question.figure, results.answers[question.key])
+    for key, draw in answers.DRAWINGS.items():
+        if key in results.answers:
+            yield key, partial(draw, results.answers[key])
     for task in results.tasks:
         yield from envelope.drawings(task, results.envelopes[task.name].arrays)
 

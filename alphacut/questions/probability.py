@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
 
-from alphacut.case.structure import Structure
-from alphacut.case.types import Quantity
-from alphacut.figures import style
-from alphacut.figures.style import INK, ORANGE, alpha_legend, colours
+from alphacut.case.limits import ProbabilitySection
 from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.questions.probability import CONFIDENCE, Probability, probabilities
 from alphacut.frame.structures.quantities import Output
@@ -19,12 +15,8 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.quantity import between, engineering
+from alphacut.io.quantity import between
 from alphacut.questions.question import Motion, Question, Row, event_words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
@@ -53,29 +45,22 @@ def _document(name: str, answer: Probability, limits: dict[str, float]) -> Docum
     }
 
 
-def cut(one: Document, level: int) -> str:
+def cut(event: Document, level: int) -> str:
     """Bounds of a probability on a level."""
-    return between(one["lower"][level], one["upper"][level], Nature.ATTAINED, 3)
+    return between(event["lower"][level], event["upper"][level], Nature.ATTAINED, 3)
 
 
-def interval(one: Document, level: int) -> str:
+def interval(event: Document, level: int) -> str:
     """Interval of a probability on a level that holds whatever the draws are, rounded outwards."""
-    ends = one["interval"]
+    ends = event["interval"]
     return between(ends["lower"][level], ends["upper"][level], Nature.GUARANTEED, 3)
 
 
-def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
-    """The case's limit, where it is near the curve."""
-    words = engineering(limit, unit) if unit else "1"
-    near = limit <= 2 * limits[-1]
-    if near:
-        axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
-    axes.set_title(f"limit {words} ({'dashed' if near else 'far off'})", loc="left", fontsize=10)
-
-
-class ProbabilitySection(Question):
+@dataclass(frozen=True)
+class ProbabilityQuestion(Question):
     """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
 
+    section: ProbabilitySection
     key = "probability"
     title = "How probable is it that limits are exceeded?"
     caption = "Fuzzy probability of exceeding a limit, over the limit"
@@ -88,27 +73,11 @@ class ProbabilitySection(Question):
         "between nodes",
     )
 
-    random: tuple[str, ...] = Field(
-        default=(), description="inputs that are random, with the shape of their membership"
-    )
-    samples: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
-        default=200, description="random draws at each fuzzy point"
-    )
-
-    def check(self, structure: Structure) -> None:
-        """Refuses limits and random inputs that the structure does not have.
-
-        Raises:
-            RefusedError: It has no such output or input.
-        """
-        super().check(structure)
-        structure.inputs([x for x in self.random if x != "E"], "probability.random")
-
     def answer(self, motion: Motion) -> Document:
         """Probabilities of exceeding each limit, and any of several."""
         structure = motion.structure
-        limits = self.in_si(structure)
-        random = structure.inputs(self.random, "probability.random")
+        limits = self.section.in_si(structure)
+        random = structure.inputs(self.section.random, "probability.random")
         fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
         crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
         answers = probabilities(
@@ -119,17 +88,17 @@ class ProbabilitySection(Question):
             duration=motion.duration,
             step=motion.step,
             alpha=motion.alpha,
-            samples=self.samples,
+            samples=self.section.samples,
             rng=np.random.default_rng(0),
             progress=motion.progress,
         )
         return {
             "fuzzy": list(fuzzy),
             "random": list(random),
-            "samples": self.samples,
+            "samples": self.section.samples,
             "step": motion.step,
             "alpha": motion.alpha,
-            "events": {name: _document(name, one, limits) for name, one in answers.items()},
+            "events": {name: _document(name, answer, limits) for name, answer in answers.items()},
         }
 
     @staticmethod
@@ -137,14 +106,14 @@ class ProbabilitySection(Question):
         """A row for each limit."""
         return [
             (
-                event_words(name, one["limit"], one["unit"]),
-                cut(one, 0),
-                one["nature"],
-                cut(one, -1),
-                interval(one, 0),
-                f"{max(one['error']):.2g}",
+                event_words(name, event["limit"], event["unit"]),
+                cut(event, 0),
+                event["nature"],
+                cut(event, -1),
+                interval(event, 0),
+                f"{max(event['error']):.2g}",
             )
-            for name, one in document["events"].items()
+            for name, event in document["events"].items()
         ]
 
     @staticmethod
@@ -159,23 +128,3 @@ class ProbabilitySection(Question):
             f" those at nodes every {document['step']:g} s; the last column says what lies between"
             " them."
         )
-
-    @staticmethod
-    def figure(document: Document) -> Figure:
-        """Probability over the limit, for the last event, between its bounds by level."""
-        name, one = list(document["events"].items())[-1]
-        alpha = np.asarray(document["alpha"], float)
-        limits = np.asarray(one["curve"]["limit"], float)
-        lower, upper = (np.asarray(one["curve"][side], float) for side in ("lower", "upper"))
-        drawn, axes = style.figure(7.2, 3.6)
-        for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):
-            axes.fill_between(limits, low, high, color=shade, lw=0)
-        for end in (lower[-1], upper[-1]):
-            axes.plot(limits, end, color=INK, lw=1)
-        _mark(axes, one["limit"], limits, one["unit"])
-        title = f"limit of |{name}|" if one["unit"] else "all limits, over those of the case"
-        style.prefix_axis(axes, title, one["unit"], across=True)
-        axes.set_ylabel("probability of exceeding it")
-        axes.set_ylim(0, 1.02)
-        alpha_legend(axes, alpha)
-        return drawn

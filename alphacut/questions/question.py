@@ -1,81 +1,26 @@
-"""A question to the motion of a case: a section, an answer, a figure, rows of the report.
+"""A question to the motion of a case: an answer, and the rows and words of the report.
 
-It is about limits: "drift1 <= 40 mm", "drift1 <= 0.5 %", "q3 <= 80 mm". Each question is one file
-beside this one, and one line of `alphacut.case.content`.
+Its section stands in `alphacut.case.limits`, its figure in `alphacut.figures.answers`. Each
+question is one file beside this one, and one line of `alphacut.questions.all`.
 """
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import ClassVar
 
-from pydantic import Field, PlainValidator
-
+from alphacut.case.limits import QuestionSection
 from alphacut.case.structure import Structure
-from alphacut.case.types import Section, Some
 from alphacut.frame.questions.peaks import Peaks
-from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io import quantity
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
-@dataclass(frozen=True)
-class Limit:
-    """Largest magnitude allowed of an output.
-
-    Args:
-        output: Of the structure.
-        value: In the SI unit of the output, or as a share of the storey's height.
-        share: Whether it is such a share.
-        text: The limit as the user wrote it.
-    """
-
-    output: str
-    value: float
-    share: bool
-    text: str
-
-    def si(self, structure: Structure, key: str) -> float:
-        """Limit in the SI unit of its output.
-
-        Raises:
-            RefusedError: The structure has no height of the storey.
-        """
-        number = structure.numbers.get(self.output.replace("drift", "l"))
-        if self.share and number is None:
-            raise RefusedError(
-                key, self.text, "a storey of the frame, whose length the share is of"
-            )
-        return self.value * number.modal if self.share and number else self.value
-
-
-def _limit(value: object) -> Limit:
-    """Limit that a text says."""
-    name, bound, text = (part.strip() for part in str(value).partition("<="))
-    allowed = "an output, <= and a quantity, as 'drift1 <= 40 mm' or 'drift1 <= 0.5 %'"
-    share = name.startswith("drift") and text.endswith("%")
-    number, reason = 0.0, ""
-    try:
-        number = quantity.number(text, "" if share else Output(name).unit)
-    except (ValueError, KeyError) as error:
-        reason = str(error)
-    whole = bool(bound) and re.fullmatch(r"\w+", name) is not None and number > 0
-    require(whole, "", value, allowed, reason * bool(bound))
-    return Limit(name, number, share, str(value))
-
-
-One = Annotated[Limit, PlainValidator(_limit, json_schema_input_type=str)]
-Limits = Annotated[tuple[One, ...], Some]
+PEAK_ERROR = 5e-3
+"""Error of the peaks of limited outputs that is aimed at, as a share of each."""
 
 
 def limit_words(output: str, limit: float, unit: str) -> str:
@@ -147,41 +92,22 @@ class Motion:
 Row = tuple[str, ...]
 
 
-class Question(Section, ABC):
-    """A question about limits of outputs, as a section of the case.
+@dataclass(frozen=True)
+class Question(ABC):
+    """A question about limits of outputs: its answer, and how that is read.
 
-    Its attributes are the name of the section, of its results and its figure; the heading in the
-    report; the caption of the figure; the titles of the columns of `rows`; and whether the answer
-    is read from the peaks of the limited outputs.
+    Its attributes are the name of its section, of its results and its figure; the heading in the
+    report; the caption of the figure; and the titles of the columns of `rows`.
+
+    Args:
+        section: The section of the case that puts the question.
     """
 
+    section: QuestionSection
     key: ClassVar[str]
     title: ClassVar[str]
     caption: ClassVar[str]
     head: ClassVar[Row]
-    reads_peaks: ClassVar[bool] = False
-    limits: Limits = Field(description="limits of outputs, 'drift1 <= 0.5 %', 'a3 <= 2 m/s^2'")
-
-    def in_si(self, structure: Structure) -> dict[str, float]:
-        """The limit of each output in its SI unit.
-
-        Raises:
-            RefusedError: The structure has no such output, or an output has two limits.
-        """
-        key = f"{self.key}.limits"
-        values = {limit.output: limit.si(structure, key) for limit in self.limits}
-        structure.observing(key, tuple(values))
-        every = ", ".join(limit.text for limit in self.limits)
-        require(len(values) == len(self.limits), key, every, "one limit for each output")
-        return values
-
-    def check(self, structure: Structure) -> None:
-        """Refuses what the structure does not have.
-
-        Raises:
-            RefusedError: It has no such output or input.
-        """
-        self.in_si(structure)
 
     def require_answerable(self, motion: Motion) -> None:
         """Refuses a motion that the question cannot be put to.
@@ -189,7 +115,7 @@ class Question(Section, ABC):
         Raises:
             RefusedError: It is one.
         """
-        self.check(motion.structure)
+        self.section.check(motion.structure)
 
     @abstractmethod
     def answer(self, motion: Motion) -> Document:
@@ -204,8 +130,3 @@ class Question(Section, ABC):
     @abstractmethod
     def words(document: Document) -> str:
         """Sentence on how to read it."""
-
-    @staticmethod
-    @abstractmethod
-    def figure(document: Document) -> Figure:
-        """Drawing of an answer."""

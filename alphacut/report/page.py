@@ -11,7 +11,6 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
@@ -20,6 +19,7 @@ from alphacut.io.files import Document, say
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import damaged, dataset_of, read_summary, require_same_run
 from alphacut.io.problem import InputProblem
+from alphacut.questions.all import QUESTIONS
 from alphacut.report.results import (
     ANSWERS,
     Row,

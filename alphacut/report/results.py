@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, between
+from alphacut.questions.all import QUESTIONS
 
 Row = tuple[str, ...]
 Table = tuple[Row, list[Row]]

@@ -8,13 +8,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.case.content import QUESTIONS
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
 from alphacut.io.quantity import ends, engineering
+from alphacut.questions.all import QUESTIONS
 from alphacut.report.results import (
     Row,
     Table,

@@ -19,12 +19,11 @@ from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
+from alphacut.questions.question import PEAK_ERROR
 from alphacut.stages.store import Stage, StageResult, Work
 
 USUAL = Tolerance(1e-3, "")
 """Tolerance where none is named: a share of each peak."""
-PEAK_ERROR = 5e-3
-"""Error of the peaks of limited outputs that is aimed at, as a share of each."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 
 

@@ -17,6 +17,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.columns import columns_text
 from alphacut.io.files import as_json, say
+from alphacut.questions.all import questions_of
 from alphacut.questions.question import Motion, Question
 from alphacut.stages import (
     cell,
@@ -155,10 +156,10 @@ class Pipeline:
 
     def _answer(self, motion: Motion) -> None:
         """Answers to what the case asks of a motion."""
-        for key, section in self.content.questions.items():
-            compute = partial(answer_of, section, motion)
-            stage = Stage(key, [section, motion], ("fuzzy", "frame", "alphacut"), compute)
-            self.results.answers[key] = self.store.take(stage).document
+        for question in questions_of(self.content.questions):
+            compute, inputs = partial(answer_of, question, motion), [question.section, motion]
+            stage = Stage(question.key, inputs, ("fuzzy", "frame", "alphacut"), compute)
+            self.results.answers[question.key] = self.store.take(stage).document
 
     def _suite(self, section: RecordsSection, structure: Structure, task: EnvelopeTask) -> None:
         """Peaks under each record of a suite, and the answers to what the case asks of them."""
@@ -189,6 +190,6 @@ class Pipeline:
         return peaks_of(result.document["peak"], alpha)
 
 
-def answer_of(section: Question, motion: Motion, work: Work) -> StageResult:
+def answer_of(question: Question, motion: Motion, work: Work) -> StageResult:
     """The answer to a question about a motion."""
-    return StageResult(section.answer(replace(motion, progress=work.tick)))
+    return StageResult(question.answer(replace(motion, progress=work.tick)))

@@ -9,6 +9,7 @@ from alphacut.case.content import Content
 from alphacut.case.structure import STAND_IN, Structure
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.refused import FailedError
+from alphacut.questions.all import questions_of
 from alphacut.questions.question import Motion
 from alphacut.stages import envelope, identify, image, suite
 from alphacut.stages.cell import model_of
@@ -70,7 +71,7 @@ def _require_motion(content: Content) -> None:
         _require_envelope(task, structure)
     (task,) = envelope.tasks(content.envelope, ())
     motion = Motion(structure, task.fuzzy, alpha, task.duration, task.section.step)
-    for question in content.questions.values():
+    for question in questions_of(content.questions):
         question.require_answerable(motion)
 
 
