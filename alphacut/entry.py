@@ -23,7 +23,8 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import check_destinations, rank, ranks, say, standard_output
 from alphacut.io.problem import BadInput, InputProblem, missing
 from alphacut.io.provenance import own_version
-from alphacut.rve.interruption import stoppable, uninterrupted
+from alphacut.rve.interruption import uninterrupted
+from alphacut.signals import stoppable
 
 COMMANDS = {
     "run": "run",

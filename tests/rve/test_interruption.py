@@ -60,7 +60,8 @@ def test_it_ends_with_the_usual_status_once_the_import_is_done(
 def test_where_ctrl_c_is_ignored_the_others_still_wait_for_the_end(number, ends):
     program = f"""
 import os, signal
-from alphacut.rve.interruption import stoppable, uninterrupted
+from alphacut.rve.interruption import uninterrupted
+from alphacut.signals import stoppable
 signal.signal(signal.SIGINT, signal.SIG_IGN)
 try:
     with stoppable(), uninterrupted():
