@@ -25,8 +25,7 @@ import numpy as np
 from alphacut.frame.box_proof import BisectionError, BoxProof, Goal, PartBounds, refusing
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dynamics.flow import LinearFlow
-from alphacut.frame.dynamics.integrators import Exact
+from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.part_store import PartStore
 from alphacut.fuzzy.arrays import Array, Mask
@@ -401,7 +400,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         UnprovedError: The system is not linear, its motion not the exact one, or bounds are not
             proved.
     """
-    begun, linear, cuts = time.perf_counter(), exact(flow), flow.boxes
+    begun, linear, cuts = time.perf_counter(), exact_flow(flow.flow), flow.boxes
     with refusing():
         proof.forecast(linear, cuts)
     store = None if flow.store is None else PartStore(flow.store, _problem(proof, flow))
@@ -470,20 +469,3 @@ def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None
         beyond = np.nanmax(np.where(wrong, inner - outer, np.nan))
         what = f"attained bounds of {output} lie outside the proved ones by {beyond:.3g}"
         raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
-
-
-def exact(flow: UnitFlow) -> LinearFlow:
-    """The exact motion of a linear structure.
-
-    Raises:
-        UnprovedError: It is none.
-    """
-    linear = flow.flow
-    if not isinstance(linear, LinearFlow):
-        raise UnprovedError("the system is not linear")
-    if not isinstance(linear.integrator, Exact):
-        raise UnprovedError(
-            f"the motion is that of the scheme '{linear.integrator.name}', and a proof is of the"
-            " exact one"
-        )
-    return linear

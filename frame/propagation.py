@@ -11,11 +11,6 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.checks.step_error import (
-    step_error,
-    with_step_error,
-    with_stray,
-)
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
@@ -32,6 +27,11 @@ from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError, require_modal_order
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
+from alphacut.frame.verification.step_error import (
+    step_error,
+    with_step_error,
+    with_stray,
+)
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing

@@ -1,12 +1,12 @@
 """Fuzzy inputs through any model: α-cuts, methods of search, bounds."""
 
 from alphacut.fuzzy.campaign.store import Store
+from alphacut.fuzzy.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
 from alphacut.fuzzy.knowledge.from_data import from_data
 from alphacut.fuzzy.knowledge.joint import jointly
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.alpha_cut_optimisation import Optimisation
 from alphacut.fuzzy.plans.automatic import Automatic
-from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo, RandomInput
 from alphacut.fuzzy.plans.transformation import Extended, General, Reduced, Signed
 from alphacut.fuzzy.propagation import propagate, width_shares
 from alphacut.fuzzy.refused import FailedError, RefusedError

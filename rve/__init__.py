@@ -6,7 +6,7 @@ Each model is a frozen dataclass of its resolution with ``solve(radius_map, matr
 from typing import TYPE_CHECKING, Any
 
 from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
-from alphacut.rve.mesh.outline import Ellipse
+from alphacut.rve.outline import Ellipse
 from alphacut.rve.result import HomogenisedStiffness, StressCurve, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel

@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.mesh.outline import Outline, area, circle, is_round
+from alphacut.rve.outline import Outline, area, circle, is_round
 from alphacut.stochastic import RadiusMap
 
 AREA = 4.0  # of the cell, in halves of its side

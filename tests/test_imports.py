@@ -1,6 +1,7 @@
 """Imports point one way, and no package imports DOLFINx or its like."""
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -70,13 +71,14 @@ def test_imports_point_one_way(package):
     assert not {name: found for name, found in wrong.items() if found}
 
 
-ROOMS = {
-    "alphacut": ("io", "records", "case", "stages", "export", "figures", "report", "commands"),
-    "fuzzy": ("sets", "knowledge", "campaign", "plans"),
-    "frame": ("calculus", "structures", "response", "dynamics", "modal", "certificate", "methods"),
-    "rve": ("mesh", "planar", "slices", "series", "table"),
-}
-"""Rooms of each package, in the order in which they may import: each those before it."""
+TABLE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+def rooms_of(package: str) -> tuple[str, ...]:
+    """Folders of a package in the order of CONTRIBUTING's table: each may import those before."""
+    rows = re.findall(rf"^\| in `{package}/` \| (.*) \|$", TABLE, re.MULTILINE)
+    assert len(rows) == 1, f"CONTRIBUTING.md has {len(rows)} rows of the rooms in {package}"
+    return tuple(re.findall(r"`(\w+)`", rows[0]))
 
 
 def module_of(path: Path) -> str:
@@ -118,46 +120,73 @@ def graph() -> dict[str, set[str]]:
     }
 
 
-def circles(of: dict[str, set[str]]) -> set[str]:
-    """Modules that lie on a circle: what is left once those without imports are taken away."""
-    left = dict(of)
-    while free := {name for name, found in left.items() if not found & left.keys()}:
-        left = {name: found for name, found in left.items() if name not in free}
-    while last := {name for name in left if not any(name in found for found in left.values())}:
-        left = {name: found for name, found in left.items() if name not in last}
-    return set(left)
+def circles(imports: dict[str, set[str]]) -> set[str]:
+    """Nodes on a circle: what stays when those that import nothing, or nobody imports, are gone."""
+    rest = dict(imports)
+    while free := {name for name, found in rest.items() if not found & rest.keys()}:
+        rest = {name: found for name, found in rest.items() if name not in free}
+    while last := {name for name in rest if not any(name in found for found in rest.values())}:
+        rest = {name: found for name, found in rest.items() if name not in last}
+    return set(rest)
 
 
-def backward(of: dict[str, set[str]]) -> list[str]:
-    """Imports from a room of one that comes after it."""
-    wrong = []
-    for package, rooms in ROOMS.items():
-        place = {room: number for number, room in enumerate(rooms)}
-        prefix = "alphacut." if package == "alphacut" else f"alphacut.{package}."
-        for name, found in of.items():
-            here = name.removeprefix(prefix).partition(".")[0] if name.startswith(prefix) else ""
-            for other in found if here in place else ():
-                there = other.removeprefix(prefix).partition(".")[0]
-                if other.startswith(prefix) and place.get(there, -1) > place[here]:
-                    wrong.append(f"{name} imports {other}")
-    return wrong
+def folder_of(module: str) -> str:
+    """Folder of a module within its package, as "frame.dual"; a file beside the folders is itself."""
+    package = package_of(module)
+    parts = module.removeprefix("alphacut.").removeprefix(f"{package}.").split(".")
+    return f"{package}.{parts[0]}" if module != f"alphacut.{package}" else package
+
+
+def folder_imports(imports: dict[str, set[str]]) -> dict[str, set[str]]:
+    """The folders that each folder imports, of those that are not doors of a package."""
+    folders: dict[str, set[str]] = {}
+    for name, used in imports.items():
+        here = folder_of(name)
+        folders.setdefault(here, set()).update({folder_of(other) for other in used} - {here})
+    return folders
+
+
+def backward(imports: dict[str, set[str]], package: str) -> list[str]:
+    """Imports of a folder from one that comes after it in CONTRIBUTING's table."""
+    order = {f"{package}.{room}": number for number, room in enumerate(rooms_of(package))}
+    return [
+        f"{here} imports {there}"
+        for here, used in folder_imports(imports).items()
+        for there in used
+        if here in order and order.get(there, -1) > order[here]
+    ]
 
 
 def test_no_files_import_one_another_in_a_circle():
     assert circles(graph()) == set()
 
 
-def test_rooms_import_in_one_direction():
-    assert backward(graph()) == []
+def test_no_folders_import_one_another_in_a_circle():
+    assert circles(folder_imports(graph())) == set()
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_rooms_import_in_the_order_of_the_table(package):
+    folders = {
+        path.name
+        for path in (ROOT / package).iterdir()
+        if path.is_dir() and not path.is_symlink() and any(path.rglob("*.py"))
+    }
+    assert set(rooms_of(package)) == folders
+    assert backward(graph(), package) == []
 
 
 def test_a_circle_and_a_backward_import_would_be_seen():
     lazy = ast.parse("def f():\n    from alphacut.case import load\n")
     assert uses(lazy, {"alphacut.case.load"}) == {"alphacut.case.load"}
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == {"b", "c"}
-    assert backward({"alphacut.io.files": {"alphacut.case.load"}, "alphacut.case.load": set()}) == [
-        "alphacut.io.files imports alphacut.case.load"
-    ]
+    wrong = {"alphacut.io.files": {"alphacut.case.load"}, "alphacut.case.load": set()}
+    assert backward(wrong, "alphacut") == ["alphacut.io imports alphacut.case"]
+    pair = {"alphacut.frame.dual.level": {"alphacut.frame.parts"}}
+    pair["alphacut.frame.parts"] = {"alphacut.frame.dual.box"}
+    pair["alphacut.frame.dual.box"] = set()
+    assert circles(pair) == set()
+    assert circles(folder_imports(pair)) == {"frame.dual", "frame.parts"}
 
 
 def test_a_wrong_direction_would_be_seen():
@@ -173,7 +202,22 @@ def test_a_wrong_direction_would_be_seen():
 )
 def test_a_package_imports_nothing_heavy(package):
     program = f"import sys, {package}; print(*sys.modules)"
+    assert not HEAVY & modules_after(program)
+
+
+def modules_after(program: str) -> set[str]:
+    """What a program prints, word by word."""
     run = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
-    assert not HEAVY & set(run.stdout.split())
+    return set(run.stdout.split())
+
+
+def test_a_case_is_read_without_matplotlib():
+    program = "import sys; from alphacut.case.load import load; load('cases/building.toml')"
+    modules = modules_after(f"{program}; print(*sys.modules)")
+    assert "alphacut.case.content" in modules
+    assert not {name for name in modules if name.partition(".")[0] == "matplotlib"}
+    assert not {
+        name for name in modules if name.startswith(("alphacut.figures", "alphacut.questi"))
+    }

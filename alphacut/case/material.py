@@ -27,7 +27,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.quantity import number
 from alphacut.rve.cell import VoigtPhase
-from alphacut.rve.mesh.outline import Ellipse, circle, reach
+from alphacut.rve.outline import Ellipse, circle, reach
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 

@@ -17,7 +17,7 @@ from alphacut.io.provenance import versions
 from alphacut.rve import bounds
 from alphacut.rve.cell import STRAIN, Cell, Phase
 from alphacut.rve.fibre_constants import fibre_constants
-from alphacut.rve.mesh.outline import circle
+from alphacut.rve.outline import circle
 from alphacut.rve.result import HomogenisedStiffness, effective_modulus
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.spheres import space_bounds

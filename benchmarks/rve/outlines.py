@@ -21,7 +21,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Phase, square_moduli
 from alphacut.rve.mesh.curved import plane_mesh
-from alphacut.rve.mesh.outline import Ellipse, Outline, reach
+from alphacut.rve.outline import Ellipse, Outline, reach
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.slices.model import SlicesModel
 from alphacut.rve.slices.plane_cell import PlaneCell

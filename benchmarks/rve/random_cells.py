@@ -21,7 +21,7 @@ import numpy as np
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Cell, Phase, VoigtPhase
-from alphacut.rve.mesh.outline import Ellipse, circle
+from alphacut.rve.outline import Ellipse, circle
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.result import HomogenisedStiffness

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet
+from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
@@ -188,3 +189,19 @@ class LinearFlow(Flow):
             step_map = self.integrator.step_map(matrices, h)
             load = linear_load(ground, h, steps)
         return trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)
+
+
+def exact_flow(flow: object) -> LinearFlow:
+    """The flow, if it is the exact motion of a linear structure.
+
+    Raises:
+        UnprovedError: It is none.
+    """
+    if not isinstance(flow, LinearFlow):
+        raise UnprovedError("the system is not linear")
+    if not isinstance(flow.integrator, Exact):
+        raise UnprovedError(
+            f"the motion is that of the scheme '{flow.integrator.name}', and a proof is of the"
+            " exact one"
+        )
+    return flow

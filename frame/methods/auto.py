@@ -22,12 +22,12 @@ from alphacut.frame.boxes import SHARE, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.dual.proof import DualProof
-from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
-from alphacut.frame.parts import WIDE, exact
+from alphacut.frame.parts import WIDE
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
@@ -118,7 +118,7 @@ class Auto:
         for each in (proof, dual) if inputs <= MOST_PARAMETERS else (dual,):
             try:
                 with refusing():
-                    works.append((each.forecast(exact(flow), flow.boxes), each))
+                    works.append((each.forecast(exact_flow(flow.flow), flow.boxes), each))
             except UnprovedError as error:
                 reasons.append(f"{each.name}: {error}")
         if self.tolerance and not self.peaks and len(works) == 2:

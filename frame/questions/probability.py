@@ -18,11 +18,11 @@ import numpy as np
 
 from alphacut.frame.boxes import ALPHA, Boxes, boxes
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
-from alphacut.frame.checks.step_error import MARGIN, stray
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.questions.peaks import ANY, require_limits, within_steps
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.verification.step_error import MARGIN, stray
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress

@@ -12,10 +12,10 @@ from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.gmsh_prisms import INCLUSION, Prisms, extruded
 from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading
-from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Triangulation
+from alphacut.rve.outline import Outline, circle, is_round
 
 BELOW, ABOVE = [0, 1, 2, 6, 7, 9], [3, 4, 5, 12, 13, 14]
 """Nodes of a prism's triangles in Basix's order: vertices, then edges 01, 02, 12."""

@@ -13,7 +13,7 @@ from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading, particle_grading
 from alphacut.rve.mesh.jacobian import LEAST_RATIO, jacobian_ratios
-from alphacut.rve.mesh.outline import Outline, circle, is_round, require_fit
+from alphacut.rve.outline import Outline, circle, is_round, require_fit
 from alphacut.rve.settings import require_mesh_size
 
 _CLOSEST = 0.9995

@@ -13,8 +13,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.outline import Outline
 from alphacut.rve.mesh.periodicity import MeshError
+from alphacut.rve.outline import Outline
 
 PRISM_15 = 18
 """Gmsh's type of the element."""

@@ -7,7 +7,7 @@ from math import hypot
 
 import numpy as np
 
-from alphacut.rve.mesh.outline import Outline, bend_radii, extents
+from alphacut.rve.outline import Outline, bend_radii, extents
 
 Sizes = Callable[[float, float], float]
 _PER_RADIUS = 1.4

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.rve.mesh.outline import Outline, bend_radii, is_round
+from alphacut.rve.outline import Outline, bend_radii, is_round
 
 Triangles = tuple[Array, Rows, Mask]
 Sizes = Callable[[float, float], float]

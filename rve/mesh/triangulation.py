@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.rve.mesh.outline import Outline, circle, reach, require_fit
+from alphacut.rve.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, require_map
 
 

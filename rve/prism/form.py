@@ -9,9 +9,9 @@ from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.fenicsx import MPI, at_points, basix, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm, strain
 from alphacut.rve.mesh.jacobian import LEAST_RATIO
-from alphacut.rve.mesh.outline import is_round
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES, slab_rule, slice_weights, wedge
+from alphacut.rve.outline import is_round
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.quadrature import level_rule
 

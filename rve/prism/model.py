@@ -24,8 +24,8 @@ from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.grading import REFINEMENTS
-from alphacut.rve.mesh.outline import Outline, circle, is_round
 from alphacut.rve.mesh.triangulation import reference_radius
+from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.prism.error_estimate import judged
 from alphacut.rve.prism.form import FoldedMeshError

@@ -19,7 +19,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import STRAIN, AnyPhase, Cell, axial_moduli, square_moduli
 from alphacut.rve.certificate import certified
-from alphacut.rve.mesh.outline import Outline, circle, is_round
+from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import (

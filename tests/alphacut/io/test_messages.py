@@ -6,7 +6,7 @@ import pytest
 from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, RefusedError, Triangular, propagate
-from alphacut.fuzzy.plans.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo
+from alphacut.fuzzy.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo
 from alphacut.fuzzy.refused import real
 from alphacut.io.problem import InputProblem
 from tests.alphacut.small import FRAME, written

@@ -19,11 +19,11 @@ from alphacut.frame.certificate.remainder import (
     largest_growth,
     parts,
 )
-from alphacut.frame.checks.step_error import MARGIN, step_error
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, problems
 from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.verification.step_error import MARGIN, step_error
 from alphacut.fuzzy import Interval
 
 PULSE = Accelerogram(0.37, np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0]))

@@ -10,10 +10,10 @@ from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
 from alphacut.rve.mesh.jacobian import jacobian_ratios
-from alphacut.rve.mesh.outline import Ellipse, area, circle, is_round
 from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
 from alphacut.rve.mesh.prism_grid import moved
 from alphacut.rve.mesh.triangulation import reference_radius
+from alphacut.rve.outline import Ellipse, area, circle, is_round
 from alphacut.stochastic import HermiteMap
 
 

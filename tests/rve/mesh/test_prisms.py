@@ -10,9 +10,9 @@ pytest.importorskip("dolfinx")
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh import gmsh_prisms, square
 from alphacut.rve.mesh.columns import extrude, grid_of
-from alphacut.rve.mesh.outline import Ellipse, circle
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.rve.mesh.wedge import slab_rule, wedge
+from alphacut.rve.outline import Ellipse, circle
 from alphacut.rve.prism.form import PrismForm
 from alphacut.stochastic import HermiteMap
 

@@ -16,7 +16,7 @@ MODELS = """
 import json
 from mpi4py import MPI
 from alphacut.rve.cell import Phase
-from alphacut.rve.mesh.outline import Ellipse
+from alphacut.rve.outline import Ellipse
 from alphacut.rve.prism.model import PrismModel
 from alphacut.stochastic import HermiteMap
 

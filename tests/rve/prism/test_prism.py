@@ -10,8 +10,8 @@ from alphacut.rve.bounds import reuss, voigt
 from alphacut.rve.cell import Phase, VoigtPhase
 from alphacut.rve.certificate import CertificateError
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.outline import Ellipse
 from alphacut.rve.mesh.wedge import slice_weights
+from alphacut.rve.outline import Ellipse
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.series.model import SeriesModel

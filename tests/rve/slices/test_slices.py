@@ -6,7 +6,7 @@ import pytest
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.cell import VoigtPhase, axial_moduli, square_moduli
-from alphacut.rve.mesh.outline import Ellipse, circle
+from alphacut.rve.outline import Ellipse, circle
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.slices.model import SlicesModel, solve_outline_slice, solve_slice

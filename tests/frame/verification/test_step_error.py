@@ -16,7 +16,7 @@ from alphacut.frame import (
     StoreyFrame,
     envelope,
 )
-from alphacut.frame.checks.step_error import MARGIN
+from alphacut.frame.verification.step_error import MARGIN
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import FailedError, RefusedError
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from alphacut.frame import Exact, LinearFlow, StoreyFrame, envelope
-from alphacut.frame.checks import step_error
-from alphacut.frame.checks.step_error import stray
 from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.verification import step_error
+from alphacut.frame.verification.step_error import stray
 from alphacut.fuzzy import Interval
 
 
