@@ -14,6 +14,7 @@ from alphacut.case.limits import (
     TolerancesSection,
 )
 from alphacut.case.material import (
+    AnyLaw,
     AnyRadius,
     Cell,
     ImageCell,
@@ -21,8 +22,10 @@ from alphacut.case.material import (
     ModulusSection,
     RadiusMapSection,
     RoundCell,
+    ThetaSection,
 )
 from alphacut.case.matrices import MatricesSection
+from alphacut.case.meshed import MeshedCell
 from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
@@ -42,7 +45,7 @@ class Content(Section):
         description="stages that `alphacut run` computes"
     )
     microstructure: MicrostructureSection | None = None
-    radius: RadiusMapSection | None = None
+    radius: AnyLaw | None = None
     cell: Cell | None = None
     mesh: Mesh = Mesh()
     modulus: ModulusSection = ModulusSection()
@@ -100,6 +103,27 @@ class Content(Section):
         return float(self.round.fraction.modal)
 
     @property
+    def meshed(self) -> MeshedCell | None:
+        """The cell if its mesh comes from a file."""
+        return self.cell if isinstance(self.cell, MeshedCell) else None
+
+    @property
+    def radius_map(self) -> RadiusMapSection | None:
+        """The radius map of [radius], if there is one."""
+        return self.radius if isinstance(self.radius, RadiusMapSection) else None
+
+    @property
+    def meshed_cell(self) -> tuple[ThetaSection, MeshedCell]:
+        """The law of θ and the phases of a mesh from a file.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        if self.meshed is None:
+            raise RefusedError("cell.phases", None, "a section for each physical group")
+        return self.radius or ThetaSection(), self.meshed
+
+    @property
     def round_cell(self) -> tuple[AnyRadius, RoundCell]:
         """The radius map and the phases of a round particle.
 
@@ -108,7 +132,7 @@ class Content(Section):
         """
         if self.round is None:
             raise RefusedError("cell", None, "a section [cell] with a particle")
-        radius = self.radius or self.round.fraction_map
+        radius = self.radius_map or self.round.fraction_map
         if radius is None:
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")
         return radius, self.round
@@ -125,17 +149,41 @@ class Content(Section):
         return self.frame or self.pendulum or self.matrices
 
     @model_validator(mode="after")
+    def _mesh(self) -> Self:
+        """Refuses a mesh from a file without phases, and keys that say what the file holds."""
+        file, meshed = self.mesh.file is not None, self.meshed is not None
+        allowed = "[cell.phases], a phase for each physical group of mesh.file"
+        require(not file or meshed, "cell.phases", None, allowed)
+        require(file or not meshed, "mesh.file", None, "a mesh of Gmsh beside [cell.phases]")
+        if not file:
+            lone = self.radius is None or self.radius_map is not None
+            about = RadiusMapSection.model_fields["a1"].description
+            require(lone, "radius.a1", None, f"{about}; theta alone beside mesh.file")
+            return self
+        for key in ("size", "layers"):
+            require(not self.mesh.names(key), f"mesh.{key}", "beside mesh.file", "one of them")
+        has_geometry = self.radius_map is not None or "microstructure" in self.stages
+        require(not has_geometry, "radius", "a map of radii", "theta alone beside mesh.file")
+        stated = self.modulus.tolerance is not None
+        cure = "compare a coarser mesh"
+        allowed = "none beside mesh.file, whose error nobody knows"
+        require(not stated, "modulus.tolerance", self.modulus.tolerance, allowed, cure)
+        return self
+
+    @model_validator(mode="after")
     def _stages(self) -> Self:
         """Refuses stages without their sections."""
         fraction = self.round is not None and self.round.fraction is not None
         known = self.picture is not None or "microstructure" in self.stages or fraction
+        known = known or self.meshed is not None
         needs = {
             "microstructure": ("microstructure",),
             "modulus": ("cell",) if known else ("radius", "cell"),
             "envelope": ("envelope",),
         }
         method = self.modulus.method
-        methods = (method,) if self.round is None else self.round.methods
+        solved = self.round or self.meshed
+        methods = (method,) if solved is None else solved.methods
         one = "microstructure" not in self.stages or self.radius is None
         for holds, key, value, allowed in (
             *(

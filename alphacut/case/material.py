@@ -7,9 +7,10 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import Discriminator, Field, PlainValidator, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from alphacut.case.fraction_map import FractionMap
+from alphacut.case.meshed import MeshedCell
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
@@ -17,6 +18,7 @@ from alphacut.case.types import (
     Length,
     Levels,
     Modulus,
+    ModulusOrStiffness,
     Quantity,
     Ratio,
     Section,
@@ -25,7 +27,6 @@ from alphacut.case.types import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.quantity import number
 from alphacut.rve.cell import VoigtPhase
 from alphacut.rve.outline import Ellipse, circle, reach
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -40,12 +41,22 @@ SHAPES = (
 )
 
 
-class RadiusMapSection(Section):
-    """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
+class ThetaSection(Section):
+    """Law of θ alone, where a mesh from a file has the geometry."""
 
     theta: Annotated[tuple[Theta, Theta], after(rising)] = Field(
         default=(-3.0, 3.0), description="support of θ"
     )
+
+    @property
+    def law(self) -> TruncatedNormal:
+        """Law of θ, a normal one cut off at both ends."""
+        return TruncatedNormal(*self.theta)
+
+
+class RadiusMapSection(ThetaSection):
+    """Random radius of the particle over half the cell's side, as a map of θ (eq. 12)."""
+
     a1: Radius = Field(description="radius at the lower end of θ")
     a3: Radius = Field(description="radius at the upper end of θ")
     a2: Number = Field(description="slope dr/dξ at the lower end")
@@ -55,11 +66,6 @@ class RadiusMapSection(Section):
     def numbers(self) -> dict[str, FuzzyNumber]:
         """Parameters of the map by name: the factors a1 … a4 of the functions of eq. 12."""
         return {"a1": self.a1, "a2": self.a2, "a3": self.a3, "a4": self.a4}
-
-    @property
-    def law(self) -> TruncatedNormal:
-        """Law of θ, a normal one cut off at both ends."""
-        return TruncatedNormal(*self.theta)
 
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """The map at crisp values of its parameters."""
@@ -76,20 +82,6 @@ class RadiusMapSection(Section):
             except RefusedError as error:
                 raise RefusedError("radius", values, error.allowed, error.cure) from None
         return self
-
-
-def _stiffness(rows: list[list[object]]) -> VoigtPhase:
-    """Material of three rows of its plane-strain stiffness, as texts."""
-    try:
-        return VoigtPhase(tuple(tuple(number(x, "Pa") for x in row) for row in rows))
-    except (TypeError, ValueError):
-        allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
-        raise RefusedError("", rows, allowed) from None
-
-
-Stiffness = Annotated[
-    VoigtPhase, PlainValidator(_stiffness, json_schema_input_type=list[list[str]])
-]
 
 
 def _outline(particles: str) -> Ellipse | None:
@@ -113,10 +105,7 @@ class RoundCell(Section):
     )
     matrix_modulus: Modulus = Field(description="Young's modulus of the matrix")
     matrix_poisson: Ratio = Field(description="Poisson's ratio of the matrix")
-    inclusion_modulus: Annotated[
-        Annotated[Modulus, Tag("<modulus>")] | Annotated[Stiffness, Tag("<stiffness>")],
-        Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),
-    ] = Field(
+    inclusion_modulus: ModulusOrStiffness = Field(
         description="Young's modulus of the particle, or three rows of its plane-strain stiffness"
         " (11, 22, 12 with 2 ε12)"
     )
@@ -130,7 +119,7 @@ class RoundCell(Section):
     )
 
     @property
-    def phases(self) -> dict[str, FuzzyNumber]:
+    def constants(self) -> dict[str, FuzzyNumber]:
         """The elastic constants by name."""
         names = [f"{x}_{y}" for x in ("matrix", "inclusion") for y in ("modulus", "poisson")]
         every = ((name, getattr(self, name)) for name in names)
@@ -233,17 +222,35 @@ class ImageCell(Section):
         return self
 
 
+def _cell_kind(table: Mapping[str, object]) -> str:
+    """Kind of a cell by a key that it alone has."""
+    if "image" in table:
+        return "<image>"
+    return "<mesh>" if "phases" in table else "<round>"
+
+
 AnyRadius = RadiusMapSection | FractionMap
 """The random radius of a case, of [radius] or of cell.fraction."""
 Cell = Annotated[
-    Annotated[RoundCell, Tag("<round>")] | Annotated[ImageCell, Tag("<image>")],
-    Discriminator(lambda table: "<image>" if "image" in table else "<round>"),
+    Annotated[RoundCell, Tag("<round>")]
+    | Annotated[ImageCell, Tag("<image>")]
+    | Annotated[MeshedCell, Tag("<mesh>")],
+    Discriminator(_cell_kind),
+]
+AnyLaw = Annotated[
+    Annotated[RadiusMapSection, Tag("<map>")] | Annotated[ThetaSection, Tag("<law>")],
+    Discriminator(lambda table: "<law>" if set(table) <= {"theta"} else "<map>"),
 ]
 
 
 class Mesh(Section):
     """Discretisation of the product domain."""
 
+    file: CaseFile | None = Field(
+        default=None,
+        description="mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and"
+        " layers; its physical groups are the phases of [cell.phases]",
+    )
     layers: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
         default=12, description="element layers in θ, of method prism"
     )

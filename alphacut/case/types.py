@@ -14,7 +14,9 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     PlainValidator,
+    Tag,
     ValidationInfo,
 )
 from pydantic.annotated_handlers import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -25,6 +27,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.io.quantity import QUANTITIES
+from alphacut.rve.cell import VoigtPhase
 
 
 class Section(BaseModel):
@@ -195,6 +198,24 @@ CaseFile = Annotated[Path, text(case_file)]
 Names = Annotated[tuple[str, ...], Each, after(unlike)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
+
+
+def _stiffness(rows: list[list[object]]) -> VoigtPhase:
+    """Material of three rows of its plane-strain stiffness, as texts."""
+    try:
+        return VoigtPhase(tuple(tuple(quantity.number(x, "Pa") for x in row) for row in rows))
+    except (TypeError, ValueError):
+        allowed = 'three rows as ["90 GPa", "20 GPa", "0 GPa"], symmetric positive definite'
+        raise RefusedError("", rows, allowed) from None
+
+
+Stiffness = Annotated[
+    VoigtPhase, PlainValidator(_stiffness, json_schema_input_type=list[list[str]])
+]
+ModulusOrStiffness = Annotated[
+    Annotated[Modulus, Tag("<modulus>")] | Annotated[Stiffness, Tag("<stiffness>")],
+    Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),
+]
 Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]

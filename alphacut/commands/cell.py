@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.case.material import AnyRadius, Mesh, RoundCell
+from alphacut.case.content import Content
 from alphacut.commands.options import Command, add_common, answer, read
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
@@ -14,6 +14,7 @@ from alphacut.report.results import ISOTROPIC, fibre_label
 from alphacut.report.tables import text_table
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.stages import cell
+from alphacut.stages.meshed import modal_sample
 
 KEYS = {
     "--a2": ("radius.a2", "slope of the radius at the lower end of θ"),
@@ -45,7 +46,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves and reports."""
     content = read(options).content
-    radius, phases = content.round_cell
+    radius, phases = content.round_cell if content.meshed is None else content.meshed_cell
     elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)
     result = cell.solve(radius, phases, model)
@@ -60,7 +61,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         second = cell.solve(radius, phases, cell.model_of(phases, content.mesh, modulus))
         document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)
     if options.export:
-        document["export"] = export(radius, phases, content.mesh, Path(options.export))
+        document["export"] = export(content, Path(options.export))
     answer(options, document, out, summary(result, document))
     return 0
 
@@ -83,27 +84,35 @@ def difference(
     return gap
 
 
-def export(radius: AnyRadius, phases: RoundCell, mesh: Mesh, path: Path) -> Document:
+def export(content: Content, path: Path) -> Document:
     """Writes the mesh with displacements and stresses; returns counts."""
     from alphacut.export.cell_files import write_cell
-    from alphacut.rve.prism.fields import cell_fields
+    from alphacut.rve.prism.fields import cell_fields, mesh_fields
     from alphacut.rve.prism.model import PrismModel
 
-    modal = cell.modal_cell(radius, phases)
-    model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)
-    fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion)
+    mesh = content.mesh
+    if mesh.file is not None:
+        sample = modal_sample(*content.meshed_cell)
+        fields = mesh_fields(PrismModel(mesh=mesh.file), sample.law, sample.phases)
+    else:
+        modal = cell.modal_cell(*content.round_cell)
+        model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)
+        fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion)
     return {"file": str(path), "nodes": write_cell(fields, path)}
 
 
 def summary(result: HomogenisedStiffness, document: Document) -> str:
-    """The result as a table, every number with its declared error."""
-    errors = document["declared_error"] or {"E_GPa": 0.0, "nu": 0.0, "stress_GPa": {}}
-    stress, off = document["stress_GPa"], errors["stress_GPa"]
+    """The result as a table, each number with its declared error."""
+    errors, stress = document["declared_error"], document["stress_GPa"]
+    off = ["not declared"] * 4
+    if errors is not None:
+        values = (errors["E_GPa"], errors["nu"], *errors["stress_GPa"].values())
+        off = [f"{value:.1e}" for value in values]
     rows = [
-        ("E, GPa", f"{document['E_GPa']:#.8g}", f"{errors['E_GPa']:.1e}"),
-        ("ν", f"{document['nu']:.6f}", f"{errors['nu']:.1e}"),
-        ("mean σ11, GPa", f"{stress['s11']:#.9g}", f"{off.get('s11', 0.0):.1e}"),
-        ("mean σ12, GPa", f"{stress['s12']:#.9g}", f"{off.get('s12', 0.0):.1e}"),
+        ("E, GPa", f"{document['E_GPa']:#.8g}", off[0]),
+        ("ν", f"{document['nu']:.6f}", off[1]),
+        ("mean σ11, GPa", f"{stress['s11']:#.9g}", off[2]),
+        ("mean σ12, GPa", f"{stress['s12']:#.9g}", off[3]),
     ]
     for key, number in document["fibres"].items():
         rows.append((fibre_label(key), f"{number['value']:.6g}", f"{number['error']:.1e}"))

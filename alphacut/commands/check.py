@@ -60,7 +60,7 @@ def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     if not content.frame.is_whole:
         if content.round is None or not content.round.square:
             return None
-        if content.radius is None and content.round.fraction is None:
+        if content.radius_map is None and content.round.fraction is None:
             return None
         quick = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
         model = model_of(content.round, content.mesh, quick)
@@ -72,6 +72,10 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
     """Key, value and kind of every quantity of a section, and of those below it."""
     for key, info in type(section).model_fields.items():
         content, unit = getattr(section, key), quantity_of(info)
+        if isinstance(content, dict):
+            for name, part in content.items():
+                if isinstance(part, Section):
+                    yield from rows_of(f"{prefix}{key}.{name}.", part)
         several = content if isinstance(content, tuple) else (content,)
         for number, one in enumerate(several, start=1):
             place = f"{prefix}{key}" + (f"[{number}]" if len(several) > 1 else "")

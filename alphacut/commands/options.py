@@ -121,8 +121,9 @@ def read(options: argparse.Namespace) -> Case:
         RefusedError: It solves no prisms, and there are options of PETSc.
     """
     case = load(options.case, options.set)
-    prisms = case.content.round is not None and case.content.modulus.method == "prism"
-    require_petsc(options.petsc, prisms)
+    content = case.content
+    prisms = content.round is not None and content.modulus.method == "prism"
+    require_petsc(options.petsc, prisms or content.meshed is not None)
     return case
 
 

@@ -40,7 +40,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
 
 def _material(results: Results) -> Iterator[Drawing]:
     """Map of radii, which the stage microstructure draws itself; modulus, image, stress."""
-    map_of = results.content.radius
+    map_of = results.content.radius_map
     if map_of is not None and results.microstructure is None:
         yield "fig13-p-box", partial(material.p_box, map_of)
     if map_of is not None:
@@ -120,7 +120,8 @@ def file_stem(name: str, results: Results) -> str:
 
 def _mesh(results: Results, folder: Path, executor: Executor | None) -> dict[str, Future[bool]]:
     """Fig. 15 under way by its file, where prisms gave the modulus."""
-    if results.modulus is None or results.content.modulus.method != "prism":
+    prisms = results.content.round is not None and results.content.modulus.method == "prism"
+    if results.modulus is None or not prisms:
         return {}
     name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
     cell = modal_cell(*results.content.round_cell)

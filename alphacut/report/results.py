@@ -48,7 +48,8 @@ def material(summary: Document) -> Table:
         nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
         ends = cut(young, -1, nature), cut(young, 0, nature, error)
-        rows.append((name, *ends, str(nature), error_text(error, nature)))
+        off = error_text(error, nature) if part.get("particles") != "mesh" else "not declared"
+        rows.append((name, *ends, str(nature), off))
         others = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
         for label, of in others.items():
             if of:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
-from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell
+from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell, ThetaSection
+from alphacut.case.meshed import MeshedCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
@@ -24,6 +26,7 @@ from alphacut.rve.spheres import space_bounds
 from alphacut.rve.spheres.cubic import hill_average
 from alphacut.rve.spheres.result import HomogenisedSpheres, volume_fraction
 from alphacut.rve.spheres.series.model import SphereSeriesModel
+from alphacut.stages.meshed import MeshedSample, sample_at, solve_samples
 from alphacut.stochastic import gauss_rule
 
 GPA = 1e9
@@ -33,28 +36,38 @@ SPHERES = 1e-5
 """Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
 SLACK = 5e-3
 """Relative distance of E from the bounds that is allowed: packings meet a fraction to 0.5 %."""
-Solve = Callable[..., Sequence[HomogenisedStiffness]]
-"""A model of the cell: from radius map, matrix and inclusions to one result for each of these."""
+AnyCell = RoundCell | MeshedCell
+AnySample = Cell | MeshedSample
+Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
+"""A model of the cell: one result for each sample; cells share all but their inclusion."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness in words."""
 
 
-def averaged(model: Solve, *cell: object) -> list[HomogenisedStiffness]:
+def averaged(model: Solve, cells: Sequence[Any]) -> list[HomogenisedStiffness]:
     """Results whose E and ν are those of the isotropic average of the plane stiffness."""
-    return [result.averaged("isotropic") for result in model(*cell)]
+    return [result.averaged("isotropic") for result in model(cells)]
 
 
-def meaning(cell: RoundCell, modulus: ModulusSection) -> str:
+def solve_cells(
+    model: Callable[..., list[HomogenisedStiffness]], cells: Sequence[Cell]
+) -> list[HomogenisedStiffness]:
+    """One result for each cell; they share all but their inclusion."""
+    first = cells[0]
+    return model(first.radius, first.matrix, [cell.inclusion for cell in cells])
+
+
+def meaning(cell: AnyCell, modulus: ModulusSection) -> str:
     """Average that E and ν are of: eq. 16, isotropic or spheres."""
     return "spheres" if cell.particles == "spheres" else AVERAGES[modulus.average]
 
 
-def model_of(cell: RoundCell, mesh: Mesh, modulus: ModulusSection, **elements: object) -> Solve:
+def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: object) -> Solve:
     """The model that the sections of a case name.
 
     Args:
         cell: Phases.
-        mesh: Resolution of elements.
+        mesh: Resolution of elements, or the file of their mesh.
         modulus: Method, tolerance and average.
         elements: Options of the product-space elements: petsc, parallel, estimate, moduli.
 
@@ -70,8 +83,20 @@ def model_of(cell: RoundCell, mesh: Mesh, modulus: ModulusSection, **elements: o
 
 
 def _model(
-    cell: RoundCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
+    cell: AnyCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
 ) -> Solve:
+    if isinstance(cell, MeshedCell):
+        from alphacut.rve.prism.model import PrismModel
+
+        assert mesh.file is not None
+        return partial(solve_samples, PrismModel(mesh=Path(mesh.file), **elements))
+    return partial(solve_cells, _model_of_particle(cell, mesh, modulus, elements))
+
+
+def _model_of_particle(
+    cell: RoundCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
+) -> Callable[..., list[HomogenisedStiffness]]:
+    """`solve` of a model of a cell with one particle."""
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
         return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11)).solve
@@ -88,13 +113,23 @@ def _model(
     return PrismModel(mesh.size, mesh.layers, outline=outline, **elements).solve
 
 
-def inputs_of(radius: AnyRadius, cell: RoundCell) -> dict[str, FuzzyNumber]:
+def inputs_of(radius: AnyRadius | ThetaSection, cell: AnyCell) -> dict[str, FuzzyNumber]:
     """Inputs of the cell by name, crisp or fuzzy, in SI."""
-    return radius.numbers | cell.phases
+    of_map = radius.numbers if isinstance(radius, AnyRadius) else {}
+    return of_map | cell.constants
 
 
-def cell_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell) -> Cell:
+def cell_at(
+    values: Mapping[str, float], radius: AnyRadius | ThetaSection, cell: AnyCell
+) -> AnySample:
     """The cell at crisp values of the inputs, in SI."""
+    if isinstance(cell, MeshedCell):
+        return sample_at(values, cast("ThetaSection", radius), cell)
+    return particle_at(values, cast("AnyRadius", radius), cell)
+
+
+def particle_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell) -> Cell:
+    """The cell with one particle at crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
     inclusion = cell.stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
     return Cell(matrix, inclusion, radius.at(values), cell.outline or circle)
@@ -103,19 +138,22 @@ def cell_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell) -> 
 def modal_cell(radius: AnyRadius, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
     values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    return cell_at(values, radius, cell)
+    return particle_at(values, radius, cell)
 
 
-def solve(radius: AnyRadius, cell: RoundCell, model: Solve) -> HomogenisedStiffness:
+def solve(radius: AnyRadius | ThetaSection, cell: AnyCell, model: Solve) -> HomogenisedStiffness:
     """The cell's result at the modal values of its inputs."""
-    modal = modal_cell(radius, cell)
-    return model(modal.radius, modal.matrix, [modal.inclusion])[0]
+    values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
+    return model([cell_at(values, radius, cell)])[0]
 
 
-def references(radius: AnyRadius, cell: RoundCell, stated: float | None = None) -> Document:
+def references(
+    radius: AnyRadius | ThetaSection, cell: AnyCell, stated: float | None = None
+) -> Document:
     """Fraction of the particles, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E in GPa.
 
-    They are of the modal inputs; the fraction alone of particles that are not round and isotropic.
+    They are of the modal inputs; the fraction alone of particles that are not round and isotropic,
+    none of a mesh from a file.
 
     Args:
         radius: Random radius.
@@ -123,7 +161,9 @@ def references(radius: AnyRadius, cell: RoundCell, stated: float | None = None) 
         stated: Fraction that the case states, of which bounds and estimate are; None: that of the
             map.
     """
-    modal = modal_cell(radius, cell)
+    if isinstance(cell, MeshedCell):
+        return {}
+    modal = modal_cell(cast("AnyRadius", radius), cell)
     map_of, matrix, inclusion = modal.radius, modal.matrix, modal.inclusion
     rule, spheres = gauss_rule(map_of.distribution, points=40), cell.particles == "spheres"
     radii = map_of(rule.nodes)

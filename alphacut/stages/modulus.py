@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell
+from alphacut.case.material import AnyRadius, Mesh, ModulusSection, ThetaSection
+from alphacut.case.meshed import MeshedCell
 from alphacut.fuzzy import (
     Crisp,
     Extended,
@@ -26,11 +27,12 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
-from alphacut.io.provenance import source_digest, versions
+from alphacut.io.provenance import file_digest, source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.stages.cell import (
     GPA,
+    AnyCell,
     Solve,
     cell_at,
     inputs_of,
@@ -83,16 +85,14 @@ class CellTask:
     """
 
     model: Solve
-    radius: AnyRadius
-    cell: RoundCell
+    radius: AnyRadius | ThetaSection
+    cell: AnyCell
     crisp: Mapping[str, float]
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
-        every = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
-        first, inclusions = every[0], [one.inclusion for one in every]
-        results = self.model(first.radius, first.matrix, inclusions)
-        return [self._outputs(result) for result in results]
+        cells = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
+        return [self._outputs(result) for result in self.model(cells)]
 
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
         curve = result.curve
@@ -109,7 +109,7 @@ class CellTask:
         }
 
 
-def theta_of(radius: AnyRadius) -> Array:
+def theta_of(radius: AnyRadius | ThetaSection) -> Array:
     """The θ at which stress curves are stored, shape (SHOWN,)."""
     return np.asarray(np.linspace(*radius.theta, SHOWN))
 
@@ -127,8 +127,8 @@ class CellCampaign:
         stated_fraction: Share that particles take as the case states; None where it does not.
     """
 
-    radius: AnyRadius
-    cell: RoundCell
+    radius: AnyRadius | ThetaSection
+    cell: AnyCell
     mesh: Mesh
     modulus: ModulusSection
     petsc: Mapping[str, str] = field(default_factory=dict)
@@ -138,16 +138,16 @@ class CellCampaign:
     def inputs(self) -> dict[str, FuzzyNumber]:
         """Fuzzy inputs by name, in SI; the material where none is fuzzy."""
         numbers = inputs_of(self.radius, self.cell)
-        material = "inclusion_modulus" if self.cell.stiffness is None else "matrix_modulus"
+        names = ("inclusion_modulus", "matrix_modulus", *numbers)
+        material = next(name for name in names if name in numbers)
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
         return fuzzy or {material: numbers[material]}
 
     def model(self, *, estimate: bool = False) -> Solve:
         """The model of the cell; it may declare its errors at an extra cost."""
-        support = None
-        if self.cell.stiffness is None:
-            ends = inputs_of(self.radius, self.cell)["inclusion_modulus"].support
-            support = (ends.lower, ends.upper)
+        support, modulus = None, self.cell.constants.get("inclusion_modulus")
+        if modulus is not None:
+            support = (modulus.support.lower, modulus.support.upper)
         own = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
         return model_of(self.cell, self.mesh, self.modulus, **own)
 
@@ -156,9 +156,11 @@ class CellCampaign:
         """Origin of a sample besides its fuzzy inputs: sections, program."""
         modulus = self.modulus.model_dump(exclude={"plan", "alpha"})
         crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
-        options = [self.mesh.model_dump(), self.cell.particles, dict(self.petsc)]
+        mesh = {"file": self.mesh.file and file_digest(self.mesh.file)}
+        mesh |= self.mesh.model_dump(exclude={"file"})
+        options = [mesh, self.cell.particles, dict(self.petsc)]
         source = [source_digest(("stochastic", "rve")), versions()]
-        stiffness = repr(self.cell.stiffness)
+        stiffness = repr(self.cell.model_dump(include={"inclusion_modulus", "phases"}))
         sections = [modulus, options, crisp, repr(self.radius.theta), stiffness]
         return {"sections": sections, "source": source}
 
@@ -195,7 +197,7 @@ class CellCampaign:
         """
         if not self.cell.square or self.modulus.method == "prism":
             return Knowledge()
-        of = {name: number.support for name, number in self.cell.phases.items()}
+        of = {name: number.support for name, number in self.cell.constants.items()}
         matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]
         poisson = of["matrix_poisson"]
         stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
@@ -211,7 +213,7 @@ class CellCampaign:
     def errors(self, result: Bounds) -> dict[str, float]:
         """Relative error of E by source: the largest of all samples, or that of the modal one."""
         errors = {name: error for name, error in _largest(result, "error").items() if error}
-        if errors or self.modulus.method != "prism":
+        if errors or self.modulus.method != "prism" or isinstance(self.cell, MeshedCell):
             return errors
         return dict(solve(self.radius, self.cell, self.model(estimate=True)).error)
 

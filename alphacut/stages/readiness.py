@@ -14,6 +14,7 @@ from alphacut.questions.question import Motion
 from alphacut.stages import envelope, identify, image, suite
 from alphacut.stages.cell import model_of
 from alphacut.stages.envelope import EnvelopeTask
+from alphacut.stages.meshed import require_mesh
 from alphacut.stages.modulus import CellCampaign, require_levels
 from alphacut.stochastic.sections import Simulated
 
@@ -42,6 +43,8 @@ def _require_material(content: Content) -> None:
     """Builds the model of the cell, and the samples it is asked for, or judges its image."""
     if "envelope" in content.stages and not content.has_own_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
+    if content.meshed is not None:
+        require_mesh(content.mesh, *content.meshed_cell)
     if content.picture is not None:
         image.study_of(content.picture)
     elif "microstructure" not in content.stages:
@@ -51,8 +54,9 @@ def _require_material(content: Content) -> None:
 
 
 def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> CellCampaign:
-    """Samples of a round cell, by a solver with options of PETSc."""
-    sections = (*content.round_cell, content.mesh, content.modulus)
+    """Samples of a cell that is no image, by a solver with options of PETSc."""
+    parts = content.round_cell if content.meshed is None else content.meshed_cell
+    sections = (*parts, content.mesh, content.modulus)
     return CellCampaign(*sections, petsc or {}, content.stated_fraction)
 
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import AnyPhase, Cell
+from alphacut.rve.cell import THREE_LOADS, AnyPhase, Cell
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.form import strain
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
 from alphacut.rve.prism.model import PrismModel
+from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.krylov import solve
-from alphacut.stochastic import RadiusMap
+from alphacut.rve.solver.options import SolverOptions
+from alphacut.stochastic import RadiusMap, ThetaLaw
 
 NODES = 15
 
@@ -52,13 +55,32 @@ def cell_fields(
         FoldedMeshError: The map bends more than the layers can follow.
     """
     cell, problem = Cell(matrix, inclusion, radius_map, model.outline), model.problem(radius_map)
+    return _fields(problem, cell.stiffness, model.loads(cell), model.options)
+
+
+def mesh_fields(model: PrismModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
+    """Fields on a mesh from a file, under three loads.
+
+    Raises:
+        ConvergenceError: The linear solver stopped early.
+        MeshError: The file holds no cell of prisms.
+        RefusedError: Law or phases are not those of the mesh.
+    """
+    problem, named = model.mesh_problem(law, phases)
+    stiffness = [phase.stiffness for phase in named.phases]
+    return _fields(problem, stiffness, THREE_LOADS, model.options)
+
+
+def _fields(
+    problem: PrismProblem, stiffness: Sequence[Array], loads: Array, options: SolverOptions
+) -> CellFields:
+    """Fields under macroscopic strains (loads, 3)."""
     form, grid = problem.form, problem.form.grid
-    problem.assemble(cell.stiffness)
-    loads = model.loads(cell)
-    vectors = solve(problem.solver(model.options), problem.loads(loads)).vectors
+    problem.assemble(stiffness)
+    vectors = solve(problem.solver(options), problem.loads(loads)).vectors
     fluctuation, own = fem.Function(form.space), np.arange(len(form.wedge), dtype=np.int32)
     at_nodes = at_points(strain(fluctuation), vertices_and_midpoints())
-    positions = grid.positions(radius_map)
+    positions = grid.positions(problem.map)
     total = np.empty((grid.nodes, 2, len(vectors)))
     wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, vector in enumerate(vectors):
@@ -68,7 +90,7 @@ def cell_fields(
         fluctuation.x.array[:] = u.ravel()
         strains = at_nodes.eval(form.mesh, own).reshape(len(own), NODES, 3)
         wedges[form.wedge, ..., k] = strains + uniform
-    stress = np.stack(cell.stiffness)[grid.phase][:, None] @ wedges
+    stress = np.stack(stiffness)[grid.phase][:, None] @ wedges
     numbered = grid.cells + grid.phase[:, None] * grid.nodes
     kept, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)

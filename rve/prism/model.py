@@ -30,7 +30,7 @@ from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.prism.error_estimate import judged
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
-from alphacut.rve.prism.own_mesh import own_mesh_problem, require_own_mesh
+from alphacut.rve.prism.own_mesh import NamedPhases, own_mesh_problem, require_own_mesh
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import require_compressible, require_mesh_size, require_parts
@@ -140,10 +140,7 @@ class PrismModel:
         """The result on a mesh of one's own."""
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
-            problem = own_mesh_problem(self.mesh, self.parallel)
-            grid = problem.form.grid
-            named = require_own_mesh(grid, law, phases)
-            problem.move(named.law)
+            problem, named = self.mesh_problem(law, phases)
         loads, stiffness = THREE_LOADS, [phase.stiffness for phase in named.phases]
         strains, solved = self._solve_system(problem, stiffness, loads, seconds)
         stress = strains.stress(stiffness)
@@ -160,6 +157,18 @@ class PrismModel:
             checks=require(checks, discretisation=ROUGH_MESH),
             energies=energies_of(strains, named.phases, loads),
         )
+
+    def mesh_problem(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
+        """The problem on a mesh from a file with its law and its phases; kept for the next ones.
+
+        Raises:
+            MeshError: The file holds no cell of prisms.
+            RefusedError: Law or phases are not those of the mesh.
+        """
+        problem = own_mesh_problem(self.mesh, self.parallel)
+        named = require_own_mesh(problem.form.grid, law, phases)
+        problem.move(named.law)
+        return problem, named
 
     def problem(self, radius_map: RadiusMap) -> PrismProblem:
         """The mesh and the form, moved to a map; kept for the next map.

@@ -1,0 +1,99 @@
+"""Cases on a mesh of the user's own: from the file to the report, or refused by what does not fit."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.entry import main
+from alphacut.rve import Phase, PrismModel
+from alphacut.stochastic import TruncatedNormal
+from tests.alphacut.small import CELL, written
+
+MESHES = Path(__file__).parents[3] / "meshes"
+TEXT = f"""
+title = "Two particles"
+stages = ["modulus"]
+[mesh]
+file = "{MESHES / "two-particles.msh"}"
+[cell.phases]
+matrix = {{ modulus = "20 GPa", poisson = 0.3 }}
+particles = {{ modulus = "[75, 80, 85] GPa", poisson = 0.3 }}
+[modulus]
+plan = "reduced"
+alpha = [0, 1]
+"""
+STIFFNESS = (
+    '[["90 GPa", "20 GPa", "0 GPa"], ["20 GPa", "90 GPa", "0 GPa"], ["0 GPa", "0 GPa", "30 GPa"]]'
+)
+
+
+def modulus(young):
+    phases = {"matrix": Phase(20e9), "particles": Phase(young)}
+    model = PrismModel(mesh=MESHES / "two-particles.msh")
+    return model.solve(TruncatedNormal(-3, 3), phases)[0].averaged("isotropic").modulus
+
+
+def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):
+    case = written(tmp_path, TEXT)
+    assert main(["check", str(case)]) == 0
+    assert "cell.phases" in capsys.readouterr().out
+    assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 0
+    assert "not declared" in capsys.readouterr().out
+    cuts = json.loads((tmp_path / "out/summary.json").read_text())["modulus"]["E_GPa"]
+    ends = [cuts["lower"][0], cuts["lower"][1], cuts["upper"][0]]
+    assert ends == pytest.approx([modulus(e) / 1e9 for e in (75e9, 80e9, 85e9)], rel=1e-9)
+    assert main(["report", str(tmp_path / "out")]) == 0
+    assert "Two particles" in (tmp_path / "out/report.html").read_text(encoding="utf-8")
+
+
+def solved(case, path, *options):
+    """The document of the command `cell`, with the mesh in a file."""
+    words = ["--export", str(path), "--json", str(path.with_suffix(".json")), "--quiet"]
+    assert main(["cell", str(case), *words, *options]) == 0
+    return json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+
+
+def test_an_exported_cell_taken_as_the_mesh_has_the_same_modulus(tmp_path):
+    prism = {'method = "series"': 'method = "prism"', "tolerance = 1e-6": ""}
+    small = ["--set", "mesh.size=0.5", "--set", "mesh.layers=4"]
+    right = solved(written(tmp_path, CELL, **prism), tmp_path / "a.msh", *small)
+    named = TEXT.replace(str(MESHES / "two-particles.msh"), str(tmp_path / "a.msh"))
+    case = written(tmp_path, named, **{"particles =": "inclusion ="})
+    result = solved(case, tmp_path / "b.msh")
+    assert result["E_GPa"] == pytest.approx(right["E_GPa"], rel=1e-12)
+    assert result["declared_error"] is None
+    assert result["export"]["nodes"] == right["export"]["nodes"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("particles =", "stones =", "phase is 'stones'"),
+        ("particles =", 'glue = {modulus = "1 GPa", poisson = 0.3}\nparticles =', "phase is 'glue'"),
+        ("two-particles", "unlike-sides", "a node of the sides x1 = ±1"),
+        ("two-particles", "absent", "mesh.file is"),
+        ("[modulus]", "[radius]\ntheta = [-2, 3]\n[modulus]", "law of θ is on -2 … 3"),
+        ("[modulus]", "[radius]\na1 = 0.2\na2 = 0\na3 = 0.3\na4 = 0\n[modulus]", "radius is a map"),
+        ("[modulus]", "[modulus]\ntolerance = 1e-3", "modulus.tolerance"),
+        ("[mesh]", "[mesh]\nsize = 0.2", "mesh.size is beside mesh.file"),
+        ('"20 GPa", poisson = 0.3', '"20 GPa"', "cell.phases.matrix is without poisson"),
+        ('"20 GPa", poisson', f"{STIFFNESS}, poisson", "none beside a stiffness"),
+        ("[mesh]\nfile", "about", "mesh.file"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused_in_one_line(tmp_path, capsys, old, new, message):
+    case = written(tmp_path, TEXT, **{old: new})
+    assert main(["check", str(case)]) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert "Traceback" not in said
+
+
+def test_the_law_alone_needs_a_mesh(tmp_path, capsys):
+    lines = [line for line in CELL.splitlines() if not line.startswith(("a1", "a2", "a3", "a4"))]
+    case = written(tmp_path, "\n".join([*lines[:4], "theta = [-3, 3]", *lines[4:]]))
+    assert main(["check", str(case)]) == 2
+    assert "radius.a1" in capsys.readouterr().err
