@@ -90,7 +90,7 @@ class RecordsSection(Section):
     """
 
     files: Annotated[tuple[Files, ...], Each, Some] = Field(
-        description="files or patterns, as records/*.AT2; FILE#CHANNEL of several"
+        description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
     trim: Annotated[Trim, text(_trim)] | None = Field(
