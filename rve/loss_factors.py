@@ -36,8 +36,7 @@ class LossFactors:
 def phase_losses(phase: AnyPhase, loss: float, bulk_loss: float | None = None) -> Array:
     """Loss factors of K and of G, shape (2,), from that of Young's modulus.
 
-    1/E = 1/(9 K) + 1/(3 G) loses the mean of both by energy. Without a loss of the bulk modulus ν
-    is real, and all moduli have the same.
+    Without a loss of the bulk modulus ν is real, and all moduli have the same.
 
     Args:
         phase: The material.
@@ -47,16 +46,32 @@ def phase_losses(phase: AnyPhase, loss: float, bulk_loss: float | None = None) -
     Raises:
         RefusedError: The shear modulus would have a negative loss, or the phase is not isotropic.
     """
-    if bulk_loss is None:
-        return np.array([loss, loss])
+    losses = bulk_and_shear_losses(phase, bulk_loss is not None) @ [loss, bulk_loss or 0.0]
+    if losses.min() < 0:
+        most = 3 * loss / (1 - 2 * getattr(phase, "poisson", 0.0))
+        allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
+        raise RefusedError("loss of the bulk modulus", bulk_loss, allowed)
+    return np.asarray(losses)
+
+
+def bulk_and_shear_losses(phase: AnyPhase, has_bulk: bool) -> Array:
+    """Matrix (2, 2) from losses of Young's and of the bulk modulus to those of K and of G.
+
+    1/E = 1/(9 K) + 1/(3 G) loses the mean of both by energy.
+
+    Args:
+        phase: The material.
+        has_bulk: Whether the bulk modulus has a loss of its own; else all moduli have that of E.
+
+    Raises:
+        RefusedError: It has one in a phase that is not isotropic.
+    """
+    if not has_bulk:
+        return np.array([[1.0, 0.0], [1.0, 0.0]])
     if not isinstance(phase, Phase):
-        raise RefusedError("loss of the bulk modulus", bulk_loss, "none beside a stiffness")
+        raise RefusedError("loss of the bulk modulus", "there", "none beside a stiffness")
     nu = phase.poisson
-    shear_loss = (3 * loss - (1 - 2 * nu) * bulk_loss) / (2 * (1 + nu))
-    if shear_loss < 0:
-        most = f"up to {3 * loss / (1 - 2 * nu):.4g}, where the shear modulus loses nothing"
-        raise RefusedError("loss of the bulk modulus", bulk_loss, most)
-    return np.array([bulk_loss, shear_loss])
+    return np.array([[0.0, 1.0], [1.5 / (1 + nu), (nu - 0.5) / (1 + nu)]])
 
 
 def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:

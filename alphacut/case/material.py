@@ -35,6 +35,7 @@ from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
 Theta = Annotated[float, Quantity(least=-10, most=10)]
+Loss = Annotated[FuzzyNumber, Quantity(least=0, most=0.5, fuzzy=True)]
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'
@@ -112,6 +113,18 @@ class RoundCell(Section):
     inclusion_poisson: Ratio | None = Field(
         default=None, description="Poisson's ratio of the particle, beside its modulus"
     )
+    matrix_loss: Loss | None = Field(
+        default=None, description="loss factor tan δ of the matrix's Young's modulus, as 2 %"
+    )
+    matrix_loss_bulk: Loss | None = Field(
+        default=None, description="that of its bulk modulus, where it is another"
+    )
+    inclusion_loss: Loss | None = Field(
+        default=None, description="loss factor of the particle's Young's modulus or stiffness"
+    )
+    inclusion_loss_bulk: Loss | None = Field(
+        default=None, description="that of its bulk modulus, where it is another"
+    )
     fraction: Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)] | None = Field(
         default=None,
         description="share of area, below π/4, or of volume of spheres, below π/6, that particles"
@@ -159,6 +172,14 @@ class RoundCell(Section):
         return None if self.fraction is None else FractionMap(self.fraction, self.shape)
 
     @property
+    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
+        """Loss factors of Young's and the bulk modulus of matrix and particle; empty for none."""
+        if self.matrix_loss is None or self.inclusion_loss is None:
+            return ()
+        particle = self.inclusion_loss, self.inclusion_loss_bulk
+        return (self.matrix_loss, self.matrix_loss_bulk), particle
+
+    @property
     def fibres(self) -> bool:
         """True for round fibres of an isotropic material."""
         return self.square and self.particles == "cylinders"
@@ -178,6 +199,31 @@ class RoundCell(Section):
             most = self.fraction.support.upper
             allowed = f"values below {touching:.6g}, where particles touch"
             require(most < touching, "cell.fraction", f"{most:g}", allowed)
+        return self
+
+    @model_validator(mode="after")
+    def _losses(self) -> Self:
+        """Refuses losses of one phase alone, of spheres, and of bulk moduli that are too large."""
+        for name, other in (("matrix", "inclusion"), ("inclusion", "matrix")):
+            loss, bulk = (getattr(self, f"{name}_loss{x}") for x in ("", "_bulk"))
+            beside = getattr(self, f"{other}_loss") is not None
+            given = loss is not None or (bulk is None and not beside)
+            require(given, f"cell.{name}_loss", None, "a loss of either phase, 0 for none")
+            if bulk is not None:
+                ratio = getattr(self, f"{name}_poisson")
+                require(
+                    ratio is not None, f"cell.{name}_loss_bulk", "there", "none beside a stiffness"
+                )
+                most = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
+                allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
+                require(
+                    bulk.support.upper <= most,
+                    f"cell.{name}_loss_bulk",
+                    f"{bulk.support.upper:g}",
+                    allowed,
+                )
+        fibres = not self.losses or self.particles != "spheres"
+        require(fibres, "cell.matrix_loss", "beside spheres", "losses of cylinders or ellipses")
         return self
 
 

@@ -102,12 +102,13 @@ def _model_of_particle(
         return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11)).solve
     if cell.square and method in ("auto", "series"):
         own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
-        return SeriesModel(accuracy=own).solve
+        return SeriesModel(accuracy=own, energies=bool(cell.losses)).solve
     outline = cell.outline or circle
     if method in ("auto", "slices"):
         from alphacut.rve.slices.model import SlicesModel
 
-        return SlicesModel(mesh_size=mesh.size, outline=outline).solve
+        energies = bool(cell.losses)
+        return SlicesModel(mesh_size=mesh.size, outline=outline, energies=energies).solve
     from alphacut.rve.prism.model import PrismModel
 
     return PrismModel(mesh.size, mesh.layers, outline=outline, **elements).solve

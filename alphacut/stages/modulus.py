@@ -29,6 +29,7 @@ from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest, source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
+from alphacut.rve.phase_energies import CONSTANTS
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.stages.cell import (
     GPA,
@@ -41,6 +42,7 @@ from alphacut.stages.cell import (
     references,
     solve,
 )
+from alphacut.stages.losses import LossCuts, loss_bounds
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
 
@@ -82,12 +84,14 @@ class CellTask:
         radius: Random radius.
         cell: Phases.
         crisp: Inputs that are not fuzzy, by name, in SI.
+        losses: Cuts of the phases' loss factors, if there are.
     """
 
     model: Solve
     radius: AnyRadius | ThetaSection
     cell: AnyCell
     crisp: Mapping[str, float]
+    losses: LossCuts | None = None
 
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
@@ -97,6 +101,7 @@ class CellTask:
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
         curve = result.curve
         fibres = fibre_constants(result).values if self.cell.fibres else {}
+        losses = {} if self.losses is None else loss_outputs(result, self.losses)
         return {
             "E": result.modulus,
             "nu": result.poisson,
@@ -106,6 +111,7 @@ class CellTask:
             "curve11": between_nodes(curve.theta, curve.s11, theta_of(self.radius)),
             **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
             **{f"check:{name}": value for name, value in result.checks.items()},
+            **losses,
         }
 
 
@@ -162,6 +168,7 @@ class CellCampaign:
         source = [source_digest(("stochastic", "rve")), versions()]
         stiffness = repr(self.cell.model_dump(include={"inclusion_modulus", "phases"}))
         sections = [modulus, options, crisp, repr(self.radius.theta), stiffness]
+        sections += [repr((self.cell.losses, self.modulus.alpha))] if self.cell.losses else []
         return {"sections": sections, "source": source}
 
     @property
@@ -169,7 +176,7 @@ class CellCampaign:
         """The function from fuzzy inputs and a plan to the α-cuts of all outputs."""
         numbers = inputs_of(self.radius, self.cell)
         crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
-        task = CellTask(self.model(), self.radius, self.cell, crisp)
+        task = CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
         shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
         return partial(propagate, task, alpha=self.modulus.alpha, shared=shared)
 
@@ -185,6 +192,13 @@ class CellCampaign:
             identity=self.identity if work.samples else None,
         )
         return stage_result(result, self)
+
+    @property
+    def losses(self) -> LossCuts | None:
+        """Cuts of the phases' loss factors; None where the case has none."""
+        if not self.cell.losses:
+            return None
+        return LossCuts.of_phases(self.cell.losses, self.modulus.alpha)
 
     @property
     def knowledge(self) -> Knowledge:
@@ -209,6 +223,16 @@ class CellCampaign:
         signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
+
+    def loss_errors(self, result: Bounds) -> dict[str, float]:
+        """Errors of the loss factors of E, G and K: as those of E, the largest or the modal one."""
+        assert self.losses is not None
+        assert result.samples is not None
+        if self.modulus.method == "prism":
+            judged = solve(self.radius, self.cell, self.model(estimate=True))
+            return dict(zip(CONSTANTS, loss_bounds(judged, self.losses)[1], strict=True))
+        largest = result.samples.values.output("loss_error").max(axis=0)
+        return dict(zip(CONSTANTS, map(float, largest), strict=True))
 
     def errors(self, result: Bounds) -> dict[str, float]:
         """Relative error of E by source: the largest of all samples, or that of the modal one."""
@@ -243,6 +267,9 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
         shown, key = (ends / GPA, f"{name}_GPa") if unit == "Pa" else (ends, name)
         cuts[key] = {"lower": shown[:, 0], "upper": shown[:, 1]}
+    if campaign.losses is not None:
+        for name, ends in loss_ends(result).items():
+            variables[f"loss_{name}"] = (CUT, ends, {"long_name": f"loss factor of {name}"})
     about_points = {"long_name": "inputs, in SI"}
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
     words = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
@@ -270,7 +297,42 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         "checks": _largest(result, "check"),
         "references": references(campaign.radius, campaign.cell, campaign.stated_fraction),
     }
-    return StageResult(document, xarray.Dataset(variables, coordinates))
+    data = xarray.Dataset(variables, coordinates)
+    if campaign.losses is not None:
+        document["loss"] = loss_document(data) | {"error": campaign.loss_errors(result)}
+    return StageResult(document, data)
+
+
+def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
+    """Outputs of a sample: ends of the loss factors on each level, and their errors."""
+    ends, errors = loss_bounds(result, cuts)
+    return {"loss_lower": ends[:, 0], "loss_upper": ends[:, 1], "loss_error": np.nan_to_num(errors)}
+
+
+def loss_ends(result: Bounds) -> dict[str, Array]:
+    """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
+
+    The outputs of a sample are the ends for the cuts of the losses on every level; on its level the
+    one of the same number counts.
+    """
+    return {
+        name: np.array(
+            [
+                [
+                    result.lower[level, result.column(f"loss_lower[{level}][{k}]")],
+                    result.upper[level, result.column(f"loss_upper[{level}][{k}]")],
+                ]
+                for level in range(len(result.alpha))
+            ]
+        )
+        for k, name in enumerate(CONSTANTS)
+    }
+
+
+def loss_document(data: xarray.Dataset) -> Document:
+    """α-cuts of the loss factors."""
+    cuts = {name: data[f"loss_{name}"].values for name in CONSTANTS}
+    return {name: {"lower": x[:, 0], "upper": x[:, 1]} for name, x in cuts.items()}
 
 
 def _largest(result: Bounds, kind: str) -> dict[str, float]:
@@ -292,6 +354,16 @@ def require_levels(alpha: tuple[float, ...], key: str) -> None:
     """
     complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
     require(complete, key, list(alpha), "levels from 0 to 1, or 1 alone")
+
+
+def loss_of(data: xarray.Dataset) -> FuzzyNumber | None:
+    """The fuzzy loss factor of E; None where the phases have none."""
+    if "loss_E" not in data:
+        return None
+    alpha, ends = data["alpha"].values, data["loss_E"].transpose("alpha", "bound").values
+    if tuple(alpha) == (1.0,):
+        return Crisp(float(ends.mean()))
+    return outer_steps(alpha, ends[:, 0], ends[:, 1])
 
 
 def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:

@@ -1,0 +1,77 @@
+"""α-cuts of the cell's loss factors, from those of its phases level by level."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Self
+
+import numpy as np
+
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array
+from alphacut.rve.loss_factors import MAX_FIRST_ORDER, bulk_and_shear_losses, loss_factors
+from alphacut.rve.phase_energies import CONSTANTS
+from alphacut.rve.result import HomogenisedStiffness
+
+Losses = tuple[FuzzyNumber, FuzzyNumber | None]
+"""Loss factor of a phase's Young's modulus, and of its bulk modulus where that is another."""
+
+
+@dataclass(frozen=True, eq=False)
+class LossCuts:
+    """Cuts of the phases' loss factors.
+
+    Args:
+        ends: Of Young's and of the bulk modulus, shape (levels, 2 ends, phases, 2); 0 where the
+            bulk modulus has no loss factor of its own.
+        has_bulk: Whether it has, for each phase.
+    """
+
+    ends: Array
+    has_bulk: tuple[bool, ...]
+
+    @classmethod
+    def of_phases(cls, losses: Sequence[Losses], alpha: Sequence[float]) -> Self:
+        """Cuts of fuzzy loss factors on some levels."""
+        none = (0.0, 0.0)
+        ends = [
+            [[young.cut(level), bulk.cut(level) if bulk else none] for young, bulk in losses]
+            for level in alpha
+        ]
+        return cls(
+            np.moveaxis(np.array(ends), -1, 1), tuple(bulk is not None for _, bulk in losses)
+        )
+
+    def corners(self, shares: Array, to_moduli: Array) -> Array:
+        """Losses that bring those of E, G and K to their ends, to first order.
+
+        Args:
+            shares: ∂ln c/∂ln X by K and G of each phase, shape (phases, 2, 3).
+            to_moduli: Loss factors of K and G from those of Young's and the bulk modulus, shape
+                (phases, 2, 2).
+
+        Returns:
+            Of K and G of the phases, shape (levels, 2 ends, 3, phases, 2).
+        """
+        slopes = np.einsum("pxj,pxc->cpj", to_moduli, shares)
+        lower, upper = np.moveaxis(self.ends[:, :, None], 1, 0)
+        least, most = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
+        return np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([least, most]))
+
+
+def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:
+    """Ends of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
+    assert result.energies is not None
+    assert result.cell is not None
+    shares, _ = result.energies.shares(result.constants_of)
+    phases = zip(result.cell.phases, cuts.has_bulk, strict=True)
+    corners = cuts.corners(shares, np.array([bulk_and_shear_losses(*pair) for pair in phases]))
+    errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
+    if corners.max() <= MAX_FIRST_ORDER:
+        return np.einsum("lecpx,pxc->lec", corners, shares), np.array(errors)
+    ends = np.empty(corners.shape[:3])
+    for place in product(*map(range, ends.shape)):
+        ends[place] = loss_factors(result, corners[place]).values[CONSTANTS[place[-1]]]
+    return ends, np.array(errors)
