@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -29,7 +30,7 @@ from alphacut.case.meshed import MeshedCell
 from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
-from alphacut.case.structure import Frame, Pendulum, Structure
+from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import RefusedError, require
 
@@ -205,6 +206,17 @@ class Content(Section):
         return self
 
     @model_validator(mode="after")
+    def _damping(self) -> Self:
+        """Refuses the damping of a material whose loss factors no stage computes."""
+        ratio = getattr(self.structure_section, "damping_ratio", None)
+        computed = "modulus" in self.stages and bool(self.cell and self.cell.losses)
+        if isinstance(ratio, MaterialDamping):
+            section = "frame" if self.frame else "matrices"
+            allowed = "stage modulus and loss factors in [cell], or a number"
+            require(computed, f"{section}.damping_ratio", "material", allowed)
+        return self
+
+    @model_validator(mode="after")
     def _records(self) -> Self:
         """Refuses a structure that nothing moves, and questions that a suite does not answer."""
         section, suite = self.structure_section, self.records
@@ -234,11 +246,14 @@ class Content(Section):
             value = None if structure is None else f"beside {len(sections) - 1} more"
             raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
         whole = self.frame is None or self.frame.is_whole or "modulus" in self.stages
+        ratio = getattr(self.structure_section, "damping_ratio", None)
+        by_material = isinstance(ratio, MaterialDamping)
         own = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         studies = {"envelope": own} | {f"study[{k}]": x for k, x in enumerate(self.study)}
         for key, study in studies.items():
-            made = {"E"} if "modulus" in self.stages else set()
-            structure.inputs([x for x in study.fuzzy if x not in made], f"{key}.fuzzy")
+            computed = r"E|zeta\d*" if by_material else "E" if "modulus" in self.stages else "(?!)"
+            given = [x for x in study.fuzzy if not re.fullmatch(computed, x)]
+            structure.inputs(given, f"{key}.fuzzy")
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
         names = [study.name for study in self.study]

@@ -242,6 +242,9 @@ class ImageCell(Section):
     )
     modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
     poisson: Annotated[tuple[Ratio, ...], Each] = Field(description="Poisson's ratio of each phase")
+    loss: Annotated[tuple[Loss, ...], Each] | None = Field(
+        default=None, description="loss factor tan δ of each phase's Young's modulus at real ν"
+    )
     smooth: bool = Field(default=False, description="whether noise is taken away first")
     level: bool = Field(default=False, description="whether the drift of light is taken away first")
 
@@ -250,6 +253,12 @@ class ImageCell(Section):
         """E and ν of each phase."""
         several = self.poisson * (len(self.modulus) if len(self.poisson) == 1 else 1)
         return tuple(zip(self.modulus, several, strict=True))
+
+    @property
+    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
+        """Loss factors of Young's modulus of each phase; its bulk modulus has the same."""
+        several = (self.loss or ()) * (len(self.modulus) if len(self.loss or ()) == 1 else 1)
+        return tuple((loss, None) for loss in several)
 
     @model_validator(mode="after")
     def _parted(self) -> Self:
@@ -262,6 +271,12 @@ class ImageCell(Section):
         for check in (
             (one, "cell.threshold", value, "one of cell.threshold and cell.labels"),
             (fits, "cell.modulus", values, f"one for each of {count} phases"),
+            (
+                len(self.losses) in (0, count),
+                "cell.loss",
+                f"{len(self.losses)} loss factors",
+                f"one for each of {count} phases",
+            ),
             (sides <= 2, "cell.pixel", sides, "a side, or a width and a height"),
         ):
             require(*check)

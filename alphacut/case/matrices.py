@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
-from alphacut.case.structure import Critical, Structure, read_accelerogram
+from alphacut.case.structure import (
+    LOSS_STAND_IN,
+    RATIO_WORDS,
+    DampingRatio,
+    MaterialDamping,
+    Structure,
+    read_accelerogram,
+)
 from alphacut.case.types import Section, Some, after, case_file, text, unlike
 from alphacut.frame import Accelerogram, MatrixStructure
+from alphacut.frame.structures.energy_shares import modal_energy_shares
 from alphacut.frame.structures.monomial import Monomial
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import Crisp, FuzzyNumber
@@ -75,9 +84,7 @@ class MatricesSection(Section):
     mass: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of M")
     stiffness: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of K")
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
-    damping_ratio: Critical | None = Field(
-        default=None, description="damping over the critical one, of all modes"
-    )
+    damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
     direction: str = Field(
         default="", description="direction of the ground: it moves all unknowns NODE.DIRECTION"
     )
@@ -89,22 +96,32 @@ class MatricesSection(Section):
     )
     outputs: dict[str, ObservedRow] = Field(description="observed quantities by name")
 
-    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
+    def structure(
+        self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
+    ) -> Structure:
         """The structure, with a Young's modulus in Pa in place of its own parameter E.
+
+        Of a damping by the material, the terms of the stiffness that hold E lose as it does.
 
         Raises:
             RefusedError: The matrices make no structure.
         """
         try:
             numbers = self._numbers(modulus)
-            return Structure(self._model(numbers), numbers)
+            model = self._model(numbers)
+            if isinstance(self.damping_ratio, MaterialDamping):
+                ratios = self._material_ratios(self.damping_ratio, model, loss or LOSS_STAND_IN)
+                numbers |= ratios
+                parameters = {name: number.modal for name, number in numbers.items()}
+                model = replace(model, parameters=parameters, ratios=tuple(ratios))
+            return Structure(model, numbers)
         except RefusedError as error:
             key = f"matrices: {error.key}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
 
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
         numbers = dict(self.parameters)
-        if self.damping_ratio is not None:
+        if isinstance(self.damping_ratio, FuzzyNumber):
             numbers[RATIO] = self.damping_ratio
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
@@ -122,9 +139,20 @@ class MatricesSection(Section):
             observed=rows,
             ground=self.accelerogram,
             pattern=self._pattern(),
-            ratios=() if self.damping_ratio is None else (RATIO,),
+            ratios=(RATIO,) if isinstance(self.damping_ratio, FuzzyNumber) else (),
             row_factors={name: self.outputs[name].factor.simplest for name in rows},
         )
+
+    def _material_ratios(
+        self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
+    ) -> dict[str, FuzzyNumber]:
+        """Damping ratio of all modes, or of each where some stiffness is of another material."""
+        of_material = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
+        require(any(of_material), "damping_ratio", "material", "a term of the stiffness with E")
+        if all(of_material):
+            return {RATIO: damping.ratio(loss)}
+        shares = modal_energy_shares(model, np.flatnonzero(of_material))
+        return {f"{RATIO}{k}": damping.ratio(loss, x) for k, x in enumerate(shares, start=1)}
 
     def _terms(
         self, terms: tuple[tuple[Monomial, Array], ...]

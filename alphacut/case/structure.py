@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from alphacut.case.types import Each, Modulus, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
@@ -14,7 +15,7 @@ from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.storey import SYMBOLS
-from alphacut.fuzzy import Crisp, FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, chosen, require
 from alphacut.io.problem import suggestion
@@ -26,7 +27,6 @@ Moment = Annotated[FuzzyNumber, Quantity("m^4", above=0, fuzzy=True)]
 Count = Annotated[FuzzyNumber, Quantity(above=0, fuzzy=True)]
 Stiffness = Annotated[FuzzyNumber, Quantity("N/m", above=0, fuzzy=True)]
 Damping = Annotated[FuzzyNumber, Quantity("N*s/m", least=0, fuzzy=True)]
-Critical = Annotated[FuzzyNumber, Quantity(least=0, below=1, fuzzy=True)]
 Displacement = Annotated[FuzzyNumber, Quantity("m", fuzzy=True)]
 Velocity = Annotated[FuzzyNumber, Quantity("m/s", fuzzy=True)]
 Rate = Annotated[FuzzyNumber, Quantity("1/s", least=0, fuzzy=True)]
@@ -39,9 +39,65 @@ Spin = Annotated[FuzzyNumber, Quantity("rad/s", fuzzy=True)]
 ZERO = Crisp(0.0)
 NAMES = {"q0": "displacements", "v0": "velocities", "output": "outputs"}
 """Keys by the names of the frame's own arguments, where they differ."""
+RATIO_WORDS = (
+    'damping over the critical one, of all modes; "material" takes that of the loss factors of the'
+    ' cell, "material + 1 %" adds that of joints'
+)
 DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
 STAND_IN = Crisp(2e10)
 """Young's modulus in Pa of a frame whose own is yet to be computed."""
+LOSS_STAND_IN = Crisp(0.02)
+"""Loss factor of a material whose own is yet to be computed."""
+
+
+@dataclass(frozen=True)
+class MaterialDamping:
+    """Damping ratio by the loss factor of the cell's material, independent of frequency.
+
+    Args:
+        joints: Damping ratio of joints besides.
+    """
+
+    joints: FuzzyNumber = ZERO
+
+    def ratio(self, loss: FuzzyNumber, energy_share: float = 1.0) -> FuzzyNumber:
+        """ζ = sin(½ arctan η) of a mode that oscillates freely, and the joints' besides.
+
+        Args:
+            loss: Loss factor of the material's Young's modulus.
+            energy_share: Share of the mode's strain energy in the material; η is that of the loss.
+        """
+        if loss.support.width == 0 and self.joints.support.width == 0:
+            return Crisp(_ratio_of_loss(loss.modal * energy_share) + self.joints.modal)
+        alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
+        pairs = [(loss.cut(level), self.joints.cut(level)) for level in alpha]
+        lower, upper = (
+            [_ratio_of_loss(of[end] * energy_share) + joints[end] for of, joints in pairs]
+            for end in (0, 1)
+        )
+        return PiecewiseLinear(alpha, lower, upper)
+
+
+def _ratio_of_loss(loss: float) -> float:
+    return math.sin(math.atan(loss) / 2)
+
+
+def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping:
+    """A damping ratio, or that of the material."""
+    words = value.partition("+") if isinstance(value, str) else ("", "", "")
+    if words[0].strip() != "material":
+        return RATIO.read(value)
+    if not words[1]:
+        return MaterialDamping()
+    return MaterialDamping(RATIO.read(words[2].strip()))
+
+
+RATIO = Quantity(least=0, below=1, fuzzy=True)
+DampingRatio = Annotated[
+    FuzzyNumber | MaterialDamping,
+    RATIO,
+    PlainValidator(_damping_ratio, json_schema_input_type=float | list[float] | str),
+]
 
 
 @dataclass(frozen=True)
@@ -136,6 +192,15 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     return read_recording(case_file(value, info)).accelerogram()
 
 
+def ratio_of(
+    ratio: FuzzyNumber | MaterialDamping | None, loss: FuzzyNumber | None
+) -> FuzzyNumber | None:
+    """Damping ratio of all modes; of the material by its loss factor, which has a stand-in."""
+    if isinstance(ratio, MaterialDamping):
+        return ratio.ratio(loss or LOSS_STAND_IN)
+    return ratio
+
+
 class Frame(Section):
     """Storey frame: rigid floors on elastic columns, numbered from the ground.
 
@@ -158,9 +223,7 @@ class Frame(Section):
     stiffness: Annotated[tuple[Stiffness, ...], Each] | None = Field(
         default=None, description="stiffness of each storey, in place of columns and modulus"
     )
-    damping_ratio: Critical | None = Field(
-        default=None, description="damping over the critical one, of all modes"
-    )
+    damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
     dampers: Annotated[tuple[Damping, ...], Each] = Field(
         default=(ZERO,), description="viscous damper of each floor"
     )
@@ -208,22 +271,25 @@ class Frame(Section):
         several = values or ()
         return several * self.floors if len(several) == 1 else several
 
-    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
-        """The frame with a Young's modulus in Pa, its own by default.
+    def structure(
+        self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
+    ) -> Structure:
+        """The frame with a Young's modulus in Pa, its own by default, and the loss factor of it.
 
         Raises:
             RefusedError: Its values make no frame.
         """
         number = self.modulus if self.stiffness else modulus or self.modulus or STAND_IN
+        ratio = ratio_of(self.damping_ratio, loss)
         try:
-            model = self._model(number)
+            model = self._model(number, ratio)
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        every = self._numbers(number)
+        every = self._numbers(number, ratio)
         return Structure(model, {name: every[name] for name in model.parameters})
 
-    def _model(self, modulus: FuzzyNumber | None) -> StoreyFrame:
+    def _model(self, modulus: FuzzyNumber | None, ratio: FuzzyNumber | None) -> StoreyFrame:
         return StoreyFrame(
             self._modal(self.masses),
             self._modal(self.lengths),
@@ -236,7 +302,7 @@ class Frame(Section):
             outputs=self.outputs,
             rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
             ground=self.accelerogram,
-            damping_ratio=None if self.damping_ratio is None else self.damping_ratio.modal,
+            damping_ratio=None if ratio is None else ratio.modal,
             columns=() if self.stiffness else self._modal(self.columns),
             stiffness=self._modal(self.stiffness),
         )
@@ -244,15 +310,17 @@ class Frame(Section):
     def _modal(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
         return tuple(x.modal for x in self.per_floor(values))
 
-    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+    def _numbers(
+        self, modulus: FuzzyNumber | None, ratio: FuzzyNumber | None
+    ) -> dict[str, FuzzyNumber]:
         """Every number by the name of its parameter; some are none of this frame's."""
         numbers: dict[str, FuzzyNumber] = {
             "E": modulus or STAND_IN,
             "rayleigh_mass": self.rayleigh_mass,
             "rayleigh_stiffness": self.rayleigh_stiffness,
         }
-        if self.damping_ratio is not None:
-            numbers["zeta"] = self.damping_ratio
+        if ratio is not None:
+            numbers["zeta"] = ratio
         if self.second_moment is not None:
             numbers["I"] = self.second_moment[0]  # of all storeys, where it is one
         for key, symbol in SYMBOLS.items():
@@ -263,6 +331,9 @@ class Frame(Section):
     @model_validator(mode="after")
     def _complete(self) -> Self:
         """Refuses a frame without damping, or that is none."""
+        lossless = isinstance(self.damping_ratio, MaterialDamping) and self.stiffness is not None
+        allowed = "columns of the material, or [matrices] where some storeys are of another"
+        require(not lossless, "frame.damping_ratio", "material, beside stiffness", allowed)
         placed = self.names("dampers") == (self.damper_placement is not None)
         for holds, key, allowed, cure in (
             (placed, "damper_placement", "both dampers and damper_placement", ""),
@@ -283,8 +354,10 @@ class Pendulum(Section):
     angle: Angle = Field(description="angle at the start, 0 hanging down")
     angular_velocity: Spin = Field(description="angular velocity at the start")
 
-    def structure(self, modulus: FuzzyNumber | None = None) -> Structure:
-        """The pendulum; it takes no modulus."""
+    def structure(
+        self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
+    ) -> Structure:
+        """The pendulum; it takes neither modulus nor loss factor."""
         model = pendulum(
             mass=self.mass.modal,
             length=self.length.modal,

@@ -15,7 +15,6 @@ from alphacut.io.quantity import between
 from alphacut.report.results import ISOTROPIC, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
 from alphacut.stages.identify import learned
-from alphacut.stages.modulus import number_of
 from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stochastic.microstructure_summary import fragment
@@ -73,12 +72,10 @@ def add_envelope(parser: argparse.ArgumentParser) -> None:
 
 def envelope(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the envelope of [envelope]."""
-    number = None
-    if options.modulus:
-        number = number_of(read_dataset(Path(options.modulus), "--modulus"), "--modulus")
+    data = read_dataset(Path(options.modulus), "--modulus") if options.modulus else None
     with opened(options) as (case, store):
         pipeline = Pipeline(Results(case.content), store)
-        pipeline.motion(pipeline.structure(number), studies=False)
+        pipeline.motion(pipeline.structure(data, "--modulus"), studies=False)
     document = pipeline.results.document()
     answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0

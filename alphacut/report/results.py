@@ -51,9 +51,13 @@ def material(summary: Document) -> Table:
         off = error_text(error, nature) if part.get("particles") != "mesh" else "not declared"
         rows.append((name, *ends, str(nature), off))
         others = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
+        others |= {"loss factor of E": part.get("loss", {}).get("E")}
         for label, of in others.items():
             if of:
                 rows.append((label, cut(of, -1, nature), cut(of, 0, nature), str(nature), ""))
+    for name, (low, modal, high) in summary.get("damping", {}).items():
+        ends = (between(*pair, Nature.ATTAINED, 4) for pair in ((modal, modal), (low, high)))
+        rows.append((f"damping ratio {name}", *ends, str(Nature.ATTAINED), ""))
     return filled(MATERIAL, rows)
 
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 from alphacut.case.content import Content
 from alphacut.case.records import RecordsSection
-from alphacut.case.structure import Structure
+from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.frame.verification.self_test import ContradictionError
-from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.columns import columns_text
 from alphacut.io.files import as_json, say
@@ -34,6 +34,9 @@ from alphacut.stages.modulus import CellCampaign
 from alphacut.stages.readiness import campaign_of, overhangs
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, StageResult, StageStore, Work
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass
@@ -70,7 +73,7 @@ class Pipeline:
             self.material()
         if "envelope" in stages:
             data = results.modulus if results.image is None else results.image
-            self._motion(self.structure(None if data is None else modulus.number_of(data.arrays)))
+            self._motion(self.structure(None if data is None else data.arrays))
         samples = self.campaign if results.modulus is not None else None
         richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
         results.shares = self.store.take(shares.stage(samples, results.structure, richest))
@@ -102,9 +105,15 @@ class Pipeline:
         particles = self.campaign.cell.particles
         cell.require_bounds((ends[0], ends[1]), data.document["references"], particles)
 
-    def structure(self, number: FuzzyNumber | None) -> Structure:
-        """The structure with a modulus in Pa, None for its own."""
-        content = self.content
+    def structure(self, data: xarray.Dataset | None, key: str = "modulus") -> Structure:
+        """The structure with the modulus and the loss factor of a stage, None for its own.
+
+        Args:
+            data: Result of stage modulus.
+            key: Where it comes from.
+        """
+        content, number = self.content, None if data is None else modulus.number_of(data, key)
+        loss = None if data is None else modulus.loss_of(data)
         section = content.structure_section
         if section is None or content.envelope is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
@@ -114,7 +123,11 @@ class Pipeline:
             None,
             "a modulus, or --modulus FILE.nc",
         )
-        return section.structure(number)
+        by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
+        allowed = "loss factors of the cell, or a number"
+        known = loss is not None or not by_material
+        require(known, "frame.damping_ratio", "material", allowed)
+        return section.structure(number, loss)
 
     def motion(self, structure: Structure, studies: bool = True) -> None:
         """Envelopes of the structure, of every study or of [envelope] alone."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from alphacut.case.content import Content
-from alphacut.case.structure import STAND_IN, Structure
+from alphacut.case.structure import LOSS_STAND_IN, STAND_IN, Structure
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.fuzzy.refused import FailedError
 from alphacut.questions.all import questions_of
@@ -65,7 +65,8 @@ def _require_motion(content: Content) -> None:
     section = content.structure_section
     if section is None or content.envelope is None:
         return
-    structure, alpha = section.structure(_modulus(content)), content.envelope.alpha
+    number, alpha = _modulus(content), content.envelope.alpha
+    structure = section.structure(number, _loss(content, number))
     if content.identify is not None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:
@@ -90,6 +91,15 @@ def _modulus(content: Content) -> FuzzyNumber | None:
         is_fuzzy = any(number.support.width > 0 for number in inputs)
     crisp = content.modulus.alpha == (1.0,) or not is_fuzzy
     return Crisp(value) if crisp else Triangular(0.99 * value, value, 1.01 * value)
+
+
+def _loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
+    """A loss factor that stands in for that of a stage, fuzzy where that will be."""
+    losses = [x for pair in content.cell.losses for x in pair if x] if content.cell else []
+    widths = [x.support.width for x in (*losses, modulus) if x is not None]
+    value = LOSS_STAND_IN.modal
+    is_fuzzy = any(widths) and content.modulus.alpha != (1.0,)
+    return Triangular(0.9 * value, value, 1.1 * value) if is_fuzzy else LOSS_STAND_IN
 
 
 def _require_envelope(task: EnvelopeTask, structure: Structure) -> None:

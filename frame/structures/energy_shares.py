@@ -1,0 +1,34 @@
+"""Shares of terms of the stiffness in the strain energy of modes, by which materials damp them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import eigh
+
+from alphacut.frame.structures.matrix import MatrixStructure, value_of
+from alphacut.fuzzy.arrays import Array, Rows
+
+
+def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Rows) -> Array:
+    """Σ φᵀK_i φ / φᵀK φ over some terms of the stiffness, by rising frequency, shape (modes,).
+
+    The loss factor of a mode is to first order the mean of those of its parts by these shares
+    (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at modal values.
+
+    Args:
+        system: The structure.
+        terms: Places of the terms.
+    """
+    p = system.parameters
+    mass = sum(float(value_of(factor, p)) * array for factor, array in system.mass)
+    parts = np.array([float(value_of(factor, p)) * array for factor, array in system.stiffness])
+    stiffness, a, b = parts.sum(axis=0), system.massive, system.massless
+    shapes = np.zeros((system.size, len(a)))
+    follow = -np.linalg.solve(stiffness[np.ix_(b, b)], stiffness[np.ix_(b, a)])
+    condensed = stiffness[np.ix_(a, a)] + stiffness[np.ix_(a, b)] @ follow
+    shapes[a] = eigh(condensed, mass[np.ix_(a, a)])[1]
+    shapes[b] = follow @ shapes[a]
+    energies = np.einsum("ik,tij,jk->tk", shapes, parts, shapes)
+    return np.asarray(energies[terms].sum(axis=0) / energies.sum(axis=0))

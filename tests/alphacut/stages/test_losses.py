@@ -1,0 +1,146 @@
+"""Loss factors of phases in a case: their α-cuts, and the damping of a frame of the material."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.linalg import eigvals
+
+from alphacut.case.load import load
+from alphacut.case.structure import MaterialDamping
+from alphacut.entry import main
+from alphacut.frame import MatrixStructure
+from alphacut.frame.structures.energy_shares import modal_energy_shares
+from alphacut.fuzzy import Crisp, Triangular
+from alphacut.io.problem import BadInput
+
+CASE = """
+title = "A frame of fibres"
+stages = ["modulus", "envelope"]
+[radius]
+a1 = 0.3
+a2 = [0.1, 0.2, 0.3]
+a3 = 0.6
+a4 = 0.2
+[cell]
+matrix_modulus = "20 GPa"
+matrix_poisson = 0.3
+inclusion_modulus = "[75, 80, 85] GPa"
+inclusion_poisson = 0.3
+matrix_loss = "[1.4, 2, 2.6] %"
+inclusion_loss = "[0.35, 0.5, 0.65] %"
+[modulus]
+plan = "reduced"
+alpha = [0, 0.5, 1]
+[frame]
+masses = "10 t"
+lengths = "3 m"
+second_moment = "1e-5 m^4"
+damping_ratio = "material"
+displacements = "10 mm"
+[envelope]
+fuzzy = ["E", "zeta"]
+alpha = [0, 1]
+duration = "2 s"
+step = "0.02 s"
+"""
+
+
+def summary(folder, text):
+    case = folder / "case.toml"
+    case.write_text(text, encoding="utf-8")
+    assert main(["run", str(case), "--quiet", "--no-figures", "--out", str(folder / "out")]) == 0
+    return json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_the_frame_is_damped_by_half_the_loss_factor_of_its_material(tmp_path):
+    document = summary(tmp_path, CASE)
+    loss = document["modulus"]["loss"]["E"]
+    low, modal, high = document["damping"]["zeta"]
+    expected = np.sin(np.arctan([loss["lower"][0], loss["lower"][-1], loss["upper"][0]]) / 2)
+    assert np.allclose([low, modal, high], expected, rtol=1e-12)
+    assert low > 0.35e-2 / 2
+    assert high < 2.6e-2 / 2
+    assert document["envelopes"]["all"]["nature"] == "guaranteed"
+    without = CASE.replace('"material"', '"1 %"').replace('fuzzy = ["E", "zeta"]', 'fuzzy = ["E"]')
+    lines = (x for x in without.splitlines() if "_loss" not in x)
+    (tmp_path / "other").mkdir()
+    other = summary(tmp_path / "other", "\n".join(lines))
+    assert other["modulus"]["E_GPa"] == document["modulus"]["E_GPa"]
+    assert "loss" not in other["modulus"]
+
+
+WRONG = [
+    ('"[1.4, 2, 2.6] %"', '"-1 %"', "cell.matrix_loss", "from 0 up to 0.5"),
+    ('"[1.4, 2, 2.6] %"', "0.51", "cell.matrix_loss", "from 0 up to 0.5"),
+    ('matrix_loss = "[1.4, 2, 2.6] %"\n', "", "cell.matrix_loss", "a loss of either phase"),
+    ("[cell]", "[cell]\nmatrix_loss_bulk = 0.2", "cell.matrix_loss_bulk", "up to 0.105"),
+    ("[cell]", '[cell]\nparticles = "spheres"', "cell.matrix_loss", "cylinders or ellipses"),
+    ('"material"', '"material - 1 %"', "frame.damping_ratio", "below 1"),
+    (
+        'lengths = "3 m"\nsecond_moment = "1e-5 m^4"',
+        'stiffness = "1 MN/m"',
+        "frame.damping_ratio",
+        "columns of the material",
+    ),
+]
+
+
+def problems(folder, text):
+    path = folder / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput) as caught:
+        load(path)
+    return caught.value.problems
+
+
+@pytest.mark.parametrize(("old", "new", "key", "words"), WRONG)
+def test_what_is_wrong_is_said_in_one_line(tmp_path, old, new, key, words):
+    assert old in CASE
+    found = problems(tmp_path, CASE.replace(old, new))
+    assert key in [problem.key for problem in found]
+    assert any(words in str(problem) for problem in found)
+
+
+def test_a_material_without_losses_damps_no_frame(tmp_path):
+    lines = (x for x in CASE.splitlines() if "_loss" not in x)
+    (problem,) = problems(tmp_path, "\n".join(lines))
+    assert problem.key == "frame.damping_ratio"
+    assert "loss factors in [cell]" in str(problem)
+
+
+def test_joints_come_on_top_on_every_level():
+    damping = MaterialDamping(Triangular(0.005, 0.01, 0.02))
+    ratio = damping.ratio(Triangular(0.01, 0.02, 0.04), 0.5)
+    for level in (0.0, 1.0):
+        joints, loss = damping.joints.cut(level), Triangular(0.01, 0.02, 0.04).cut(level)
+        expected = np.sin(np.arctan(np.array(loss) / 2) / 2) + joints
+        assert np.allclose(ratio.cut(level), expected, rtol=1e-12)
+    assert MaterialDamping().ratio(Crisp(0.02)).modal == pytest.approx(0.01, rel=1e-3)
+
+
+def test_a_lossless_ground_storey_damps_modes_by_their_energy_elsewhere():
+    """Against complex modes, whose distance is of third order in the loss factor."""
+    upper = np.array([[1.0, -1, 0], [-1, 2, -1], [0, -1, 1]]) * 4e6
+    ground = np.diag([9e6, 0, 0])
+    mass = np.diag([2e4, 1e4, 1e4, 0.0])
+    upper, ground = (np.pad(x, (0, 1)) for x in (upper, ground))
+    joined = np.zeros((4, 4))  # an unknown without mass on the roof
+    joined[2:, 2:] = np.array([[1, -1], [-1, 1.0]]) * 1e6
+    ground_of_it = np.diag([0, 0, 0, 2e5])
+    structure = MatrixStructure(
+        {"E": 1.0},
+        mass=[(1.0, mass)],
+        stiffness=[("E", upper), (1.0, ground), ("E", joined), (1.0, ground_of_it)],
+        observed={"roof": np.eye(4)[2]},
+    )
+    shares, gaps = modal_energy_shares(structure, [0, 2]), []
+    for loss in (0.04, 0.02):
+        stiffness = (upper + joined) * (1 + 1j * loss) + ground + ground_of_it
+        a, b = np.ix_(range(3), range(3)), stiffness[3:, :3]
+        condensed = stiffness[a] - b.T @ b / stiffness[3, 3]
+        squared = np.sort(eigvals(condensed, mass[a]))
+        exact = np.sin(np.angle(squared) / 2)
+        gaps.append(abs(np.sin(np.arctan(loss * shares) / 2) / exact - 1).max())
+    assert gaps[0] < 1e-3
+    assert np.log2(gaps[0] / gaps[1]) == pytest.approx(2, abs=0.05)
