@@ -71,6 +71,11 @@ class MeshedCell(Section):
         return False
 
     @property
+    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
+        """Loss factors of the phases: none."""
+        return ()
+
+    @property
     def square(self) -> bool:
         """False: a file may hold any phases."""
         return False
