@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.export.mesh import ORDER
+from alphacut.export.mesh import VTK_ORDER
 from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap
@@ -98,8 +98,9 @@ def picture(folder: Path) -> None:
     """Draw the particle and the shear stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, ORDER]])
+    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, VTK_ORDER]])
     wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
+    assert (wedges.compute_cell_sizes()["Volume"] > 0).all()
     wedges.point_data["stress 12 in MPa"] = drawn.stress[:, 2, 1] / 1e6
     plotter = pyvista.Plotter(off_screen=True, shape=(1, 2), window_size=(1300, 900))
     plotter.add_mesh(wedges.extract_cells(drawn.phase == 1), color="steelblue", show_edges=True)

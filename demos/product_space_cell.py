@@ -23,7 +23,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from alphacut.export.mesh import ORDER
+from alphacut.export.mesh import VTK_ORDER
 from alphacut.rve import LOADS, Phase, PrismModel, effective_modulus
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.triangulation import reference_radius
@@ -138,8 +138,9 @@ def picture(folder: Path) -> None:
     """Write the fields, and draw the particle and the stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, ORDER]])
+    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, VTK_ORDER]])
     wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
+    assert (wedges.compute_cell_sizes()["Volume"] > 0).all()
     wedges.cell_data["phase"] = drawn.phase
     wedges.point_data["stress 11 in MPa"] = drawn.stress[:, 0, 0] / 1e6
     wedges.save(folder / "product_space_cell.vtu")

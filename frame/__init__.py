@@ -11,7 +11,7 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
-from alphacut.frame.propagation import METHODS, envelope
+from alphacut.frame.propagation import METHODS, envelope, require_envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
 from alphacut.frame.structures.linear import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
@@ -22,5 +22,5 @@ __all__ = [
     "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact",
     "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
-    "Sampled", "Search", "StoreyFrame", "envelope", "pendulum",
+    "Sampled", "Search", "StoreyFrame", "envelope", "pendulum", "require_envelope",
 ]  # fmt: skip

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from alphacut.frame.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.proof import DualProof
@@ -22,6 +23,7 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
+from alphacut.frame.parts import exact
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError, require_modal_order
@@ -37,6 +39,8 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import chosen, require
 
+FIRST_STEPS = 3
+"""Steps of the motions that show whether they exist."""
 JUDGED = 4
 """Most inputs of a follower's envelope that a proof is made beside."""
 OTHER_UNITS = 500
@@ -101,27 +105,88 @@ def envelope(
             values without a meaning, or a motion that does not exist.
         FailedError: A step is too long, or a method cannot do what it is to do.
     """
-    known = isinstance(model, LagrangianSystem) or hasattr(model, "matrices")
-    allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
-    require(known, "model", type(model).__name__, allowed)
-    way = _method(model, method, options)
-    if integrator is None:
-        proves = isinstance(way, Auto | Proof | DualProof | Search)
-        integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
-    every = boxes(inputs, alpha)
-    flow = flow_of(model, every.names, duration, step, integrator)
-    require_admissible(model, every)
-    cuts, which = every.distinct()
+    problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
     folder = None if store is None else Path(store)
-    over = UnitFlow(flow, cuts, relative, folder, interruptible)
-    steps = step_error(over)
+    flow = replace(problem.flow, relative=relative, store=folder, interruptible=interruptible)
+    steps = step_error(flow)
     with showing(progress) as tick:
-        bounds = way.run(over, tick)
-    bounds = _judged(with_step_error(bounds, over, steps), over, way)
-    bounds = with_stray(bounds, over)
+        bounds = problem.method.run(flow, tick)
+    bounds = _judged(with_step_error(bounds, flow, steps), flow, problem.method)
+    bounds = with_stray(bounds, flow)
     if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
         bounds = with_motions_tested(bounds, model)
-    return _on_levels(bounds, every.alpha, which)
+    return _on_levels(bounds, problem.alpha, problem.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """An envelope that can be computed.
+
+    Args:
+        method: The method.
+        flow: The motion, with the boxes of different levels.
+        alpha: Levels that are asked for, shape (A,).
+        rows: Box of each of them, shape (A,).
+    """
+
+    method: Method
+    flow: UnitFlow
+    alpha: Array
+    rows: Rows
+
+
+def _problem(
+    model: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber | float],
+    method: Method | str | None,
+    duration: float,
+    step: float,
+    alpha: Sequence[float],
+    integrator: str | Integrator | None,
+    options: Mapping[str, object],
+) -> _Problem:
+    """The problem that arguments of `envelope` pose.
+
+    Raises:
+        RefusedError: As `envelope`.
+    """
+    is_system = isinstance(model, LagrangianSystem) or hasattr(model, "matrices")
+    allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
+    require(is_system, "model", type(model).__name__, allowed)
+    chosen_method = _method(model, method, options)
+    if integrator is None:
+        proves = isinstance(chosen_method, Auto | Proof | DualProof | Search)
+        integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
+    levels = boxes(inputs, alpha)
+    flow = flow_of(model, levels.names, duration, step, integrator)
+    require_admissible(model, levels)
+    cuts, rows = levels.distinct()
+    return _Problem(chosen_method, UnitFlow(flow, cuts), levels.alpha, rows)
+
+
+def require_envelope(
+    model: LinearSystem | LagrangianSystem,
+    inputs: Mapping[str, FuzzyNumber | float],
+    method: Method | str | None = None,
+    *,
+    duration: float,
+    step: float,
+    alpha: Sequence[float] = ALPHA,
+    integrator: str | Integrator | None = None,
+    **options: object,
+) -> None:
+    """Requires what `envelope` requires of its arguments, from the first steps of a few motions.
+
+    Raises:
+        RefusedError: As `envelope`.
+        UnprovedError: A proof is asked for, and there is none of such a structure.
+    """
+    problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
+    short = replace(problem.flow.flow, duration=min(FIRST_STEPS * step, duration))
+    short.values(problem.flow.boxes.probes)
+    if isinstance(problem.method, Proof | DualProof):
+        with refusing():
+            problem.method.forecast(exact(problem.flow), problem.flow.boxes)
 
 
 def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 # triangle, vertical edges; from there to VTK's, the lower triangle seen from outside.
 ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
 MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
+VTK_ORDER = [ORDER[k] for k in MIRRORED]
 COMPONENTS = ("11", "22", "12")
 MATRIX, PARTICLE = "#f0a860", "#b79ad9"  # orange and lilac, as in the paper
 PIXELS = (1000, 1100)
@@ -61,8 +62,7 @@ def wedges(
 
     # meshio 5.3 reads and writes this cell but has forgotten its dimension
     topological_dimension.setdefault("wedge15", 3)
-    cells = cells[:, ORDER][:, MIRRORED]
-    return meshio.Mesh(points, [("wedge15", cells)], data, {"phase": [phase]})
+    return meshio.Mesh(points, [("wedge15", cells[:, VTK_ORDER])], data, {"phase": [phase]})
 
 
 def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:

@@ -87,18 +87,24 @@ class EnvelopeTask:
     def envelope_of(self, structure: Structure, tick: Progress | None = None) -> frame.Envelope:
         """The envelope by the method of the case."""
         return frame.envelope(
-            structure.model,
-            structure.inputs(self.fuzzy),
-            duration=self.duration,
-            step=self.section.step,
-            alpha=self.section.alpha,
-            method=self.section.method,
-            integrator=self.section.integrator,
+            **self.arguments(structure),
             relative=not self.tolerance(structure).unit,
             interruptible=False,
             progress=tick or False,
-            **self.options(structure),
         )
+
+    def arguments(self, structure: Structure) -> dict[str, Any]:
+        """Arguments of `frame.envelope` and of `frame.require_envelope` that the case names."""
+        return {
+            "model": structure.model,
+            "inputs": structure.inputs(self.fuzzy),
+            "duration": self.duration,
+            "step": self.section.step,
+            "alpha": self.section.alpha,
+            "method": self.section.method,
+            "integrator": self.section.integrator,
+            **self.options(structure),
+        }
 
     def close_peaks(self, structure: Structure, work: Work) -> Peaks:
         """Peaks of the limited outputs by the method that bounds peaks most closely."""

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
+from alphacut import frame
 from alphacut.case.content import Content
 from alphacut.case.structure import LOSS_STAND_IN, STAND_IN, Structure
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
-from alphacut.fuzzy.refused import FailedError
 from alphacut.questions.all import questions_of
 from alphacut.questions.question import Motion
 from alphacut.stages import envelope, identify, image, suite
 from alphacut.stages.cell import model_of
-from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.meshed import require_mesh
 from alphacut.stages.modulus import CellCampaign, require_levels
 from alphacut.stochastic.sections import Simulated
 
-STEPS = 3
-"""Steps of the motion that a method is tried with."""
-
 
 def require_runnable(content: Content) -> None:
-    """Builds everything that the stages of a case read, and tries the methods that it names.
+    """Builds everything that the stages of a case read, and the first steps of its motions.
 
     Raises:
         RefusedError: A stage would refuse a file, a model or a value.
@@ -61,7 +56,7 @@ def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> Cel
 
 
 def _require_motion(content: Content) -> None:
-    """Tries the method of each study on a few steps, and what questions ask of the structure."""
+    """Requires an admissible motion of each study, and what questions ask of the structure."""
     section = content.structure_section
     if section is None or content.envelope is None:
         return
@@ -73,7 +68,7 @@ def _require_motion(content: Content) -> None:
         records = suite.suite(content.records, content.envelope, structure)
         structure = suite.under(structure, records[0])
     for task in envelope.tasks(content.envelope, content.study):
-        _require_envelope(task, structure)
+        frame.require_envelope(**task.arguments(structure))
     (task,) = envelope.tasks(content.envelope, ())
     motion = Motion(structure, task.fuzzy, alpha, task.duration, task.section.step)
     for question in questions_of(content.questions):
@@ -100,17 +95,6 @@ def _loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
     value = LOSS_STAND_IN.modal
     is_fuzzy = any(widths) and content.modulus.alpha != (1.0,)
     return Triangular(0.9 * value, value, 1.1 * value) if is_fuzzy else LOSS_STAND_IN
-
-
-def _require_envelope(task: EnvelopeTask, structure: Structure) -> None:
-    """Tries the method of a task on a few steps; what fails by its numbers is left to the run."""
-    structure.inputs(task.fuzzy)
-    steps = min(STEPS, round(task.duration / task.section.step))
-    short = replace(task, duration=steps * task.section.step, limited=())
-    try:
-        short.envelope_of(structure)
-    except (FailedError, ArithmeticError):
-        return
 
 
 def overhangs(content: Content, structure: Structure) -> Iterator[str]:

@@ -1,9 +1,17 @@
 """The same problem said otherwise, and the same case run otherwise, gives no contradiction."""
 
+import os
+import random
+import signal
+import subprocess
+import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from alphacut.fuzzy import Interval, Knowledge, Signed, propagate
 from benchmarks.relations import cases, frames, functions
@@ -74,6 +82,48 @@ def test_a_case_has_one_set_of_numbers_however_it_is_run(tmp_path):
     case.write_text(CASE, encoding="utf-8")
     (found,) = cases.ways_checked(cases.CaseRun(case), [OTHERWISE], np.random.default_rng(1))
     assert found[1] == [], found
+
+
+def arrays_of(folder):
+    """Arrays of all results of a run, without the seconds in their attributes."""
+    return {path.name: xr.load_dataset(path) for path in sorted(Path(folder).glob("*.nc"))}
+
+
+def kill_after(seconds, words):
+    """Starts a command and kills it with its workers; whether it was still running."""
+    started = subprocess.Popen(words, env=cases.surroundings(cases.PLAIN), start_new_session=True)
+    with suppress(subprocess.TimeoutExpired):
+        started.wait(seconds)
+    was_running = started.poll() is None
+    with suppress(ProcessLookupError):
+        os.killpg(started.pid, signal.SIGKILL)
+    started.wait()
+    return was_running
+
+
+@pytest.mark.slow
+def test_runs_killed_at_random_times_are_taken_up_to_the_bit(tmp_path):
+    seed = int(os.environ.get("SEED", random.randrange(10**9)))
+    print("seed", seed)
+    draw, case = random.Random(seed), tmp_path / "small.toml"
+    case.write_text(CASE, encoding="utf-8")
+    way = cases.PLAIN | {"figures": "yes"}
+    begun = time.monotonic()
+    summary = cases.CaseRun(case, way=way).run(tmp_path / "plain")
+    seconds, plain, kills = time.monotonic() - begun, arrays_of(tmp_path / "plain"), 0
+    for trial in range(20):
+        out, workers = tmp_path / str(trial), draw.choice(["1", "2"])
+        other = cases.CaseRun(case, way=way | {"workers": workers})
+        words = cases.command(case, (), out, other.way)
+        for _ in range(draw.randint(1, 3)):
+            kills += kill_after(draw.uniform(0.1, 1.0) * seconds, words)
+        found = other.run(out)
+        assert not [*cases.differences(*map(cases.numbers, (summary, found)))], trial
+        assert [*arrays_of(out)] == [*plain]
+        assert all(data.equals(plain[name]) for name, data in arrays_of(out).items()), trial
+        if kills >= 12:
+            return
+    pytest.fail(f"{kills} kills only")
 
 
 def test_ways_hold_every_pair_of_factors():

@@ -149,3 +149,9 @@ def test_a_record_longer_than_the_motion_is_said(place, capfd):
     assert sentence in capfd.readouterr().out
     assert main(["run", *words, "--no-figures", "--quiet", f"--out={place}/out"]) == 0
     assert sentence in capfd.readouterr().err
+
+
+def test_check_refuses_a_proof_of_a_schemes_motion(place, capfd):
+    changes = ("--set=envelope.method=proof", "--set=envelope.integrator=midpoint")
+    assert main(["check", str(written(place, FRAME)), *changes]) == 1
+    assert "a proof is of the exact one" in capfd.readouterr().err
