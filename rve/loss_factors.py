@@ -54,7 +54,7 @@ def phase_losses(phase: AnyPhase, loss: float, bulk_loss: float | None = None) -
     return np.asarray(losses)
 
 
-def bulk_and_shear_losses(phase: AnyPhase, has_bulk: bool) -> Array:
+def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
     """Matrix (2, 2) from losses of Young's and of the bulk modulus to those of K and of G.
 
     1/E = 1/(9 K) + 1/(3 G) loses the mean of both by energy.

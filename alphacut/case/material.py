@@ -17,6 +17,7 @@ from alphacut.case.types import (
     Each,
     Length,
     Levels,
+    Loss,
     Modulus,
     ModulusOrStiffness,
     Quantity,
@@ -35,7 +36,6 @@ from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
 Theta = Annotated[float, Quantity(least=-10, most=10)]
-Loss = Annotated[FuzzyNumber, Quantity(least=0, most=0.5, fuzzy=True)]
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
     'cylinders, spheres or ellipses(ratio of axes from 1/4 to 4, degrees), as "ellipses(2, 30)"'

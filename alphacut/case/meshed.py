@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from alphacut.case.types import ModulusOrStiffness, Quantity, Section
+from alphacut.case.types import Loss, ModulusOrStiffness, Quantity, Section
 from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.refused import require
 from alphacut.rve.cell import Phase, VoigtPhase
@@ -21,6 +21,7 @@ class PhaseSection(Section):
     poisson: Annotated[float, Quantity(above=-1, below=0.5)] | None = Field(
         default=None, description="Poisson's ratio, beside Young's modulus"
     )
+    loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
 
     @model_validator(mode="after")
     def _require_ratio(self) -> Self:
@@ -56,6 +57,21 @@ class MeshedCell(Section):
         return moduli or {"scale": Crisp(1.0)}
 
     @property
+    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
+        """Loss factor of each phase, whose bulk modulus has the same; empty for none."""
+        losses = (phase.loss for phase in self.phases.values())
+        return tuple((loss, None) for loss in losses if loss is not None)
+
+    @model_validator(mode="after")
+    def _require_losses(self) -> Self:
+        """Refuses losses of some phases alone."""
+        missing = [name for name, phase in self.phases.items() if phase.loss is None]
+        complete = len(missing) in (0, len(self.phases))
+        key = f"cell.phases.{missing[0]}.loss" if missing else ""
+        require(complete, key, None, "a loss factor of each phase, 0 for none")
+        return self
+
+    @property
     def methods(self) -> tuple[str, ...]:
         """Models that can solve it."""
         return "auto", "prism"
@@ -69,11 +85,6 @@ class MeshedCell(Section):
     def fibres(self) -> bool:
         """False: constants along fibres need one round particle."""
         return False
-
-    @property
-    def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
-        """Loss factors of the phases: none."""
-        return ()
 
     @property
     def square(self) -> bool:

@@ -216,6 +216,7 @@ ModulusOrStiffness = Annotated[
     Annotated[Modulus, Tag("<modulus>")] | Annotated[Stiffness, Tag("<stiffness>")],
     Discriminator(lambda value: "<stiffness>" if isinstance(value, list) else "<modulus>"),
 ]
+Loss = Annotated[FuzzyNumber, Quantity(least=0, most=0.5, fuzzy=True)]
 Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]

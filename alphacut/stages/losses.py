@@ -64,10 +64,11 @@ class LossCuts:
 def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:
     """Ends of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
     assert result.energies is not None
-    assert result.cell is not None
     shares, _ = result.energies.shares(result.constants_of)
-    phases = zip(result.cell.phases, cuts.has_bulk, strict=True)
-    corners = cuts.corners(shares, np.array([bulk_and_shear_losses(*pair) for pair in phases]))
+    # phases of a mesh, whose result knows no cell, have no bulk losses of their own
+    phases = (None,) * len(cuts.has_bulk) if result.cell is None else result.cell.phases
+    pairs = zip(phases, cuts.has_bulk, strict=True)
+    corners = cuts.corners(shares, np.array([bulk_and_shear_losses(*pair) for pair in pairs]))
     errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
     if corners.max() <= MAX_FIRST_ORDER:
         return np.einsum("lecpx,pxc->lec", corners, shares), np.array(errors)

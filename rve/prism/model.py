@@ -95,8 +95,8 @@ class PrismModel:
         """One result for each of `inclusions`, in their order, on one mesh.
 
         On a mesh of one's own, `solve(law, {name: phase})` gives one result, of the law of θ and
-        the materials of its physical groups. It declares no error: a coarser mesh of one's own
-        tells it.
+        the materials of its physical groups, in whose order its energies are. It declares no error:
+        a coarser mesh of one's own tells it.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
@@ -147,6 +147,10 @@ class PrismModel:
         whole = stress @ np.linalg.inv(loads).T
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
         checks = _checks(strains, stiffness, loads, named.phases) | {"residual": solved.residual}
+        energies = energies_of(strains, named.phases, loads)
+        order = [
+            problem.form.grid.names.index(name) for name in cast("Mapping[str, object]", phases)
+        ]
         return HomogenisedStiffness(
             curve,
             self.name,
@@ -155,7 +159,7 @@ class PrismModel:
             iterations=solved.iterations,
             seconds={**seconds, "total": sum(seconds.values())},
             checks=require(checks, discretisation=ROUGH_MESH),
-            energies=energies_of(strains, named.phases, loads),
+            energies=PhaseEnergies(energies.values[order], energies.errors[order]),
         )
 
     def mesh_problem(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:

@@ -97,3 +97,18 @@ def test_the_law_alone_needs_a_mesh(tmp_path, capsys):
     case = written(tmp_path, "\n".join([*lines[:4], "theta = [-3, 3]", *lines[4:]]))
     assert main(["check", str(case)]) == 2
     assert "radius.a1" in capsys.readouterr().err
+
+
+def test_phases_of_a_mesh_have_losses_by_name_whatever_their_order(tmp_path):
+    lines = TEXT.splitlines()
+    rows = [
+        row.replace(" }", f", loss = {x} }}") for row, x in zip(lines[6:8], (0.02, 0), strict=True)
+    ]
+    losses = []
+    for order in (rows, rows[::-1]):
+        case = written(tmp_path, "\n".join([*lines[:6], *order, *lines[8:]]))
+        assert main(["run", str(case), "--quiet", "--out", str(tmp_path / "out")]) == 0
+        document = json.loads((tmp_path / "out/summary.json").read_text())["modulus"]
+        losses.append(document["loss"]["E"]["upper"][-1])
+    assert losses[0] == pytest.approx(losses[1], rel=1e-9)
+    assert 0.015 < losses[0] < 0.02  # most energy is in the matrix
