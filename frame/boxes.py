@@ -57,7 +57,9 @@ class Boxes:
     numbers: Mapping[str, FuzzyNumber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        require(bool(self.names), "inputs", None, "fuzzy numbers by name, one at least")
+        require(
+            bool(self.names), "inputs", value=None, allowed="fuzzy numbers by name, one at least"
+        )
         levels = np.asarray(self.alpha)
         if not (levels.size and levels[0] >= 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()):
             raise RefusedError("alpha", levels.tolist(), "levels that rise within [0, 1]")

@@ -152,7 +152,7 @@ def _problem(
     """
     is_system = isinstance(model, LagrangianSystem) or hasattr(model, "matrices")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
-    require(is_system, "model", type(model).__name__, allowed)
+    require(is_system, "model", value=type(model).__name__, allowed=allowed)
     chosen_method = _method(model, method, options)
     if integrator is None:
         proves = isinstance(chosen_method, Auto | Proof | DualProof | Search)
@@ -221,8 +221,15 @@ def _method(
         method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
     if not isinstance(method, str):
         runs = hasattr(method, "run") and not isinstance(method, type)
-        require(runs, "method", repr(method), f"{', '.join(METHODS)}, or an object as Proof()")
-        require(not options, "options", [*options], "none beside a method that is no name")
+        require(
+            runs,
+            "method",
+            value=repr(method),
+            allowed=f"{', '.join(METHODS)}, or an object as Proof()",
+        )
+        require(
+            not options, "options", value=[*options], allowed="none beside a method that is no name"
+        )
         return method
     chosen("method", method, METHODS)
     for option in options:
@@ -242,12 +249,14 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
         own, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
-        require(own.admits(low, high), key, shown, own.range or "finite")
+        require(own.admits(low, high), key, value=shown, allowed=own.range or "finite")
         near = abs(system.parameters.get(name, 0.0))
         sizes = abs(low), abs(high)
         alike = near == 0 or (min(sizes) < OTHER_UNITS * near and OTHER_UNITS * max(sizes) > near)
         allowed = f"values of the size of {near:g}, the structure's own"
-        require(alike or not any(sizes), key, shown, allowed, "give both in SI units")
+        require(
+            alike or not any(sizes), key, value=shown, allowed=allowed, cure="give both in SI units"
+        )
     if isinstance(system, LagrangianSystem):
         return
     if isinstance(system, StoreyFrame):
@@ -261,10 +270,17 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             positive = bool(np.linalg.eigvalsh(matrices.mass.value).min() > 0)
         except np.linalg.LinAlgError:  # from damping by a ratio, which divides by the mass
             positive = False
-        require(positive, "mass", f"not positive definite at {at}", "a mass for every unknown")
+        require(
+            positive,
+            "mass",
+            value=f"not positive definite at {at}",
+            allowed="a mass for every unknown",
+        )
         moved = moved or matrices.q0.value.any() or matrices.v0.value.any()
     _require_modal_order(system, cuts)
-    require(moved, "q0, v0 and ground", "zero", "a start or a record that moves something")
+    require(
+        moved, "q0, v0 and ground", value="zero", allowed="a start or a record that moves something"
+    )
 
 
 def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:

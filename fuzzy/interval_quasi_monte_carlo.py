@@ -171,7 +171,7 @@ class IntervalQuasiMonteCarlo:
     def __post_init__(self) -> None:
         real("points", self.points, positive=True, whole=True)
         allowed = f"multiples of {SCRAMBLINGS}, one part for each scrambling"
-        require(self.points % SCRAMBLINGS == 0, "points", self.points, allowed)
+        require(self.points % SCRAMBLINGS == 0, "points", value=self.points, allowed=allowed)
         real("seed", self.seed, whole=True)
 
     def run(
@@ -196,7 +196,12 @@ class IntervalQuasiMonteCarlo:
             RefusedError: There is no random input, or an input is named twice.
         """
         separate = bool(random) and not set(random) & set(inputs)
-        require(separate, "random inputs", tuple(random), "one or more, none of them fuzzy")
+        require(
+            separate,
+            "random inputs",
+            value=tuple(random),
+            allowed="one or more, none of them fuzzy",
+        )
         results = []
         for u in self._probabilities(len(random)):
             drawn = {

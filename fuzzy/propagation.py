@@ -101,7 +101,7 @@ def propagate(
     method = _checked(method or Automatic(), on_failure)
     holds = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
-    require(holds, "executor", executor, allowed)
+    require(holds, "executor", value=executor, allowed=allowed)
     call = Call(function, domain.names, tuple(shared), vectorised)
     key = b"" if store is None else model_key(identity or {})
     with (
@@ -128,7 +128,13 @@ def _checked(method: Plan, on_failure: str) -> Plan:
     runs = hasattr(method, "run") and not isinstance(method, type)
     runs = runs and len(signature(method.run).parameters) == 2  # campaign and domain
     cure = "IntervalQuasiMonteCarlo().run(…) takes random inputs besides"
-    require(runs, "method", repr(method), "an object such as General() or Signed()", cure)
+    require(
+        runs,
+        "method",
+        value=repr(method),
+        allowed="an object such as General() or Signed()",
+        cure=cure,
+    )
     chosen("on_failure", on_failure, ("raise", "skip"))
     return method
 

@@ -116,7 +116,7 @@ def real(
     allowed += f", up to {most:g}" if most < inf else ""
     inside = isfinite(number) and least <= number <= most and (number > 0 or not positive)
     shown = printable(value) if isinstance(value, Integral) else repr(value)
-    require(inside, key, shown, allowed)
+    require(inside, key, value=shown, allowed=allowed)
     return number
 
 
@@ -127,7 +127,7 @@ def require_numbers(name: str, values: object) -> None:
         RefusedError: They are a text or a single number, or contain something else.
     """
     listed = isinstance(values, Collection) and not isinstance(values, str)
-    require(listed, name, repr(values), "a list of numbers")
+    require(listed, name, value=repr(values), allowed="a list of numbers")
     for value in np.ravel(values).tolist() if isinstance(values, np.ndarray) else values:  # type: ignore[attr-defined]
         real(name, value)
 
@@ -139,7 +139,7 @@ def chosen(key: str, value: object, names: Iterable[str]) -> None:
         RefusedError: It is not.
     """
     allowed = tuple(names)
-    require(value in allowed, key, value, ", ".join(allowed))
+    require(value in allowed, key, value=value, allowed=", ".join(allowed))
 
 
 def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure: str = "") -> None:

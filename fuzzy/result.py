@@ -157,22 +157,25 @@ class Bounds:
     def _check_shapes(self) -> None:
         middle = () if self.time is None else (len(self.time),)
         shape = (len(self.alpha), *middle, len(self.outputs))
-        places = (*shape, len(self.inputs))
+        points = (*shape, len(self.inputs))
         ends = [end for pair in (self.inner, self.outer) for end in pair or ()]
         by_output = [words for words in (self.natures, self.units) if words]
-        for name, found, expected in (
-            *((name, getattr(self, name).shape, shape) for name in ("lower", "upper", "error")),
-            *((name, getattr(self, name).shape, places) for name in ("lower_at", "upper_at")),
-            *(("inner and outer", end.shape, shape) for end in ends),
-            *(("natures, units", (len(words),), shape[-1:]) for words in by_output),
-        ):
-            require(found == expected, f"shape of {name}", found, str(expected))
+        for name in ("lower", "upper", "error"):
+            _require_shape(name, getattr(self, name).shape, shape)
+        for name in ("lower_at", "upper_at"):
+            _require_shape(name, getattr(self, name).shape, points)
+        for end in ends:
+            _require_shape("inner and outer", end.shape, shape)
+        for words in by_output:
+            _require_shape("natures, units", (len(words),), shape[-1:])
 
     def _check_values(self) -> None:
         finite = np.isfinite(self.lower) & np.isfinite(self.upper)
         plain = finite & ((self.error >= 0) | (np.isnan(self.error) & self._guaranteed))
         allowed = "finite ends, errors of 0 or more, or NaN where guaranteed"
-        require(plain.all(), "lower, upper and error", "not finite, or negative", allowed)
+        require(
+            plain.all(), "lower, upper and error", value="not finite, or negative", allowed=allowed
+        )
 
     def _check_proof(self) -> None:
         """Raise if bounds contradict each other by more than their error and rounding."""
@@ -238,7 +241,12 @@ class Bounds:
         if (claim := self.claim.claim) is not None:
             return Claimed(steps, claim, float(self.alpha[0]))
         complete = (self.alpha[0], self.alpha[-1]) == (0, 1)
-        require(complete, "alpha", self.alpha.tolist(), "levels from 0 to 1: alpha=levels(4)")
+        require(
+            complete,
+            "alpha",
+            value=self.alpha.tolist(),
+            allowed="levels from 0 to 1: alpha=levels(4)",
+        )
         return steps
 
     def column(self, output: str = "y") -> int:
@@ -320,3 +328,7 @@ class Bounds:
 def _digits(value: float) -> str:
     """A number with six digits; empty where it is not known."""
     return "" if np.isnan(value) else f"{value + 0.0:.6g}"
+
+
+def _require_shape(name: str, found: tuple[int, ...], shape: tuple[int, ...]) -> None:
+    require(found == shape, f"shape of {name}", value=found, allowed=str(shape))

@@ -76,7 +76,7 @@ class MicrostructureStudy:
         shape, share = self.shape, 1 - float(sample.cdf(self.shape.reach))
         value = f"{share:.1%} of the {shape.cells} in cells tighter than r_n = {shape.reach:g}"
         allowed = f"shares up to {MAX_CAPPED:.0%}, since particles touch at r_n = 1"
-        require(share <= MAX_CAPPED, "particles", value, allowed, self._cure)
+        require(share <= MAX_CAPPED, "particles", value=value, allowed=allowed, cure=self._cure)
         return sample if shape == SPHERES else sample.capped(shape.reach)
 
     @property
@@ -204,7 +204,9 @@ def fitted_map(
     lower, upper = case.limits_of(used)
     cure = f"set [radius] to a1 = {upper:.10g}, a2 = 0, a3 = {upper:.10g}, a4 = 0"
     value = f"{upper:.10g} in all cells"
-    require(upper - lower >= MIN_RANGE, "r_n", value, "cells of unequal r_n", cure)
+    require(
+        upper - lower >= MIN_RANGE, "r_n", value=value, allowed="cells of unequal r_n", cure=cure
+    )
     truncated, fit = used.truncated(lower, upper), HermiteFit(lower, upper)
     band = truncated.band(CONFIDENCE, RESAMPLES, np.random.default_rng(streams[0]))
     slopes = slope_band(

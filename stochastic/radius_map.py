@@ -54,10 +54,12 @@ def require_map(radius_map: RadiusMap) -> None:
     theta = np.linspace(law.lower, law.upper, 65)
     radii = np.asarray(radius_map(theta), float)
     alike = radii.shape == theta.shape
-    require(alike, "shape of the radii", radii.shape, f"the shape of θ, {theta.shape}")
+    require(
+        alike, "shape of the radii", value=radii.shape, allowed=f"the shape of θ, {theta.shape}"
+    )
     inside = (radii > 0) & (radii < 1)
     row = int(np.argmin(inside))
-    require(inside.all(), f"r at θ = {theta[row]:.4g}", f"{radii[row]:.4g}", RADII)
+    require(inside.all(), f"r at θ = {theta[row]:.4g}", value=f"{radii[row]:.4g}", allowed=RADII)
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ class HermiteMap:
         low, high = self.extremes() if plain else (np.nan, np.nan)
         inside, shown = low > 0 and high < 1, f"{low:.4g} … {high:.4g}"
         cure = "lower a1 or a3, or the slopes a2, a4"
-        require(inside, f"r of the map {values}", shown, RADII, cure)
+        require(inside, f"r of the map {values}", value=shown, allowed=RADII, cure=cure)
 
     @property
     def monomials(self) -> Array:

@@ -102,7 +102,13 @@ def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
     )
     largest, most = sections[0].particles.shape.largest, sample.values[-1]
     allowed = f"values up to {largest:.4g}"
-    require(most <= largest, "r_n of a cell", most, allowed, "mend the overlaps in the data")
+    require(
+        most <= largest,
+        "r_n of a cell",
+        value=most,
+        allowed=allowed,
+        cure="mend the overlaps in the data",
+    )
     return sample
 
 

@@ -120,7 +120,7 @@ class Segmentation:
             + (f", and by impulses or scratches on {impulses:.1%}" if impulses else "")
         )
         cure = "smooth = true takes noise away, level = true the drift of light"
-        require(share <= most, "threshold", value, f"up to {most:.0%}", cure)
+        require(share <= most, "threshold", value=value, allowed=f"up to {most:.0%}", cure=cure)
 
 
 def segmented(
@@ -273,7 +273,7 @@ def _inner(labels: Rows, classes: int) -> Mask:
     """
     counts = np.bincount(labels.ravel(), minlength=classes)
     value, allowed = "beyond the grey values of a class", "values that leave each class some pixels"
-    require(counts.all(), "threshold", value, allowed)
+    require(counts.all(), "threshold", value=value, allowed=allowed)
     for reach in range(_BORDER, 0, -1):
         inner = _far(labels, reach)
         if (np.bincount(labels[inner], minlength=classes) >= _ENOUGH * counts).all():

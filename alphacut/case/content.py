@@ -154,55 +154,72 @@ class Content(Section):
         """Refuses a mesh from a file without phases, and keys that say what the file holds."""
         file, meshed = self.mesh.file is not None, self.meshed is not None
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
-        require(not file or meshed, "cell.phases", None, allowed)
-        require(file or not meshed, "mesh.file", None, "a mesh of Gmsh beside [cell.phases]")
+        require(not file or meshed, "cell.phases", value=None, allowed=allowed)
+        require(
+            file or not meshed,
+            "mesh.file",
+            value=None,
+            allowed="a mesh of Gmsh beside [cell.phases]",
+        )
         if not file:
             lone = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.model_fields["a1"].description
-            require(lone, "radius.a1", None, f"{about}; theta alone beside mesh.file")
+            require(lone, "radius.a1", value=None, allowed=f"{about}; theta alone beside mesh.file")
             return self
         for key in ("size", "layers"):
-            require(not self.mesh.names(key), f"mesh.{key}", "beside mesh.file", "one of them")
+            require(
+                not self.mesh.names(key),
+                f"mesh.{key}",
+                value="beside mesh.file",
+                allowed="one of them",
+            )
         has_geometry = self.radius_map is not None or "microstructure" in self.stages
-        require(not has_geometry, "radius", "a map of radii", "theta alone beside mesh.file")
+        require(
+            not has_geometry,
+            "radius",
+            value="a map of radii",
+            allowed="theta alone beside mesh.file",
+        )
         stated = self.modulus.tolerance is not None
         cure = "compare a coarser mesh"
         allowed = "none beside mesh.file, whose error nobody knows"
-        require(not stated, "modulus.tolerance", self.modulus.tolerance, allowed, cure)
+        require(
+            not stated,
+            "modulus.tolerance",
+            value=self.modulus.tolerance,
+            allowed=allowed,
+            cure=cure,
+        )
         return self
 
     @model_validator(mode="after")
     def _stages(self) -> Self:
         """Refuses stages without their sections."""
         fraction = self.round is not None and self.round.fraction is not None
-        known = self.picture is not None or "microstructure" in self.stages or fraction
-        known = known or self.meshed is not None
+        has_map = self.picture is not None or "microstructure" in self.stages or fraction
+        has_map = has_map or self.meshed is not None
         needs = {
             "microstructure": ("microstructure",),
-            "modulus": ("cell",) if known else ("radius", "cell"),
+            "modulus": ("cell",) if has_map else ("radius", "cell"),
             "envelope": ("envelope",),
         }
+        for stage in self.stages:
+            for key in needs[stage]:
+                allowed = f"[{key}], which stage {stage} needs"
+                require(getattr(self, key) is not None, key, value=None, allowed=allowed)
+        sources = {
+            "radius": self.radius is not None,
+            "cell.fraction": fraction,
+            "stage microstructure": "microstructure" in self.stages,
+        }
+        first, *others = [name for name, is_there in sources.items() if is_there] or [""]
+        value = f"beside {', '.join(others)}"
+        require(not others, first, value=value, allowed="one of them")
         method = self.modulus.method
         solved = self.round or self.meshed
         methods = (method,) if solved is None else solved.methods
-        one = "microstructure" not in self.stages or self.radius is None
-        for holds, key, value, allowed in (
-            *(
-                (getattr(self, x) is not None, x, None, f"[{x}], which stage {stage} needs")
-                for stage in self.stages
-                for x in needs[stage]
-            ),
-            (one, "radius", "beside stage microstructure", "one of them"),
-            (not fraction or self.radius is None, "radius", "beside cell.fraction", "one of them"),
-            (
-                not fraction or "microstructure" not in self.stages,
-                "cell.fraction",
-                "beside stage microstructure",
-                "one of them",
-            ),
-            (method in methods, "modulus.method", method, f"{', '.join(methods)} for this cell"),
-        ):
-            require(holds, key, value, allowed)
+        allowed = f"{', '.join(methods)} for this cell"
+        require(method in methods, "modulus.method", value=method, allowed=allowed)
         return self
 
     @model_validator(mode="after")
@@ -213,7 +230,7 @@ class Content(Section):
         if isinstance(ratio, MaterialDamping):
             section = "frame" if self.frame else "matrices"
             allowed = "stage modulus and loss factors in [cell], or a number"
-            require(computed, f"{section}.damping_ratio", "material", allowed)
+            require(computed, f"{section}.damping_ratio", value="material", allowed=allowed)
         return self
 
     @model_validator(mode="after")
@@ -223,16 +240,29 @@ class Content(Section):
         ground = getattr(section, "accelerogram", None)
         moves = suite is not None or getattr(section, "starts", True) or ground is not None
         allowed = "a start, an accelerogram, or a section [records]"
-        require(moves, "frame.displacements", None, allowed, "nothing moves the frame")
+        require(
+            moves,
+            "frame.displacements",
+            value=None,
+            allowed=allowed,
+            cure="nothing moves the frame",
+        )
         if suite is None:
-            require(self.fragility is None, "fragility", "without records", "beside [records]")
+            require(
+                self.fragility is None,
+                "fragility",
+                value="without records",
+                allowed="beside [records]",
+            )
             return self
-        require(ground is None, "records", "beside an accelerogram", "one of them")
+        require(ground is None, "records", value="beside an accelerogram", allowed="one of them")
         for key in ("probability", "tolerances", "identify"):
             answered = getattr(self, key) is None
             allowed = "[decision] and [fragility] beside [records]"
-            require(answered, key, "beside [records]", allowed)
-        require(not self.study, "study", "beside [records]", "one motion for each record")
+            require(answered, key, value="beside [records]", allowed=allowed)
+        require(
+            not self.study, "study", value="beside [records]", allowed="one motion for each record"
+        )
         return self
 
     @model_validator(mode="after")
@@ -245,28 +275,24 @@ class Content(Section):
         if structure is None or len(sections) > 1:
             value = None if structure is None else f"beside {len(sections) - 1} more"
             raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
-        whole = self.frame is None or self.frame.is_whole or "modulus" in self.stages
         ratio = getattr(self.structure_section, "damping_ratio", None)
         by_material = isinstance(ratio, MaterialDamping)
-        own = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
-        studies = {"envelope": own} | {f"study[{k}]": x for k, x in enumerate(self.study)}
+        main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
+        studies = {"envelope": main_study} | {f"study[{k}]": x for k, x in enumerate(self.study)}
         for key, study in studies.items():
             computed = r"E|zeta\d*" if by_material else "E" if "modulus" in self.stages else "(?!)"
-            given = [x for x in study.fuzzy if not re.fullmatch(computed, x)]
-            structure.inputs(given, f"{key}.fuzzy")
+            stated = [x for x in study.fuzzy if not re.fullmatch(computed, x)]
+            structure.inputs(stated, f"{key}.fuzzy")
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
+        has_modulus = self.frame is None or self.frame.is_whole or "modulus" in self.stages
+        require(has_modulus, "frame.modulus", value=None, allowed="a modulus, or stage modulus")
+        is_framed = self.identify is None or self.frame is not None
+        require(is_framed, "identify", value="without a frame", allowed="beside [frame]")
         names = [study.name for study in self.study]
-        framed = self.identify is None or self.frame is not None
-        for holds, key, value, allowed in (
-            (whole, "frame.modulus", None, "a modulus, or stage modulus"),
-            (framed, "identify", "without a frame", "beside [frame]"),
-            *(
-                (name not in names[:place], f"study[{place}].name", name, "a name of its own")
-                for place, name in enumerate(names)
-            ),
-        ):
-            require(holds, key, value, allowed)
+        for number, name in enumerate(names):
+            is_new = name not in names[:number]
+            require(is_new, f"study[{number}].name", value=name, allowed="a name of its own")
         for section in self.questions.values():
             section.check(structure)
         if self.identify is not None:

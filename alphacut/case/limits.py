@@ -64,7 +64,7 @@ def parse_limit(value: object) -> Limit:
     except (ValueError, KeyError) as error:
         cure = str(error) if separator else ""
     is_limit = bool(separator) and re.fullmatch(r"\w+", name) is not None and number > 0
-    require(is_limit, "", value, allowed, cure)
+    require(is_limit, "", value=value, allowed=allowed, cure=cure)
     return Limit(name, number, share, str(value))
 
 
@@ -93,7 +93,9 @@ class QuestionSection(Section):
         values = {limit.output: limit.si(structure, key) for limit in self.limits}
         structure.observing(key, tuple(values))
         texts = ", ".join(limit.text for limit in self.limits)
-        require(len(values) == len(self.limits), key, texts, "one limit for each output")
+        require(
+            len(values) == len(self.limits), key, value=texts, allowed="one limit for each output"
+        )
         return values
 
     def check(self, structure: Structure) -> None:
@@ -170,4 +172,4 @@ class FragilitySection(QuestionSection):
             for x in (getattr(structure.linear, "q0", 0), getattr(structure.linear, "v0", 0))
         )
         allowed = "linear structures that start at rest, which scale with their record"
-        require(not moves, "fragility", "of another motion", allowed)
+        require(not moves, "fragility", value="of another motion", allowed=allowed)

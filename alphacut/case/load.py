@@ -200,7 +200,7 @@ def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str
         alike = (f"did you mean {full}?" for full in known if full.endswith(f".{key}"))
         cure = next(alike, suggestion(key, known))
         allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
-        require(key in known and key not in keys, "--set", change, allowed, cure)
+        require(key in known and key not in keys, "--set", value=change, allowed=allowed, cure=cure)
         _put(table, key, _value(value))
         keys.append(key)
     return tuple(keys)

@@ -191,14 +191,19 @@ class RoundCell(Section):
         ratio, isotropic = self.inclusion_poisson is not None, self.stiffness is None
         value = "there" if ratio else "missing"
         allowed = "a number beside Young's modulus, none beside a stiffness"
-        require(isotropic == ratio, "cell.inclusion_poisson", value, allowed)
+        require(isotropic == ratio, "cell.inclusion_poisson", value=value, allowed=allowed)
         solid = isotropic or self.particles != "spheres"
-        require(solid, "cell.inclusion_modulus", "a plane stiffness", "Young's modulus of spheres")
+        require(
+            solid,
+            "cell.inclusion_modulus",
+            value="a plane stiffness",
+            allowed="Young's modulus of spheres",
+        )
         if self.fraction is not None:
             touching = float(self.shape.shares(1 / reach(self.outline or circle)))
             most = self.fraction.support.upper
             allowed = f"values below {touching:.6g}, where particles touch"
-            require(most < touching, "cell.fraction", f"{most:g}", allowed)
+            require(most < touching, "cell.fraction", value=f"{most:g}", allowed=allowed)
         return self
 
     @model_validator(mode="after")
@@ -208,22 +213,32 @@ class RoundCell(Section):
             loss, bulk = (getattr(self, f"{name}_loss{x}") for x in ("", "_bulk"))
             beside = getattr(self, f"{other}_loss") is not None
             given = loss is not None or (bulk is None and not beside)
-            require(given, f"cell.{name}_loss", None, "a loss of either phase, 0 for none")
+            require(
+                given, f"cell.{name}_loss", value=None, allowed="a loss of either phase, 0 for none"
+            )
             if bulk is not None:
                 ratio = getattr(self, f"{name}_poisson")
                 require(
-                    ratio is not None, f"cell.{name}_loss_bulk", "there", "none beside a stiffness"
+                    ratio is not None,
+                    f"cell.{name}_loss_bulk",
+                    value="there",
+                    allowed="none beside a stiffness",
                 )
                 most = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
                 allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
                 require(
                     bulk.support.upper <= most,
                     f"cell.{name}_loss_bulk",
-                    f"{bulk.support.upper:g}",
-                    allowed,
+                    value=f"{bulk.support.upper:g}",
+                    allowed=allowed,
                 )
         fibres = not self.losses or self.particles != "spheres"
-        require(fibres, "cell.matrix_loss", "beside spheres", "losses of cylinders or ellipses")
+        require(
+            fibres,
+            "cell.matrix_loss",
+            value="beside spheres",
+            allowed="losses of cylinders or ellipses",
+        )
         return self
 
 
@@ -263,23 +278,18 @@ class ImageCell(Section):
     @model_validator(mode="after")
     def _parted(self) -> Self:
         """Refuses phases that nothing or too much tells apart."""
-        one, sides = bool(self.threshold) != bool(self.labels), len(self.pixel)
+        is_one = bool(self.threshold) != bool(self.labels)
         value = "beside cell.labels" if self.threshold else None
         count = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
         fits = len(self.modulus) == count and len(self.poisson) in (1, count)
         values = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
-        for check in (
-            (one, "cell.threshold", value, "one of cell.threshold and cell.labels"),
-            (fits, "cell.modulus", values, f"one for each of {count} phases"),
-            (
-                len(self.losses) in (0, count),
-                "cell.loss",
-                f"{len(self.losses)} loss factors",
-                f"one for each of {count} phases",
-            ),
-            (sides <= 2, "cell.pixel", sides, "a side, or a width and a height"),
-        ):
-            require(*check)
+        allowed = "one of cell.threshold and cell.labels"
+        require(is_one, "cell.threshold", value=value, allowed=allowed)
+        require(fits, "cell.modulus", value=values, allowed=f"one for each of {count} phases")
+        loss, allowed = f"{len(self.losses)} loss factors", f"one for each of {count} phases"
+        require(len(self.losses) in (0, count), "cell.loss", value=loss, allowed=allowed)
+        sides, allowed = len(self.pixel), "a side, or a width and a height"
+        require(sides <= 2, "cell.pixel", value=sides, allowed=allowed)
         return self
 
 

@@ -148,7 +148,12 @@ class MatricesSection(Section):
     ) -> dict[str, FuzzyNumber]:
         """Damping ratio of all modes, or of each where some stiffness is of another material."""
         of_material = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
-        require(any(of_material), "damping_ratio", "material", "a term of the stiffness with E")
+        require(
+            any(of_material),
+            "damping_ratio",
+            value="material",
+            allowed="a term of the stiffness with E",
+        )
         if all(of_material):
             return {RATIO: damping.ratio(loss)}
         shares = modal_energy_shares(model, np.flatnonzero(of_material))
@@ -170,7 +175,7 @@ class MatricesSection(Section):
         vector = np.zeros(len(places))
         for name, value in entries.items():
             allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
-            require(name in places, f"matrices.{key}", name, allowed)
+            require(name in places, f"matrices.{key}", value=name, allowed=allowed)
             vector[places[name]] = value
         return vector
 
@@ -190,11 +195,11 @@ class MatricesSection(Section):
         """Refuses rows that are given twice or not at all, and a record without a direction."""
         for name, output in self.outputs.items():
             given = (output.row is None) != (output.file is None)
-            require(given, f"matrices.outputs.{name}", None, "one of row and file")
-        require(bool(self.outputs), "matrices.outputs", None, "one output or more")
+            require(given, f"matrices.outputs.{name}", value=None, allowed="one of row and file")
+        require(bool(self.outputs), "matrices.outputs", value=None, allowed="one output or more")
         ends = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(ends[:8])}, or pattern"
         moved = bool(self._pattern().any())
-        require(moved, "matrices.direction", self.direction or None, allowed)
+        require(moved, "matrices.direction", value=self.direction or None, allowed=allowed)
         self.structure()
         return self

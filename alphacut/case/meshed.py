@@ -29,7 +29,7 @@ class PhaseSection(Section):
         isotropic = isinstance(self.modulus, FuzzyNumber)
         value = "without poisson" if self.poisson is None else "with poisson"
         allowed = "poisson beside Young's modulus, none beside a stiffness"
-        require(isotropic == (self.poisson is not None), "", value, allowed)
+        require(isotropic == (self.poisson is not None), "", value=value, allowed=allowed)
         return self
 
     def phase(self, modulus: float | None) -> Phase | VoigtPhase:

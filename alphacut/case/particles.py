@@ -55,7 +55,7 @@ class PackingSection(Section):
         ends = (self.smallest_radius, self.largest_radius)
         law = None not in ends if self.file is None else ends == (None, None)
         allowed = "a file, or both ends of the radii"
-        require(law, "microstructure.packing.file", "beside or without ends", allowed)
+        require(law, "microstructure.packing.file", value="beside or without ends", allowed=allowed)
         return self
 
 
@@ -103,7 +103,12 @@ class MicrostructureSection(Section):
     def _one_source(self) -> Self:
         """Refuses several sources, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
-        require(count == 1, "microstructure", f"with {count} of them" if count else None, allowed)
+        require(
+            count == 1,
+            "microstructure",
+            value=f"with {count} of them" if count else None,
+            allowed=allowed,
+        )
         return self
 
     def study(self, *, spheres: bool) -> MicrostructureStudy:

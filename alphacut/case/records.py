@@ -46,9 +46,14 @@ def _files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
     pattern, _, channel = str(value).partition("#")
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
     relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
-    require(relative, "", value, allowed)
+    require(relative, "", value=value, allowed=allowed)
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
-    require(0 < len(paths) <= MAX_RECORDS, "", value, f"{allowed}; 1 to {MAX_RECORDS} files")
+    require(
+        0 < len(paths) <= MAX_RECORDS,
+        "",
+        value=value,
+        allowed=f"{allowed}; 1 to {MAX_RECORDS} files",
+    )
     names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
     every = [read_recording(path, channel) for path in paths]
     return tuple(NamedRecording(*pair) for pair in zip(names, every, strict=True))
@@ -64,7 +69,9 @@ def _scale(value: object, _: ValidationInfo) -> Scale:
             scale = Scale(quantity.number(size, "m/s^2"), measure)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    require(scale.value > 0 and scale.measure in ("", "PGA", "Sa(T1)"), "", value, allowed)
+    require(
+        scale.value > 0 and scale.measure in ("", "PGA", "Sa(T1)"), "", value=value, allowed=allowed
+    )
     return scale
 
 
@@ -76,7 +83,7 @@ def _trim(value: object, _: ValidationInfo) -> Trim:
         first, last = (quantity.number(x, "s") for x in value)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         raise RefusedError("", value, allowed) from None
-    require(0 <= first < last, "", value, allowed)
+    require(0 <= first < last, "", value=value, allowed=allowed)
     return first, last
 
 
@@ -113,5 +120,10 @@ class RecordsSection(Section):
         """Refuses files of one name, under which their results would be stored."""
         names = [named.name for named in self.recordings]
         twice = sorted({name for name in names if names.count(name) > 1})
-        require(not twice, "records.files", ", ".join(twice), "each file once, by its name")
+        require(
+            not twice,
+            "records.files",
+            value=", ".join(twice),
+            allowed="each file once, by its name",
+        )
         return self

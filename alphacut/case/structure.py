@@ -135,7 +135,7 @@ class Structure:
         except (ValueError, KeyError):
             fuzzy, allowed = (), ", ".join(self.numbers)
             cure = suggestion(name, self.numbers)
-        require(bool(fuzzy), key, name, allowed, cure)
+        require(bool(fuzzy), key, value=name, allowed=allowed, cure=cure)
         return fuzzy
 
     def inputs(self, names: Sequence[str], key: str = "envelope.fuzzy") -> dict[str, FuzzyNumber]:
@@ -333,13 +333,14 @@ class Frame(Section):
         """Refuses a frame without damping, or that is none."""
         lossless = isinstance(self.damping_ratio, MaterialDamping) and self.stiffness is not None
         allowed = "columns of the material, or [matrices] where some storeys are of another"
-        require(not lossless, "frame.damping_ratio", "material, beside stiffness", allowed)
+        require(
+            not lossless, "frame.damping_ratio", value="material, beside stiffness", allowed=allowed
+        )
         placed = self.names("dampers") == (self.damper_placement is not None)
-        for holds, key, allowed, cure in (
-            (placed, "damper_placement", "both dampers and damper_placement", ""),
-            (any(map(self.names, DAMPING)), "dampers", " or ".join(DAMPING), '"0 %" for none'),
-        ):
-            require(holds, f"frame.{key}", None, allowed, cure)
+        allowed = "both dampers and damper_placement"
+        require(placed, "frame.damper_placement", value=None, allowed=allowed)
+        is_damped, allowed = any(map(self.names, DAMPING)), " or ".join(DAMPING)
+        require(is_damped, "frame.dampers", value=None, allowed=allowed, cure='"0 %" for none')
         self.structure()
         return self
 

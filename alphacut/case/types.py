@@ -89,7 +89,7 @@ class Quantity:
             inside = all(self.holds(end) for end in ends)
         except ValueError as error:
             inside, cure = False, str(error)
-        require(inside, "", value, self.allowed, cure)
+        require(inside, "", value=value, allowed=self.allowed, cure=cure)
         return number
 
     def holds(self, value: float) -> bool:

@@ -56,7 +56,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     document = {**cell.document(result), "references": references}
     if options.cross_check:
         method, methods = options.cross_check, {*phases.methods} - {"auto", result.method}
-        require(method in methods, "--cross-check", method, ", ".join(sorted(methods)))
+        require(
+            method in methods, "--cross-check", value=method, allowed=", ".join(sorted(methods))
+        )
         modulus = content.modulus.model_copy(update={"method": method})
         second = cell.solve(radius, phases, cell.model_of(phases, content.mesh, modulus))
         document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)

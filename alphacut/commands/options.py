@@ -79,7 +79,9 @@ def require_petsc(petsc: Mapping[str, str], used: bool) -> None:
     """
     name = next(iter(petsc), "")
     option = name if name == PETSC_LOG else PETSC_PREFIX + name
-    require(used or not petsc, option, "PETSc's", "options of a cell with method prism")
+    require(
+        used or not petsc, option, value="PETSc's", allowed="options of a cell with method prism"
+    )
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -139,7 +141,9 @@ def opened(options: argparse.Namespace, folder: str = "") -> Iterator[tuple[Case
         BadInput: The case has problems.
         RefusedError: There are fewer than one worker, or the folder is not this program's.
     """
-    require(options.workers >= 1, "--workers", options.workers, "a whole number 1 or more")
+    require(
+        options.workers >= 1, "--workers", value=options.workers, allowed="a whole number 1 or more"
+    )
     case, place = read(options), options.out or folder
     fresh = getattr(options, "fresh", False)
     store = StageStore(None, case.text, fresh, options.quiet, options.workers)

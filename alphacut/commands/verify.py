@@ -40,7 +40,7 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     folder = ResultsFolder.opened(path)
     document: Document = {}
     names = [name for name in folder.parts if name.startswith("envelope_")]
-    require(bool(names), "FOLDER", str(path), "results of a run with an envelope")
+    require(bool(names), "FOLDER", value=str(path), allowed="results of a run with an envelope")
     with alone("FOLDER", path):
         for name in names:
             data = dataset_of(folder.content(f"{name}.nc"))

@@ -34,7 +34,12 @@ def read_array(path: Path, name: str = "") -> Array:
         reason = " ".join(str(error).split())[:80]
         raise RefusedError(path.name, reason or type(error).__name__, ALLOWED) from None
     real = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
-    require(real and array.ndim in (1, 2) and array.size > 0, path.name, "no such array", ALLOWED)
+    require(
+        real and array.ndim in (1, 2) and array.size > 0,
+        path.name,
+        value="no such array",
+        allowed=ALLOWED,
+    )
     return array.astype(float)
 
 

@@ -151,7 +151,13 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
     except OSError as error:
         holds, reason = False, f"nothing can be written in {there}: {error.strerror or error}"
     allowed = f"the name of {kind} where you may write"
-    require(holds or is_special(path), option, value or "empty", allowed, reason.lower())
+    require(
+        holds or is_special(path),
+        option,
+        value=value or "empty",
+        allowed=allowed,
+        cure=reason.lower(),
+    )
 
 
 @contextmanager

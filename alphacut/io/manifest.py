@@ -29,8 +29,10 @@ READ_ONLY = os.O_RDONLY | sum(
     getattr(os, flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY")
 )
 RUN = door("run", "CASE.toml")
-WHOLE = ("whole results of a run", f"make it anew by {RUN}")
-"""Allowed values and cure of files that were changed."""
+COMPLETE = "whole results of a run"
+"""Allowed state of a folder of results."""
+RUN_AGAIN = f"make it anew by {RUN}"
+"""Cure of files that were changed."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,9 @@ class ResultsFolder:
             name: digest for part in self.parts.values() for name, digest in part.files.items()
         }
         if name not in files:
-            raise RefusedError(str(self.path), f"without {name} in its manifest", *WHOLE)
+            raise RefusedError(
+                str(self.path), f"without {name} in its manifest", COMPLETE, RUN_AGAIN
+            )
         return self._content(name, files[name])
 
     def _content(self, name: str, digest: str) -> bytes:
@@ -115,8 +119,9 @@ class ResultsFolder:
             content = read_regular(file)
         except OSError as error:
             state = "is missing" if isinstance(error, FileNotFoundError) else "is no regular file"
-            raise RefusedError(str(file), state, *WHOLE) from None
-        require(not digest or digest_of(content) == digest, str(file), "was changed", *WHOLE)
+            raise RefusedError(str(file), state, COMPLETE, RUN_AGAIN) from None
+        is_same = not digest or digest_of(content) == digest
+        require(is_same, str(file), value="was changed", allowed=COMPLETE, cure=RUN_AGAIN)
         return content
 
     def _require_real_parents(self, name: str) -> None:
@@ -149,7 +154,13 @@ class ResultsFolder:
         listed = self.is_lost or any(name in part.files for part in self.parts.values())
         regular = stat.S_ISREG(mode)
         kind = "a file that no manifest lists" if regular else "no regular file"
-        require(listed and (regular or stat.S_ISLNK(mode)), str(file), kind, allowed, cure)
+        require(
+            listed and (regular or stat.S_ISLNK(mode)),
+            str(file),
+            value=kind,
+            allowed=allowed,
+            cure=cure,
+        )
 
     def put(self, stage: str, fingerprint: str, source: Path) -> None:
         """Moves the files below a folder here as those of a stage, and lists them.
@@ -252,7 +263,13 @@ def require_known(facts: Mapping[str, object], path: Path) -> None:
     """
     version = facts.get("format_version")
     cure = "name another folder" if version is None else f"make it anew by {RUN}"
-    require(version == FORMAT, str(path), f"of format {version}", f"files of format {FORMAT}", cure)
+    require(
+        version == FORMAT,
+        str(path),
+        value=f"of format {version}",
+        allowed=f"files of format {FORMAT}",
+        cure=cure,
+    )
 
 
 def _names(parts: Mapping[str, StageFiles]) -> Iterator[str]:

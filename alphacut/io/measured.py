@@ -76,7 +76,7 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
         allowed = "a mode from 1, a frequency above 0, and deviations above 0"
         deviations = [values[k] for k in (columns.frequency_std, columns.shape_std) if k]
         right = mode >= 1 and mode % 1 == 0 and all(x > 0 for x in (frequency, *deviations))
-        require(right, f"{path.name}, row {row}", ",".join(cells)[:80], allowed)
+        require(right, f"{path.name}, row {row}", value=",".join(cells)[:80], allowed=allowed)
         modes[int(mode)].append(values)
     return tuple(_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes))
 
@@ -86,7 +86,7 @@ def _columns(path: Path, head: list[str]) -> _Columns:
     names = [cell.strip() for cell in head]
     floors = {int(name[1:]): place for place, name in enumerate(names) if name.startswith("q")}
     known = match is not None and len(floors) == sum(name.startswith("q") for name in names)
-    require(known, f"{path.name}, header", ",".join(head)[:80], ALLOWED)
+    require(known, f"{path.name}, header", value=",".join(head)[:80], allowed=ALLOWED)
     assert match is not None
     frequency_std = 2 if match["frequency"] else None
     shape_std = (3 if match["frequency"] else 2) if match["shape"] else None

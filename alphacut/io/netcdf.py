@@ -37,7 +37,13 @@ def read_dataset(path: Path, key: str) -> xarray.Dataset:
     folder, is_dataset = ResultsFolder.opened(path.parent), path.suffix == ".nc"
     listed = is_dataset and any(path.name in part.files for part in folder.parts.values())
     cure = "its folder holds it with manifest.json, which tells whether it is as it was written"
-    require(listed, key, str(path), "a NetCDF file in the results of this program", cure)
+    require(
+        listed,
+        key,
+        value=str(path),
+        allowed="a NetCDF file in the results of this program",
+        cure=cure,
+    )
     return dataset_of(folder.content(path.name))
 
 
@@ -73,7 +79,10 @@ def require_same_run(summary: Document, folder: ResultsFolder) -> None:
     listed = {name: part.fingerprint for name, part in folder.parts.items()}
     other = [name for name, key in summary["fingerprints"].items() if listed.get(name) != key]
     require(
-        not other, str(folder.path), f"with {', '.join(other)} of another run", "one run's files"
+        not other,
+        str(folder.path),
+        value=f"with {', '.join(other)} of another run",
+        allowed="one run's files",
     )
 
 

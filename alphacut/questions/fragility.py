@@ -34,7 +34,12 @@ class FragilityQuestion(Question):
 
     def answer(self, motion: Motion) -> Document:
         """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-        require(motion.suite is not None, "fragility", "without records", "a section [records]")
+        require(
+            motion.suite is not None,
+            "fragility",
+            value="without records",
+            allowed="a section [records]",
+        )
         assert motion.suite is not None
         limits = self.section.in_si(motion.structure)
         peaks = list(motion.suite.peaks.values())

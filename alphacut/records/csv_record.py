@@ -38,7 +38,7 @@ def _rows(file: TextFile) -> list[tuple[int, list[str]]]:
     lines = [(place, line) for place, line in enumerate(file.lines)]
     lines = [(place, line) for place, line in lines if line.strip() and not line.startswith("#")]
     allowed = "a header with units, and rows of numbers below it"
-    require(len(lines) > 1, file.name, f"{len(lines)} lines", allowed)
+    require(len(lines) > 1, file.name, value=f"{len(lines)} lines", allowed=allowed)
     separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
     return [(place, cells_of(file.name, place + 1, line, separator)) for place, line in lines]
 

@@ -91,5 +91,5 @@ def _trimmed(samples: Array, step: float, trim: Trim | None) -> Array:
     kept = samples[max(int(first), 0) : int(last) + 1]
     shown = trim if isinstance(trim, str) else f"{trim[0]:g} … {trim[1]:g} s"
     allowed = f"times within 0 … {(len(samples) - 1) * step:g} s with two samples between them"
-    require(len(kept) > 1, "trim", shown, allowed)
+    require(len(kept) > 1, "trim", value=shown, allowed=allowed)
     return kept

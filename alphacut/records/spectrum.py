@@ -32,7 +32,7 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
         RefusedError: The period or the ratio is out of range.
     """
     real("period", period, positive=True)
-    require(0 <= real("ratio", ratio) < 1, "ratio", ratio, "from 0 and below 1")
+    require(0 <= real("ratio", ratio) < 1, "ratio", value=ratio, allowed="from 0 and below 1")
     from scipy.linalg import expm  # which takes time to import
     from scipy.signal import lfilter
 

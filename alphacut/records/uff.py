@@ -46,9 +46,14 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         if kind not in (NORMAL_MODE, *COMPLEX_MODES):
             continue
         number = int(dataset["mode_n"])
-        require(number not in modes, key, f"mode {number} again", "each mode once")
+        require(number not in modes, key, value=f"mode {number} again", allowed="each mode once")
         modes[number] = _mode(path, dataset, number, floors)
-    require(bool(modes), path.name, "without a mode", "a data set 55 of a normal or complex mode")
+    require(
+        bool(modes),
+        path.name,
+        value="without a mode",
+        allowed="a data set 55 of a normal or complex mode",
+    )
     return tuple(modes[number] for number in sorted(modes))
 
 
@@ -66,12 +71,17 @@ def read_uff_record(path: Path, channel: str = "") -> Recording:
     sets = {_response(dataset): dataset for dataset in _datasets(path, 58)}
     names = [name for name in sets if not channel or name == channel.lower()]
     value = f"channel {channel or 'not named'}"
-    require(len(names) == 1, path.name, value, f"one of: {', '.join(sets) or 'none is there'}")
+    require(
+        len(names) == 1,
+        path.name,
+        value=value,
+        allowed=f"one of: {', '.join(sets) or 'none is there'}",
+    )
     dataset, key = sets[names[0]], f"{path.name}, response {names[0]}"
     kind = dataset["func_type"], dataset.get("ordinate_spec_data_type")
     allowed = "a time history (1) of an acceleration (12)"
     value = f"of function type {kind[0]} and data type {kind[1]}"
-    require(kind == (TIME_HISTORY, ACCELERATION), key, value, allowed)
+    require(kind == (TIME_HISTORY, ACCELERATION), key, value=value, allowed=allowed)
     unit = str(dataset.get("ordinate_axis_units_lab", "")).strip()
     size = acceleration_factor(unit)
     if size is None:
@@ -79,7 +89,12 @@ def read_uff_record(path: Path, channel: str = "") -> Recording:
     time, samples = np.asarray(dataset["x"], float), np.real(np.asarray(dataset["data"]))
     steps = np.diff(time)
     even = len(steps) > 0 and steps[0] > 0 and np.ptp(steps) <= EVEN * steps[0]
-    require(even and np.isfinite(samples).all(), key, "uneven", "even times, finite samples")
+    require(
+        even and np.isfinite(samples).all(),
+        key,
+        value="uneven",
+        allowed="even times, finite samples",
+    )
     step = float(time[-1] - time[0]) / len(steps)
     return Recording("UFF 58", unit, step, size * samples)
 
@@ -119,15 +134,22 @@ def _mode(path: Path, dataset: dict[str, Any], number: int, floors: Mapping[str,
         if column is not None:
             values |= {f"{n}.{direction}": complex(x) for n, x in zip(nodes, column, strict=True)}
     missing = [name for name in floors if name.lower() not in values]
-    require(not missing, key, f"without {', '.join(missing)}", f"unknowns of {nodes[:8]} …")
+    require(
+        not missing,
+        key,
+        value=f"without {', '.join(missing)}",
+        allowed=f"unknowns of {nodes[:8]} …",
+    )
     shape = np.array([values[name.lower()] for name in floors])
     collinearity = phase_collinearity(shape)
     allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
-    require(collinearity >= MIN_COLLINEARITY, key, f"complex: {collinearity:.3f}", allowed)
+    require(
+        collinearity >= MIN_COLLINEARITY, key, value=f"complex: {collinearity:.3f}", allowed=allowed
+    )
     turned = _real(shape)
     amplitudes = {floor: np.array([x]) for floor, x in zip(floors.values(), turned, strict=True)}
     frequency = _frequency(dataset)
-    require(frequency > 0, f"{key}: frequency", frequency, "above 0 Hz")
+    require(frequency > 0, f"{key}: frequency", value=frequency, allowed="above 0 Hz")
     return ModeRows(number, np.array([frequency]), amplitudes if len(amplitudes) > 1 else {})
 
 

@@ -56,7 +56,7 @@ class EnvelopeTask:
         units = {Output(x).unit for x in structure.outputs}
         own = self.section.tolerance or USUAL
         value, allowed = f"{own.value:g} {own.unit}", f"a share, or {', '.join(sorted(units))}"
-        require(own.unit in {"", *units}, "envelope.tolerance", value, allowed)
+        require(own.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
         return own
 
     def is_motion_of(self, section: EnvelopeSection) -> bool:

@@ -57,10 +57,12 @@ def require_learnable(
     Raises:
         RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
-    require(alpha[0] > 0, "envelope.alpha", list(alpha), "levels above 0")
+    require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     rows = {row.mode: row for row in _rows(section)}
     some, held = f"some of modes {[*rows]}, not all", section.held_out
-    require(set(held) < set(rows), "identify.held_out", ", ".join(map(str, held)), some)
+    require(
+        set(held) < set(rows), "identify.held_out", value=", ".join(map(str, held)), allowed=some
+    )
     used = [_measured(section, row) for mode, row in rows.items() if mode not in held]
     return rows, used, structure.inputs(section.learn, "identify.learn")
 
@@ -70,7 +72,7 @@ def _rows(section: Identify) -> tuple[ModeRows, ...]:
     universal = section.measured.suffix.lower() in ENDINGS
     allowed = "the floors of its unknowns" if universal else "left out beside a CSV file"
     given = bool(section.floors)
-    require(given == universal, "identify.floors", section.floors or None, allowed)
+    require(given == universal, "identify.floors", value=section.floors or None, allowed=allowed)
     if universal:
         return uff_mode_rows(section.measured, section.floors)
     return mode_rows(section.measured)

@@ -207,5 +207,5 @@ def _labelled(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageS
         phase[grey == label] = number
     values = {float(x) for x in np.unique(grey)}
     wrong = ", ".join(f"{x:g}" for x in sorted(values ^ set(labels))[:5])
-    require(not wrong, "cell.labels", wrong, "every value of the image, and no other")
+    require(not wrong, "cell.labels", value=wrong, allowed="every value of the image, and no other")
     return ImageStudy(cell, lambda level: (phase, phase), False)

@@ -355,7 +355,7 @@ def require_levels(alpha: tuple[float, ...], key: str) -> None:
         RefusedError: They do not go from 0 to 1, and are not 1 alone.
     """
     complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
-    require(complete, key, list(alpha), "levels from 0 to 1, or 1 alone")
+    require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")
 
 
 def loss_of(data: xarray.Dataset) -> FuzzyNumber | None:
@@ -374,9 +374,9 @@ def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
     Raises:
         RefusedError: There is none, or it is not positive, or lacks the levels 0 and 1.
     """
-    require("E" in data, key, "without E", "a modulus.nc of this program")
+    require("E" in data, key, value="without E", allowed="a modulus.nc of this program")
     alpha, ends = data["alpha"].values, data["E"].transpose("alpha", "bound").values
-    require(ends.min() > 0, key, f"{ends.min() / GPA:.3g} GPa", "a modulus above 0")
+    require(ends.min() > 0, key, value=f"{ends.min() / GPA:.3g} GPa", allowed="a modulus above 0")
     levels = tuple(float(level) for level in alpha)
     require_levels(levels, key)
     if levels == (1.0,):

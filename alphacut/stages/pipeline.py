@@ -120,13 +120,13 @@ class Pipeline:
         require(
             number is not None or content.has_own_modulus,
             "frame.modulus",
-            None,
-            "a modulus, or --modulus FILE.nc",
+            value=None,
+            allowed="a modulus, or --modulus FILE.nc",
         )
         by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
         allowed = "loss factors of the cell, or a number"
         known = loss is not None or not by_material
-        require(known, "frame.damping_ratio", "material", allowed)
+        require(known, "frame.damping_ratio", value="material", allowed=allowed)
         return section.structure(number, loss)
 
     def motion(self, structure: Structure, studies: bool = True) -> None:

@@ -196,7 +196,11 @@ class StageStore:
         there = os.path.lexists(path)
         cure = "move it away, or leave out --fresh"
         require(
-            listed or not (there and self.fresh), str(path), "listed in no manifest", "none", cure
+            listed or not (there and self.fresh),
+            str(path),
+            value="listed in no manifest",
+            allowed="none",
+            cure=cure,
         )
         if rank() == 0 and not listed and not there:
             folder.list_files(SAMPLES, "", {SAMPLES: "", f"{SAMPLES}-journal": ""})

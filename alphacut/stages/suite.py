@@ -70,7 +70,12 @@ def nominal_mode(structure: Structure) -> Nominal:
         RefusedError: The structure is not linear.
     """
     linear = structure.linear
-    require(linear is not None, "records", "with a system that is not linear", "linear structures")
+    require(
+        linear is not None,
+        "records",
+        value="with a system that is not linear",
+        allowed="linear structures",
+    )
     assert linear is not None
     omega, ratios = modal_damping_ratios(linear)
     return Nominal(2 * pi / float(omega[0]), float(ratios[0]))
@@ -95,7 +100,12 @@ def _record(
     }
     wanted = section.scale
     size = measures.get(wanted.measure, 1.0)
-    require(size > 0, f"record {named.name}", "zero throughout", "a record that moves something")
+    require(
+        size > 0,
+        f"record {named.name}",
+        value="zero throughout",
+        allowed="a record that moves something",
+    )
     factor = wanted.value / size
     length = (len(ground.acceleration) - 1) * ground.step
     duration = length + FREE_PERIODS * mode.period

@@ -31,7 +31,12 @@ def nodes(duration: float, step: float) -> Array:
     real("step", step, positive=True)
     count = round(real("duration", duration) / step)
     whole = 1 <= count <= MOST_NODES and abs(count * step - duration) <= 1e-9 * duration
-    require(whole, "duration", f"{duration:g} s", f"1 to {MOST_NODES:,} whole steps of {step:g} s")
+    require(
+        whole,
+        "duration",
+        value=f"{duration:g} s",
+        allowed=f"1 to {MOST_NODES:,} whole steps of {step:g} s",
+    )
     return np.arange(count + 1) * step
 
 

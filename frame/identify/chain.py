@@ -42,7 +42,7 @@ class Chain:
     def __init__(self, frame: StoreyFrame, names: Sequence[str]) -> None:
         n, values = frame.floors, frame.parameters
         allowed = "none: a storey softened by weight has no stiffness of such a product"
-        require(not frame.gravity, "frame.gravity", frame.gravity, allowed)
+        require(not frame.gravity, "frame.gravity", value=frame.gravity, allowed=allowed)
         self.powers = np.zeros((2, n, len(names)))
         for column, name in enumerate(names):
             part = re.fullmatch(r"([clmkI])(\d+)", name)

@@ -265,13 +265,12 @@ def _refuse(
         default=0,
     )
     ordered = bool(numbers) and sorted(set(numbers)) == numbers
-    for key, value, meaningful, allowed in (
-        ("alpha", list(alpha), rising and levels[0] > 0 and levels[-1] <= 1, "rising in (0, 1]"),
-        ("modes", numbers, ordered, "one or more, rising"),
-        ("modes", most, most <= floors, f"modes and floors from 1 to {floors}"),
-        ("parameters", least, least > 0, "positive priors"),
-    ):
-        require(meaningful, f"identify.{key}", value, allowed)
+    inside = rising and levels[0] > 0 and levels[-1] <= 1
+    require(inside, "identify.alpha", value=list(alpha), allowed="rising in (0, 1]")
+    require(ordered, "identify.modes", value=numbers, allowed="one or more, rising")
+    allowed = f"modes and floors from 1 to {floors}"
+    require(most <= floors, "identify.modes", value=most, allowed=allowed)
+    require(least > 0, "identify.parameters", value=least, allowed="positive priors")
 
 
 def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]], float]:

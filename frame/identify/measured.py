@@ -42,15 +42,15 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
-        floors = [*self.shape]
-        own = not floors or (self.reference >= 1 and self.reference not in floors)
-        for key, value, meaningful, allowed in (
-            ("number", self.mode, self.mode >= 1, "numbers from 1 on"),
-            ("floors", floors, min(floors, default=1) >= 1, "numbers from 1 on"),
-            ("frequency", self.frequency.modal, self.frequency.modal > 0, "positive values in Hz"),
-            ("reference", self.reference, own, "a floor beside those of the shape"),
-        ):
-            require(meaningful, f"mode {self.mode}: {key}", value, allowed)
+        floors, mode = [*self.shape], f"mode {self.mode}"
+        require(self.mode >= 1, f"{mode}: number", value=self.mode, allowed="numbers from 1 on")
+        are_positive = min(floors, default=1) >= 1
+        require(are_positive, f"{mode}: floors", value=floors, allowed="numbers from 1 on")
+        hertz, allowed = self.frequency.modal, "positive values in Hz"
+        require(hertz > 0, f"{mode}: frequency", value=hertz, allowed=allowed)
+        is_apart = not floors or (self.reference >= 1 and self.reference not in floors)
+        allowed = "a floor beside those of the shape"
+        require(is_apart, f"{mode}: reference", value=self.reference, allowed=allowed)
 
     @property
     def quantities(self) -> dict[str, FuzzyNumber]:
@@ -117,7 +117,7 @@ def measured_mode(
     counts = [row.size for row in rows.values()]
     as_many = values.ndim == 1 and not set(counts) - {values.size}
     allowed = f"{values.size} of each floor, as many as frequencies"
-    require(as_many, f"mode {mode}: amplitudes", counts, allowed)
+    require(as_many, f"mode {mode}: amplitudes", value=counts, allowed=allowed)
     spread = None if frequency_deviation is None else frequency_deviation * float(values.mean())
     number = _mean(values, spread, f"mode {mode}: frequencies", "frequency_deviation")
     if not rows:
@@ -134,7 +134,7 @@ def measured_mode(
         value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
         key = f"{what}: scatter of floor {reference}"
         clear = bool(np.isfinite(ratios).all()) and square <= ROUGH**2
-        require(clear, key, value, f"values up to {ROUGH:g}", cure)
+        require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
         # the reference scatters, too; the last factor is above the second order's
         share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
         both = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
@@ -160,11 +160,17 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
     if deviation is None:
         value, cure = f"{count} times {values[0]:g}", f"set {key}, such as 0.01"
         scatters = not np.allclose(values, values[0], 1e-12, 0.0)
-        require(scatters, what, value, "values that scatter", cure)
+        require(scatters, what, value=value, allowed="values that scatter", cure=cure)
         return from_data(values, "mean", law="normal")
     real(f"{what}: {key}", deviation, positive=True)
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0
     explained = (count - 1) * (scatter / deviation) ** 2 <= chdtri(max(count - 1, 1), CHANCE)
     value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"
-    require(explained, f"{what}: {key} times the mean", value, allowed, "leave it out")
+    require(
+        explained,
+        f"{what}: {key} times the mean",
+        value=value,
+        allowed=allowed,
+        cure="leave it out",
+    )
     return from_scatter(float(values.mean()), deviation, count)

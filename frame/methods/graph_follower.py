@@ -69,7 +69,12 @@ class GraphFollower:
     tolerance: float = 1e-3
 
     def __post_init__(self) -> None:
-        require(self.order in (1, 2), "order", self.order, "1 and 2, the degrees of a Taylor model")
+        require(
+            self.order in (1, 2),
+            "order",
+            value=self.order,
+            allowed="1 and 2, the degrees of a Taylor model",
+        )
         real("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Envelope:

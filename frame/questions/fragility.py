@@ -50,7 +50,12 @@ class CriticalMeasures:
     def __post_init__(self) -> None:
         ends = (self.low, self.low_reached, self.high_reached, self.high)
         rise = all((a <= b * (1 + 1e-9)).all() for a, b in pairwise(ends))
-        require(rise and (self.low > 0).all(), "critical measures", "not rising", "rising ends")
+        require(
+            rise and (self.low > 0).all(),
+            "critical measures",
+            value="not rising",
+            allowed="rising ends",
+        )
 
     @classmethod
     def of(
@@ -122,7 +127,7 @@ class CriticalMeasures:
         Raises:
             RefusedError: There is one record.
         """
-        require(len(self.low) > 1, "records", len(self.low), "two records or more")
+        require(len(self.low) > 1, "records", value=len(self.low), allowed="two records or more")
         low, high = np.log(self.low), np.log(self.high)
         finite = np.isfinite(high).all(0)
         middle = np.where(finite, (low + high) / 2, low)

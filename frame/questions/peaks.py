@@ -201,7 +201,7 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     Raises:
         RefusedError: There is no limit, one is not positive, or it names no output.
     """
-    require(bool(limits), "limits", None, "one limit or more, as {'q3': 0.1}")
+    require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
         chosen("limits", name, outputs)
         real(f"limit of {name}", float(limit), positive=True)

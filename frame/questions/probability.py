@@ -102,11 +102,13 @@ def probabilities(
     """
     require_limits(limits, model.outputs)
     both = sorted(set(fuzzy) & set(random))
-    require(not both, "random", ", ".join(both), "inputs that are not fuzzy as well")
+    require(not both, "random", value=", ".join(both), allowed="inputs that are not fuzzy as well")
     drawn = [np.asarray(draw(rng, samples), float) for draw in random.values()]
     for name, values in zip(random, drawn, strict=True):
         finite = values.shape == (samples,) and bool(np.isfinite(values).all())
-        require(finite, f"values of {name}", values.shape, f"{samples} finite numbers")
+        require(
+            finite, f"values of {name}", value=values.shape, allowed=f"{samples} finite numbers"
+        )
     draws = np.column_stack(drawn) if drawn else np.zeros((1, 0))
     cuts = boxes(fuzzy, alpha)
     scheme = "midpoint" if isinstance(model, LagrangianSystem) else "exact"

@@ -53,18 +53,20 @@ class LagrangianSystem:
         for name in ("parameters", "observed"):
             named = getattr(self, name)
             some = isinstance(named, Mapping) and bool(named)
-            require(some, name, named, "values by name, one at least")
+            require(some, name, value=named, allowed="values by name, one at least")
         for name, value in self.parameters.items():
             real(f"parameter {name}", value)
         eq = self.symbols
         quadratic = not eq.mass.free_symbols & set(eq.v)
-        require(quadratic, "lagrangian", eq.mass.tolist(), "functions quadratic in v")
+        require(quadratic, "lagrangian", value=eq.mass.tolist(), allowed="functions quadratic in v")
         for name in self.observed:
             self.output(name, eq.v)
         start = dict(zip([*eq.q, *eq.v], [x for part in self.start() for x in part], strict=True))
         modal = {eq.p[name]: value for name, value in self.parameters.items()}
         inert = abs(eq.mass.subs(start).subs(modal).evalf().det()) >= 1e-300
-        require(inert, "mass of the lagrangian", "singular", "inertia of each coordinate")
+        require(
+            inert, "mass of the lagrangian", value="singular", allowed="inertia of each coordinate"
+        )
 
     def start(self) -> tuple[list[Expr], list[Expr]]:
         """The initial state (q0, v0) in symbols."""
@@ -139,7 +141,7 @@ def _expressions(
     except (KeyError, IndexError, TypeError, AttributeError, sympy.SympifyError) as failure:
         raise RefusedError(name, repr(failure), allowed) from None
     fits = len(made) == count and all(isinstance(value, sympy.Expr) for value in made)
-    require(fits, name, made, f"{count} by coordinate, {allowed}")
+    require(fits, name, value=made, allowed=f"{count} by coordinate, {allowed}")
     return made
 
 

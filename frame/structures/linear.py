@@ -70,7 +70,7 @@ class Accelerogram:
             raise RefusedError("accelerogram", what, allowed) from None
         several = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
         what = f"{samples.size} samples every {step:g} s"
-        require(several and 0 < step < np.inf, "accelerogram", what, allowed)
+        require(several and 0 < step < np.inf, "accelerogram", value=what, allowed=allowed)
         object.__setattr__(self, "step", step)
         object.__setattr__(self, "acceleration", samples)
 
@@ -88,7 +88,7 @@ def require_ground(ground: object) -> None:
         RefusedError: It is none.
     """
     is_record = ground is None or isinstance(ground, Accelerogram)
-    require(is_record, "ground", type(ground).__name__, "an Accelerogram, or None")
+    require(is_record, "ground", value=type(ground).__name__, allowed="an Accelerogram, or None")
 
 
 class LinearSystem(Protocol):

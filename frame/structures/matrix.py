@@ -70,7 +70,7 @@ class MatrixStructure:
         for name, value in self.parameters.items():
             real(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
-            require(bool(getattr(self, kind)), kind, None, "one entry at least")
+            require(bool(getattr(self, kind)), kind, value=None, allowed="one entry at least")
         require_ground(self.ground)
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
@@ -84,7 +84,12 @@ class MatrixStructure:
         fits = len(own) in (0, 1, len(self.massive)) and all(
             Parameter("", range=RATIO).admits(x, x) for x in own
         )
-        require(fits, "ratios", self.ratios, f"one number or parameter, or one a mode, {RATIO}")
+        require(
+            fits,
+            "ratios",
+            value=self.ratios,
+            allowed=f"one number or parameter, or one a mode, {RATIO}",
+        )
 
     @property
     def size(self) -> int:
@@ -110,19 +115,19 @@ class MatrixStructure:
         a, b = self.massive, self.massless
         positive = len(a) > 0 and np.linalg.eigvalsh(mass[np.ix_(a, a)]).min() > 0
         allowed = "a positive definite matrix of the unknowns that have mass"
-        require(positive, "mass", "not positive definite", allowed)
+        require(positive, "mass", value="not positive definite", allowed=allowed)
         if not len(b):
             return
         least = np.linalg.eigvalsh(stiffness[np.ix_(b, b)]).min() / np.abs(stiffness).max()
         allowed = f"springs that hold the unknowns without mass, {b[:5].tolist()}"
-        require(least > 1e-14, "stiffness", "not positive definite there", allowed)
+        require(least > 1e-14, "stiffness", value="not positive definite there", allowed=allowed)
         damped = [k for k in b if any(array[k].any() for _, array in self.damping)]
         allowed = "dampers between unknowns that have mass"
         require(
             not damped,
             "damping",
-            f"of unknowns {np.array(damped[:5]).tolist()} without mass",
-            allowed,
+            value=f"of unknowns {np.array(damped[:5]).tolist()} without mass",
+            allowed=allowed,
         )
 
     @property
@@ -138,7 +143,7 @@ class MatrixStructure:
     def _term(self, kind: str, term: Any) -> tuple[Factor | str | float, Array]:
         """A factor that exists and has derivatives, and its array without round-off."""
         pair = isinstance(term, Sequence) and not isinstance(term, str) and len(term) == 2
-        require(pair, f"term of {kind}", type(term).__name__, "pairs (factor, array)")
+        require(pair, f"term of {kind}", value=type(term).__name__, allowed="pairs (factor, array)")
         factor, array = term
         self._require_factor(kind, factor)
         return factor, self._symmetric(kind, array)
@@ -156,20 +161,28 @@ class MatrixStructure:
             value = failure
         allowed = "arithmetic to one number, of "
         number = isinstance(value, Jet | float | int | np.number)
-        require(number, f"factor of {kind}", repr(value), allowed + ", ".join(names))
+        require(number, f"factor of {kind}", value=repr(value), allowed=allowed + ", ".join(names))
 
     def _symmetric(self, kind: str, value: Any) -> Array:
         """The array, also a sparse one, without the round-off that parts its triangles."""
         array, key = np.asarray(value.toarray() if hasattr(value, "toarray") else value), "array of"
         size = np.shape(self.mass[0][1])[0]
         square = array.shape == (size, size)
-        require(square, f"{key} {kind}", f"of shape {array.shape}", f"({size}, {size})")
+        require(
+            square, f"{key} {kind}", value=f"of shape {array.shape}", allowed=f"({size}, {size})"
+        )
         require_numbers(kind, array)
         off = np.abs(array - array.T)
         i, j = np.unravel_index(off.argmax(), off.shape)
         even = off[i, j] <= 1e-9 * np.abs(array).max()
         what = f"not symmetric: [{i}, {j}] is {array[i, j]:g}, [{j}, {i}] is {array[j, i]:g}"
-        require(even, f"{key} {kind}", what, "symmetric arrays", "mirror one triangle")
+        require(
+            even,
+            f"{key} {kind}",
+            value=what,
+            allowed="symmetric arrays",
+            cure="mirror one triangle",
+        )
         return np.asarray((array + array.T) / 2, float)
 
     def _require_vectors(self) -> None:
@@ -181,7 +194,9 @@ class MatrixStructure:
             if value is not None:
                 require_numbers(name, value)
                 fits = np.ndim(value) == 1 and len(value) in lengths
-                require(fits, name, f"of shape {np.shape(value)}", f"{lengths} numbers")
+                require(
+                    fits, name, value=f"of shape {np.shape(value)}", allowed=f"{lengths} numbers"
+                )
 
     def matrices(self, p: Mapping[str, Jet]) -> Matrices:
         """M, D, K and the initial state at S parameter sets."""

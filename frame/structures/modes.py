@@ -174,7 +174,7 @@ def _require_stiff(squared: Array) -> None:
     share = (squared / abs(squared).max(-1, keepdims=True)).min()
     key, what = "squared frequency of a damped mode", f"{share:.1e} of the greatest"
     cure = "give dampers, or join storeys that are too stiff"
-    require(share > 1e-12, key, what, "above rounding, 1e-12", cure)
+    require(share > 1e-12, key, value=what, allowed="above rounding, 1e-12", cure=cure)
 
 
 def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
@@ -196,7 +196,13 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     for _, k in np.argwhere(ratios[place] != ratios):
         pair = f"modes {min(k, place[:, k].min()) + 1} and {max(k, place[:, k].max()) + 1}"
         cure = "give both the same ratio, or take narrower inputs"
-        require(False, "damping ratios", f"unequal where {pair} may cross", "modes apart", cure)
+        require(
+            False,
+            "damping ratios",
+            value=f"unequal where {pair} may cross",
+            allowed="modes apart",
+            cure=cure,
+        )
 
 
 def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:

@@ -107,13 +107,13 @@ class StoreyFrame:
         for output in self.outputs:
             self.quantity(output)
         once = len(set(self.outputs)) == len(self.outputs)
-        require(once, "output", ", ".join(self.outputs), "each output once")
+        require(once, "output", value=", ".join(self.outputs), allowed="each output once")
         self.require_standing({})
 
     def _require_values(self) -> None:
         """Refuse what is no number or out of range, and lists that do not fit the floors."""
         n = len(self.masses)
-        require(n > 0, "masses", None, "one value a floor, from below")
+        require(n > 0, "masses", value=None, allowed="one value a floor, from below")
         real("gravity", self.gravity, least=0)
         for name, symbol in {**SYMBOLS, **SINGLE, "rayleigh": "rayleigh_mass"}.items():
             values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
@@ -123,12 +123,12 @@ class StoreyFrame:
             (real if single else require_numbers)(name, values)
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
-                require(parameter.admits(value, value), name, f"{value:g}", allowed)
+                require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
             sizes = {"second_moment": (1, n), "damping_ratio": (n,)}.get(name, (0, n))
             free = name == "rayleigh" or (single and name not in SYMBOLS)
             fits = free or np.size(values) in sizes
             what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
-            require(fits, name, what, allowed)
+            require(fits, name, value=what, allowed=allowed)
         chosen("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
@@ -137,12 +137,17 @@ class StoreyFrame:
         if len(self.stiffness):
             columns = self.columns if len(self.columns) else None
             beside = [k for k, x in {**made, "columns": columns}.items() if x is not None]
-            require(not beside, ", ".join(beside), "there", "either stiffness or what makes it")
+            require(
+                not beside,
+                ", ".join(beside),
+                value="there",
+                allowed="either stiffness or what makes it",
+            )
             made = {}
         if not len(self.stiffness) or self.gravity:
             made["lengths"] = self.lengths if len(self.lengths) else None
         for name, value in made.items():
-            require(value is not None, name, None, MADE)
+            require(value is not None, name, value=None, allowed=MADE)
 
     @property
     def floors(self) -> int:
@@ -189,7 +194,10 @@ class StoreyFrame:
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
         require(
-            name in self.parameters, "parameter", name, ", ".join([*patterns, *self.parameters])
+            name in self.parameters,
+            "parameter",
+            value=name,
+            allowed=", ".join([*patterns, *self.parameters]),
         )
         return (name,)
 
@@ -251,7 +259,7 @@ class StoreyFrame:
         match = re.fullmatch(pattern, "shear1" if name == "base_shear" else name)
         kind, z = (match[1], int(match[2])) if match else ("", 0)
         allowed = f"q, v, a, drift or shear with a floor from 1 to {self.floors}, base_shear"
-        require(0 < z <= self.floors, "output", name, allowed)
+        require(0 < z <= self.floors, "output", value=name, allowed=allowed)
         return kind, z - 1
 
     def require_standing(self, ends: Mapping[str, tuple[float, float]]) -> None:
@@ -281,7 +289,7 @@ class StoreyFrame:
             allowed = f"more than weight over height, {soft:.5g} N/m"
             cure = "else it buckles: take stiffer storeys, lighter floors or narrower supports"
             key = f"stiffness of storey {z} under P-Delta"
-            require(k > soft, key, f"{k:.5g} N/m", allowed, cure)
+            require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
 
     def _of_floors(self, pattern: str, p: Mapping[str, Jet]) -> Jet:
         """Parameters of all floors, V = (S, n)."""

@@ -117,9 +117,11 @@ class Call:
 
     def __post_init__(self) -> None:
         shown = repr(self.function)
-        require(callable(self.function), "function", shown, "what can be called")
+        require(callable(self.function), "function", value=shown, allowed="what can be called")
         single = not (self.shared and self.vectorised)
-        require(single, "shared", self.shared, "none where the function is vectorised")
+        require(
+            single, "shared", value=self.shared, allowed="none where the function is vectorised"
+        )
         for name in self.shared:
             chosen("shared input", name, self.names)
 
@@ -140,7 +142,9 @@ class Call:
         """Outputs of one task; if it fails as a whole, each point is tried alone."""
         try:
             outputs = self._outputs(points)
-            require(len(outputs) == len(points), "outputs", len(outputs), f"{len(points)}")
+            require(
+                len(outputs) == len(points), "outputs", value=len(outputs), allowed=f"{len(points)}"
+            )
         except (Exception, SystemExit) as error:  # a model that ends its program ends its sample
             if len(points) > 1:
                 return [self(point[None])[0] for point in points]
@@ -192,7 +196,9 @@ def flatten(output: Output) -> tuple[Layout, Array]:
     layout = tuple((name, array.shape) for name, array in arrays.items())
     columns = Values(layout, np.zeros((0, 0))).columns
     distinct = bool(columns) and len(set(columns)) == len(columns)
-    require(distinct, "outputs", columns, "one number or more, all of different names")
+    require(
+        distinct, "outputs", value=columns, allowed="one number or more, all of different names"
+    )
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
 
 
@@ -203,5 +209,5 @@ def _numbers(name: str, value: ArrayLike | None) -> Array:
     real_numbers = plain and not hasattr(value, "units") and np.isfinite(array).all()
     shown = " ".join(repr(value).split())[:80]
     allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
-    require(real_numbers, f"output {name}", shown, allowed)
+    require(real_numbers, f"output {name}", value=shown, allowed=allowed)
     return np.asarray(array, float)

@@ -114,7 +114,7 @@ class Store:
             is_store = _is_store(self.path)
         except OSError as error:
             is_store, cure = False, str(error)
-        require(is_store, "store", self.path, allowed, cure)
+        require(is_store, "store", value=self.path, allowed=allowed, cure=cure)
         self._connection = self._open()
 
     def _open(self) -> sqlite3.Connection:
@@ -264,7 +264,7 @@ def model_key(identity: Identity) -> bytes:
         text = ""
     named = isinstance(identity, Mapping) and bool(identity) and bool(text)
     cure = "it says what a sample depends on besides its inputs; texts and numbers"
-    require(named, "identity", identity, "a mapping, as {'version': 1}", cure)
+    require(named, "identity", value=identity, allowed="a mapping, as {'version': 1}", cure=cure)
     return blake2b(text.encode(), digest_size=16).digest()
 
 

@@ -78,7 +78,7 @@ def _quantile(claim: str) -> float | None:
     number = re.fullmatch(r"quantile +(\d*\.\d+(?:e-\d+)?)", str(claim))
     if number and 0 < float(number[1]) < 1:
         return float(number[1])
-    require(claim in ("next value", "mean", "median"), "claim", repr(claim), CLAIMS)
+    require(claim in ("next value", "mean", "median"), "claim", value=repr(claim), allowed=CLAIMS)
     return 0.5 if claim == "median" else None
 
 
@@ -105,7 +105,9 @@ def mean_cuts(data: Observations) -> Stepwise:
     low, high = data.bounds
     cure = "give both, or law='normal'"
     finite = np.isfinite(data.bounds).all()
-    require(finite, "bounds", data.bounds, "finite ends for a mean of any law", cure)
+    require(
+        finite, "bounds", value=data.bounds, allowed="finite ends for a mean of any law", cure=cure
+    )
     band, count = _band(data.count), np.arange(data.count + 1) / data.count
     sums = [np.append(0.0, np.cumsum(row)) / data.count for row in (data.lower, data.upper)]
     lower = low * band + np.interp(1 - band, count, sums[0])

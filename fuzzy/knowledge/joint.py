@@ -67,14 +67,22 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 def _common(claimed: Mapping[str, Claimed]) -> str:
     kinds = {number.claim.about for number in claimed.values()}
     cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
-    require(len(kinds) == 1, "claims of the inputs", sorted(kinds), "of one kind", cure)
+    require(
+        len(kinds) == 1,
+        "claims of the inputs",
+        value=sorted(kinds),
+        allowed="of one kind",
+        cure=cure,
+    )
     return kinds.pop()
 
 
 def _require_different_values(claimed: Mapping[str, Claimed]) -> None:
     for (first, number), (second, partner) in combinations(claimed.items(), 2):
         cure = f"{first} and {second} rest on the same values"
-        require(number.number != partner.number, "independent", True, "False", cure)
+        require(
+            number.number != partner.number, "independent", value=True, allowed="False", cure=cure
+        )
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:

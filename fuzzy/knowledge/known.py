@@ -46,7 +46,12 @@ class Knowledge:
         real("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
-                require(value in (-1, 1), f"sign of {name}", value, "1 (rises), -1 (falls)")
+                require(
+                    value in (-1, 1),
+                    f"sign of {name}",
+                    value=value,
+                    allowed="1 (rises), -1 (falls)",
+                )
 
     @property
     def words(self) -> tuple[str, ...]:

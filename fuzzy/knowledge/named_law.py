@@ -44,11 +44,23 @@ def law_cuts(
     logarithmic, finite = law == "log-normal", np.isfinite([data.lower, data.upper]).all()
     cure = "give bounds=(lower, upper) in place of a law, or measure more"
     positive = not logarithmic or data.lower[0] > 0
-    require(positive, "least value", data.lower[0], "positive ones with a log-normal law", cure)
+    require(
+        positive,
+        "least value",
+        value=data.lower[0],
+        allowed="positive ones with a log-normal law",
+        cure=cure,
+    )
     unlike = not data.exact or data.lower[0] < data.lower[-1]
     values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
     enough = data.count > 1 and finite and unlike
-    require(enough, f"values of a {law} law", values, "two or more, finite, unlike", cure)
+    require(
+        enough,
+        f"values of a {law} law",
+        value=values,
+        allowed="two or more, finite, unlike",
+        cure=cure,
+    )
     about = data.mapped(np.log) if logarithmic else data
     lower, upper = _student(about, 0.5 if mean else quantile)
     with np.errstate(over="ignore"):

@@ -45,12 +45,12 @@ class Observations:
         """
         low, high = _limits(bounds)
         ends = np.array([_pair(number, value) for number, value in enumerate(values, 1)])
-        require(len(ends) > 0, "values", list(values), "one or more")
+        require(len(ends) > 0, "values", value=list(values), allowed="one or more")
         lower, upper = ends.T
         inside = (upper >= low) & (lower <= high)
         row = int(np.argmin(inside))
         allowed = f"values within the bounds [{low:g}, {high:g}]"
-        require(inside.all(), f"value {row + 1}", ends[row].tolist(), allowed)
+        require(inside.all(), f"value {row + 1}", value=ends[row].tolist(), allowed=allowed)
         return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
 
     @property
@@ -75,7 +75,12 @@ def _limits(bounds: Limits | None) -> tuple[float, float]:
     lower, upper = (None, None) if bounds is None else bounds
     low = -np.inf if lower is None else real("lower bound", lower)
     high = np.inf if upper is None else real("upper bound", upper)
-    require(low < high, "bounds", bounds, "(lower, upper) with lower < upper, None for none")
+    require(
+        low < high,
+        "bounds",
+        value=bounds,
+        allowed="(lower, upper) with lower < upper, None for none",
+    )
     return low, high
 
 

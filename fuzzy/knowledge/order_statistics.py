@@ -109,7 +109,9 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):
         decided = np.isfinite(centre)
-        require(decided, "bounds", data.bounds, "finite ends: the values decide no cut")
+        require(
+            decided, "bounds", value=data.bounds, allowed="finite ends: the values decide no cut"
+        )
         return Stepwise((0.0,), (centre,), (centre,)), 1.0
     first = finite[0]
     lower[:first], upper[:first] = lower[first], upper[first]

@@ -117,7 +117,13 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
         holds = pair is None and not refuted[column]
         cure = f"samples contradict it{_between(bounds, pair)}"
-        require(holds, f"knowledge of {bounds.outputs[column]}", repr(words), allowed, cure)
+        require(
+            holds,
+            f"knowledge of {bounds.outputs[column]}",
+            value=repr(words),
+            allowed=allowed,
+            cure=cure,
+        )
     natures = tuple(Nature.GUARANTEED if holds else Nature.ATTAINED for holds in proved)
     agree = f"which {len(samples.points):,} samples do not contradict"
     return replace(

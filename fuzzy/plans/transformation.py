@@ -113,7 +113,7 @@ def require_budget(samples: float, campaign: Campaign, method: str) -> None:
     cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
     cure += " fewer levels, state signs (Knowledge) for Signed, or take Automatic"
     left, allowed = f"{campaign.left:,} evaluations", f"{samples:,.0f} or more"
-    require(samples <= campaign.left, "budget", left, allowed, cure)
+    require(samples <= campaign.left, "budget", value=left, allowed=allowed, cure=cure)
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,9 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
             plain.
     """
     named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
-    require(bool(named), "inputs", inputs, "a mapping, as {'E': Triangular(24, 25, 26)}")
+    require(
+        bool(named), "inputs", value=inputs, allowed="a mapping, as {'E': Triangular(24, 25, 26)}"
+    )
     return {
         name: value if isinstance(value, FuzzyNumber) else Crisp(real(f"input {name}", value))
         for name, value in inputs.items()
@@ -110,4 +112,10 @@ class Domain:
         """Refuse interactions for a method that cannot take them into account."""
         kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
         cure = "take Automatic or Optimisation"
-        require(not kinds, "interactions", kinds, f"none with the method {method}", cure)
+        require(
+            not kinds,
+            "interactions",
+            value=kinds,
+            allowed=f"none with the method {method}",
+            cure=cure,
+        )

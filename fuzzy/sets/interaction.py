@@ -97,7 +97,7 @@ class Ellipsoidal:
             real(f"correlation of {' and '.join(pair)}", value, least=-1, most=1)
         definite = len(self.names) > 1 and np.linalg.eigvalsh(self._matrix).min() > 0
         allowed = "pairs of inputs with values that agree: their matrix is positive definite"
-        require(definite, "correlation", dict(self.correlation), allowed)
+        require(definite, "correlation", value=dict(self.correlation), allowed=allowed)
 
     @property
     def names(self) -> tuple[str, ...]:

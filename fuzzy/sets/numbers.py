@@ -91,7 +91,7 @@ def rising(alpha: Iterable[float]) -> tuple[float, ...]:
     """
     levels = tuple(map(level, alpha))
     ordered = bool(levels) and (np.diff(levels) > 0).all()
-    require(ordered, "alpha", list(levels), "levels that rise within [0, 1]")
+    require(ordered, "alpha", value=list(levels), allowed="levels that rise within [0, 1]")
     return levels
 
 
@@ -127,7 +127,7 @@ class _Corners(FuzzyNumber):
         names = [corner.name for corner in fields(self)]
         corners = [real(self.word, getattr(self, name)) for name in names]
         order = " <= ".join(names)
-        require((np.diff(corners) >= 0).all(), self.word, corners, order)
+        require((np.diff(corners) >= 0).all(), self.word, value=corners, allowed=order)
 
     @cached_property
     def cuts(self) -> Cuts:
@@ -235,10 +235,15 @@ class _Nested(FuzzyNumber):
         complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
         alike = len(levels) == len(low) == len(high)
         allowed = f"levels that rise from 0 {'to' if self.to_one else 'up to'} 1, one for each end"
-        require(complete and alike, "alpha", (levels, len(low), len(high)), allowed)
+        require(complete and alike, "alpha", value=(levels, len(low), len(high)), allowed=allowed)
         ends = np.array([*low, *high[::-1]])
         ordered = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
-        require(ordered, "cuts", ends.tolist(), "finite ends, lower ones rising, upper falling")
+        require(
+            ordered,
+            "cuts",
+            value=ends.tolist(),
+            allowed="finite ends, lower ones rising, upper falling",
+        )
         for name, row in zip(("alpha", "lower", "upper"), (levels, low, high), strict=True):
             object.__setattr__(self, name, row)
 

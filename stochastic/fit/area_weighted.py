@@ -86,7 +86,9 @@ class AreaWeighted:
         inside = (self.values >= lower) & (self.values <= upper)
         value = f"[{lower:g}, {upper:g}] with {int(inside.sum())} reduced radii"
         allowed = "limits that contain ten or more"
-        require(inside.sum() >= 10, "limits", value, allowed, "take more particles")
+        require(
+            inside.sum() >= 10, "limits", value=value, allowed=allowed, cure="take more particles"
+        )
         return AreaWeighted.from_values(
             self.values[inside], self.weights[inside], self.groups[inside]
         )
@@ -112,7 +114,7 @@ class AreaWeighted:
         groups = int(self.groups.max()) + 1
         allowed = "five packings, or cells in five of the 25 patches of a section, or more"
         cure = "take more particles, and check the size of the section"
-        require(groups >= 5, "groups of the bootstrap", groups, allowed, cure)
+        require(groups >= 5, "groups of the bootstrap", value=groups, allowed=allowed, cure=cure)
         step = np.append(np.diff(self.values) > 0, True)
         drawn = self.resampled(number, generator)
         farthest = [np.abs((np.cumsum(w) - self.cumulated)[step]).max() for w in drawn]

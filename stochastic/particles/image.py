@@ -91,10 +91,10 @@ class SectionImage:
         require(
             bool(inside) and odd <= MAX_NOT_ROUND * phase.sum(),
             self.path.name,
-            f"{odd / max(phase.sum(), 1):.1%} of the particles' area in pieces that are not"
+            value=f"{odd / max(phase.sum(), 1):.1%} of the particles' area in pieces that are not"
             f" round, beside {len(inside)} that are",
-            f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others",
-            "take the image itself as the cell: cell.image",
+            allowed=f"images with round particles, up to {MAX_NOT_ROUND:.0%} of others",
+            cure="take the image itself as the cell: cell.image",
         )
         row, column, radius = np.array(inside).T
         centres = np.stack([column + 0.5, phase.shape[0] - row - 0.5], axis=1)
@@ -113,7 +113,9 @@ class SectionImage:
         clear = len(greys) == 2 and contrast >= NOISE * noise
         value = f"one of {len(greys)} greys, apart by {contrast / max(noise, 1e-300):.2g} noises"
         allowed = f"images of two greys, {NOISE:g} standard deviations apart"
-        require(clear, self.path.name, value, allowed, "average the image before")
+        require(
+            clear, self.path.name, value=value, allowed=allowed, cure="average the image before"
+        )
         phase: Mask = ~bright if _convexity(~bright) > _convexity(bright) else bright
         unevenness = _unevenness(smooth, ~phase) / contrast
         value = f"light that differs by {unevenness:.2g} of the contrast"
@@ -121,9 +123,9 @@ class SectionImage:
         require(
             unevenness <= MAX_UNEVENNESS,
             self.path.name,
-            value,
-            f"values up to {MAX_UNEVENNESS:g}",
-            cure,
+            value=value,
+            allowed=f"values up to {MAX_UNEVENNESS:g}",
+            cure=cure,
         )
         return phase
 

@@ -74,7 +74,9 @@ class Packing:
             least = f"more than {MAX_NUMBER}, where the largest radius is {largest:.3g} m"
             cure = "leave out the smallest sizes, or lower the fraction"
             few = len(radii) < max(MAX_NUMBER, self.number)
-            require(few, f"packing.{self.shape.particles}", self.number, least, cure)
+            require(
+                few, f"packing.{self.shape.particles}", value=self.number, allowed=least, cure=cure
+            )
             radii = np.append(radii, self.radii.sample(self.number, generator))
             measure = float(self.shape.measure(radii).sum()) / self.fraction
             side = float(np.sqrt(measure) if self.shape == DISCS else np.cbrt(measure))

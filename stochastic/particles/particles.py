@@ -82,7 +82,9 @@ class Particles:
         centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()
         allowed = f"{len(centres)} positions, of one particle or more"
-        require(0 < len(radii) == len(centres), "radii", f"{len(radii)} numbers", allowed)
+        require(
+            0 < len(radii) == len(centres), "radii", value=f"{len(radii)} numbers", allowed=allowed
+        )
         _refuse(~((size > 0) & (size < np.inf)), "size", size, "positive, finite lengths in m")
         _refuse(~np.isfinite(centres).all(axis=1), "centres", centres, "finite lengths in m")
         _refuse(~((radii >= 0) & (radii < np.inf)), "radii", radii, "finite lengths from 0 m on")
@@ -132,4 +134,4 @@ def nearest_image(offset: Array, size: Array) -> Array:
 def _refuse(bad: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:
     """Refuses the first bad one of some values."""
     row = int(np.argmax(bad))
-    require(not bad.any(), f"{name}[{row}]", values[row].tolist(), allowed)
+    require(not bad.any(), f"{name}[{row}]", value=values[row].tolist(), allowed=allowed)

@@ -28,7 +28,7 @@ def require_radii(key: str, radii: ArrayLike) -> None:
     wrong = radii[~((radii >= LEAST) & (radii <= MOST))]
     value = f"{wrong[0]:.6g} m" if len(wrong) else None
     plain = len(radii) > 0 and not len(wrong)
-    require(plain, key, value, f"radii from {LEAST:g} to {MOST:g} m")
+    require(plain, key, value=value, allowed=f"radii from {LEAST:g} to {MOST:g} m")
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class LogNormalRadii:
         require_radii("largest_radius", self.largest)
         allowed = f"radii from smallest_radius = {self.smallest:g} m on"
         rising = self.smallest <= self.largest
-        require(rising, "largest_radius", f"{self.largest:g} m", allowed)
+        require(rising, "largest_radius", value=f"{self.largest:g} m", allowed=allowed)
 
     @property
     def label(self) -> str:

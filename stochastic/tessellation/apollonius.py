@@ -213,7 +213,13 @@ def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
     touching = np.isin(np.arange(len(discs)), diagram.cell[diagram.neighbour < 0])
     disc = np.flatnonzero((reach <= room).all(axis=1) & ~touching)
     allowed = "windows in which the edge leaves a cell whole"
-    require(len(disc) > 0, "size", discs.size.tolist(), allowed, "take a larger section")
+    require(
+        len(disc) > 0,
+        "size",
+        value=discs.size.tolist(),
+        allowed=allowed,
+        cure="take a larger section",
+    )
     taken = reach[disc].reshape(-1, 2, 2).sum(axis=2)  # across and along
     return disc, discs.measure / (inner - taken).prod(axis=1)
 

@@ -55,7 +55,9 @@ def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
     ordered = np.isfinite(lower) and np.isfinite(upper) and lower < upper
     wide = ordered and upper - lower >= 0.999 * least  # 9.999 … 10 is wide enough
     distance = f", {least:.2g} or more apart" if ordered else ""
-    require(wide, "support of θ", [lower, upper], f"two finite ends, rising{distance}")
+    require(
+        wide, "support of θ", value=[lower, upper], allowed=f"two finite ends, rising{distance}"
+    )
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ class TruncatedNormal:
         require_support(self.lower, self.upper, unit=1.0)
         cure = "the standard normal law gives this one no probability"
         ends = [self.lower, self.upper]
-        require(self.mass > 0, "support of θ", ends, "ends nearer to 0", cure)
+        require(self.mass > 0, "support of θ", value=ends, allowed="ends nearer to 0", cure=cure)
 
     @cached_property
     def mass(self) -> float:
@@ -111,7 +113,9 @@ class TruncatedNormal:
 
         share = np.asarray(probability, float)
         wrong = share[~((share >= 0) & (share <= 1))]
-        require(not wrong.size, "probability", next(wrong.flat, None), "values in [0, 1]")
+        require(
+            not wrong.size, "probability", value=next(wrong.flat, None), allowed="values in [0, 1]"
+        )
         theta = (
             -ndtri(_normal(-self.lower) - share * self.mass)
             if self.lower > 0

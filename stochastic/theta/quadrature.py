@@ -142,7 +142,13 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
     total = float(_mass_gaps(law, edges, rule).sum())
     key = "probability between the density of θ and its distribution function"
     cure = "pdf must be the derivative of cdf, finite everywhere on the support"
-    require(total <= MASS_GAP, key, f"{total:.1e}", f"differences up to {MASS_GAP:g}", cure)
+    require(
+        total <= MASS_GAP,
+        key,
+        value=f"{total:.1e}",
+        allowed=f"differences up to {MASS_GAP:g}",
+        cure=cure,
+    )
     return edges
 
 
