@@ -13,7 +13,7 @@ from alphacut.frame.box_proof import refusing
 from alphacut.frame.boxes import ALPHA, Boxes, UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.proof import DualProof
-from alphacut.frame.dynamics.flow import LinearFlow
+from alphacut.frame.dynamics.flow import LinearFlow, exact_flow
 from alphacut.frame.dynamics.integrators import Exact, Integrator
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.envelope import Ends, Envelope
@@ -23,7 +23,6 @@ from alphacut.frame.methods.improved_follower import ImprovedFollower
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
-from alphacut.frame.parts import exact
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem, evaluate
 from alphacut.frame.structures.modes import ModalError, require_modal_order
@@ -186,7 +185,7 @@ def require_envelope(
     short.values(problem.flow.boxes.probes)
     if isinstance(problem.method, Proof | DualProof):
         with refusing():
-            problem.method.forecast(exact(problem.flow), problem.flow.boxes)
+            problem.method.forecast(exact_flow(problem.flow.flow), problem.flow.boxes)
 
 
 def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
