@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import signal
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 
 from alphacut.commands.options import (
@@ -26,6 +28,9 @@ from alphacut.io.provenance import own_version
 from alphacut.rve.interruption import uninterrupted
 from alphacut.signals import stoppable
 
+LOG = logging.getLogger(__name__)
+DEBUG = "--debug"
+"""The option of every command that shows what is logged."""
 COMMANDS = {
     "run": "run",
     "check": "check",
@@ -69,6 +74,9 @@ def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str
             name, help=command.about, description=about, allow_abbrev=False
         )
         command.arguments(made[name])
+        made[name].add_argument(
+            DEBUG, action="store_true", help="log what is done; a traceback with every error"
+        )
     return top, made
 
 
@@ -94,9 +102,10 @@ def main(
     Returns:
         Exit status, see `STATUSES`.
     """
-    with stoppable() as signals:
+    words = sys.argv[1:] if arguments is None else arguments
+    with stoppable() as signals, logged(DEBUG in words):
         try:
-            return _run(sys.argv[1:] if arguments is None else arguments, program, names)
+            return _shown(words, program, names)
         except BadInput as error:
             for problem in error.problems:
                 say(str(problem))
@@ -118,6 +127,32 @@ def main(
             return _ended(missing(error), 1)
         except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
             return _ended(str(e) or type(e).__name__, 1)
+
+
+@contextmanager
+def logged(is_on: bool) -> Iterator[None]:
+    """Writes what is logged in the block on standard error, if it is on."""
+    logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
+    if not is_on:
+        yield
+        return
+    level = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.DEBUG)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
+
+
+def _shown(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
+    """Exit status of a command; an error leaves its traceback in the log."""
+    try:
+        return _run(arguments, program, names)
+    except Exception:
+        LOG.debug("the command ended by this error", exc_info=True)
+        raise
 
 
 def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:

@@ -13,6 +13,7 @@ A node's bound is the largest over all parts (Adjiman, Floudas 1998; pruning by 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import time
 from collections.abc import Iterator, Sequence
@@ -32,6 +33,8 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
+
+LOG = logging.getLogger(__name__)
 
 BATCH = 2
 """Parts that are bounded with the same incumbents, whatever the number of threads."""
@@ -222,6 +225,7 @@ class Queue:
             with refusing():
                 found = self.proof.bounds(self.flow, part.boxes, goal)
         except UnprovedError as refusal:
+            LOG.info("a part of the box is refused: %s", refusal)
             found = [refusal] * len(part.levels)
         if self.store is not None and path is not None:
             self.store.write(path, found)
@@ -230,6 +234,7 @@ class Queue:
     def _settle(self, part: Part, found: Sequence[PartBounds | UnprovedError]) -> None:
         """Take the bounds of a part over, and put what is open into the queue."""
         self.facts["parts"] += 1
+        LOG.debug("part %d is bounded, %d are open", self.facts["parts"], len(self.open))
         for k, level in enumerate(part.levels):
             if isinstance(own := found[k], PartBounds):
                 part.outer[k] = np.where(

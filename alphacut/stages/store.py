@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
@@ -18,6 +19,8 @@ from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
 from alphacut.io.provenance import fingerprint, origin
+
+LOG = logging.getLogger(__name__)
 
 if TYPE_CHECKING:
     import xarray
@@ -161,6 +164,7 @@ class StageStore:
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
         self.taken.append(stage.name)
+        LOG.info("stage %s is taken from its files", stage.name)
         return self._read(stage.name)
 
     def _read(self, name: str) -> StageResult:
@@ -174,6 +178,7 @@ class StageStore:
 
     def _computed(self, stage: Stage) -> StageResult:
         """The result as it is computed now, and put into its files."""
+        LOG.info("stage %s is computed", stage.name)
         if self.folder is None:
             with showing(self.shown) as tick:
                 result = stage.compute(Work(workers=self.workers, tick=tick))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import first_optima
 from alphacut.frame.modal.optima import Optima
 from alphacut.fuzzy.progress_bar import Progress, share
+
+LOG = logging.getLogger(__name__)
 
 LEFT = 0.02
 """Share of the gap that Newton's method may leave."""
@@ -92,6 +95,7 @@ def certify(
             workers=workers,
             progress=tick,
         )
+        LOG.debug("branch and bound: level %g took %d boxes", model.boxes.alpha[level], used)
         done.append((optima, proved, used))
     shape = (levels, *error.shape, 2)
     inner = np.stack([optima.value for optima, *_ in done[::-1]]).reshape(shape)

@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -32,6 +33,8 @@ from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import real
+
+LOG = logging.getLogger(__name__)
 
 BOXES = 1000
 """Boxes that a proof may look at for each bound, on average."""
@@ -176,4 +179,5 @@ def _gap(proved: Envelope) -> float:
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:
+    LOG.info("envelope: %s", why)
     return replace(envelope, notes=(why, *envelope.notes))

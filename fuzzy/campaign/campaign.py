@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -25,6 +26,8 @@ from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.refused import FailedError, real
+
+LOG = logging.getLogger(__name__)
 
 _MAX_QUOTED = 3  # failed samples that a message quotes
 _MAX_LETTERS = 300  # letters of an error that a message quotes
@@ -141,6 +144,7 @@ class Campaign:
         """Outputs at new points, shape (n, columns)."""
         batch = _Batch(self, points)
         batch.run()
+        LOG.debug("%d samples, %d before", len(points), len(self))
         failures = {
             row: outcome.error
             for row, outcome in batch.outcomes.items()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +16,8 @@ from alphacut.rve.solver.numbering import LevelNumbering
 from alphacut.rve.solver.options import PREFIX, SolverOptions
 from alphacut.rve.solver.theta_preconditioner import ThetaPreconditioner
 from alphacut.stochastic import ThetaLaw
+
+LOG = logging.getLogger(__name__)
 
 
 class ConvergenceError(FailedError):
@@ -93,6 +96,7 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
                 f" iterations without reaching its tolerance (PETSc reason {reason})",
                 f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
             )
+        LOG.debug("%s with %s: %d iterations", ksp.getType(), ksp.pc.getType(), count)
         matrix.mult(x, rest)
         rest.axpy(-1, load)
         vectors.append(x)

@@ -10,6 +10,7 @@ field comes out; stopping early only widens them.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -18,6 +19,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
+
+LOG = logging.getLogger(__name__)
 
 LIMIT = 2000  # iterations; with the preconditioner, contrasts of 1e6 need fewer
 
@@ -83,6 +86,7 @@ class ConjugateGradient:
         for number in range(LIMIT):
             self.watch()
             if np.all(reach * product <= allowed):
+                LOG.debug("fields on %s points: %d iterations", fields.shape[2:], number)
                 return fields, number
             image = system.operator.apply(direction)
             length = _ratio(product, inner(direction, image))

@@ -143,6 +143,19 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, monkeypatch, capfd, line, 
     assert [path.name for path in tmp_path.iterdir()] == ["case.toml"]
 
 
+def test_debug_shows_the_traceback_and_what_is_done(tmp_path, capfd):
+    case, missing = written(tmp_path), tmp_path / "missing.toml"
+    status, _, err = spoken(capfd, "check", missing)
+    assert (status, len(err.splitlines())) == (2, 1)
+    status, _, err = spoken(capfd, "check", missing, "--debug")
+    assert status == 2
+    assert "Traceback" in err
+    assert str(missing) in err.splitlines()[-1]
+    words = ("run", case, "--out", tmp_path / "out", "--no-figures", "--quiet")
+    assert "stage envelope_all is computed" in spoken(capfd, *words, "--debug")[2]
+    assert "stage" not in spoken(capfd, *words)[2]
+
+
 @pytest.mark.parametrize(
     ("method", "integrator", "status"), [("search", "exact", 1), ("graph-follower", "midpoint", 0)]
 )
