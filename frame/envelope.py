@@ -37,6 +37,14 @@ class Envelope(Bounds):
             error; `between_nodes`: the largest value of `between`;
             `motions_tested`: exact motions that were compared with proved bounds.
         tested_structures: Their structures as arrays with axes, for `alphacut verify`.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame, envelope
+        >>> from alphacut.fuzzy import Triangular
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> bounds = envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
+        >>> bounds.upper.shape  # levels, nodes, outputs
+        (5, 6, 1)
     """
 
     time: Array

@@ -103,6 +103,14 @@ def envelope(
         RefusedError: An unknown name or option, a value outside its range, a support that reaches
             values without a meaning, or a motion that does not exist.
         FailedError: A step is too long, or a method cannot do what it is to do.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame
+        >>> from alphacut.fuzzy import Triangular
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> bounds = envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
+        >>> str(bounds.nature)
+        'guaranteed'
     """
     problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
     folder = None if store is None else Path(store)
@@ -179,6 +187,12 @@ def require_envelope(
     Raises:
         RefusedError: As `envelope`.
         UnprovedError: A proof is asked for, and there is none of such a structure.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame
+        >>> from alphacut.fuzzy import Triangular
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> require_envelope(frame, {"m1": Triangular(900, 1000, 1100)}, duration=0.5, step=0.1)
     """
     problem = _problem(model, inputs, method, duration, step, alpha, integrator, options)
     short = replace(problem.flow.flow, duration=min(FIRST_STEPS * step, duration))

@@ -1,6 +1,10 @@
 """The periodic cell: its models of the homogenised stiffness behind one result type.
 
 Each model is a frozen dataclass of its resolution with ``solve(radius_map, matrix, inclusions)``.
+
+Example:
+    >>> [load.tolist() for load in LOADS], STRAIN  # eq. 15, Voigt order (11, 22, 12 with 2 ε12)
+    ([[0.01, 0.01, 0.0], [0.0, 0.0, 0.02]], 0.01)
 """
 
 from typing import TYPE_CHECKING, Any

@@ -32,6 +32,10 @@ class Phase:
 
     Raises:
         ValueError: A value lies outside its range.
+
+    Example:
+        >>> Phase(modulus=20e9, poisson=0.3).modulus
+        20000000000.0
     """
 
     modulus: float
@@ -83,6 +87,11 @@ class VoigtPhase:
 
     Raises:
         RefusedError: The matrix is not symmetric positive definite.
+
+    Example:
+        >>> rows = ((4.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1.0))
+        >>> VoigtPhase(rows).rows[0]
+        (4.0, 1.0, 0.0)
     """
 
     rows: tuple[tuple[float, ...], ...]
@@ -121,6 +130,12 @@ class Cell:
         inclusion: Material of the particle.
         radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
+
+    Example:
+        >>> from alphacut.stochastic import HermiteMap
+        >>> cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
+        >>> len(cell.phases)
+        2
     """
 
     matrix: AnyPhase

@@ -32,6 +32,10 @@ class Ellipse:
 
     Raises:
         RefusedError: The aspect is out of range, or the angle is none.
+
+    Example:
+        >>> Ellipse(aspect=2.0, turn=30.0).aspect
+        2.0
     """
 
     aspect: float

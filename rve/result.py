@@ -22,6 +22,11 @@ def effective_modulus(s11: float, s12: float) -> tuple[float, float]:
     Args:
         s11: Mean homogenised σ11 under ε11 = ε22 = 0.01, in Pa.
         s12: Mean homogenised σ12 under ε12 = 0.01, in Pa.
+
+    Example:
+        >>> young, poisson = effective_modulus(s11=0.5e9, s12=0.2e9)
+        >>> round(young / 1e9, 3), round(poisson, 3)
+        (26.0, 0.3)
     """
     moduli = np.array([s11, np.nan, s12 / 2]) / STRAIN
     young, poisson = plane_constants(moduli, AXES)
@@ -39,6 +44,14 @@ class StressCurve:
         s12: σ12 under load 2 at the nodes, shape (n,), in Pa.
         stiffness: The whole stiffness at the nodes if known, in Voigt order, in Pa: of the plane
             (11, 22, 12 with 2 ε12), shape (n, 3, 3), or of space, (n, 6, 6).
+
+    Example:
+        >>> import numpy as np
+        >>> from alphacut.stochastic import TruncatedNormal, gauss_rule
+        >>> stiffness = np.tile(4e9 * np.eye(3), (2, 1, 1))
+        >>> curve = StressCurve.of(gauss_rule(TruncatedNormal(), points=2), stiffness)
+        >>> [f"{mean:.4g}" for mean in curve.mean]
+        ['4e+07', '8e+07']
     """
 
     theta: Array
@@ -78,6 +91,14 @@ class HomogenisedStiffness:
         average: What E and ν are of, a name in `anisotropy.AVERAGES`.
         energies: Parts of the phases in the strain energy, of which loss factors are; None where
             the model was not asked for them.
+
+    Example:
+        >>> from alphacut.rve import Phase, SeriesModel
+        >>> from alphacut.stochastic import HermiteMap
+        >>> radius = HermiteMap(0.2, 0.1, 0.6, 0.1)
+        >>> [result] = SeriesModel().solve(radius, Phase(20e9), [Phase(80e9)])
+        >>> f"{result.modulus / 1e9:.3f} GPa"
+        '22.773 GPa'
     """
 
     curve: StressCurve

@@ -161,6 +161,12 @@ class LinearFlow(Flow):
 
     Args:
         integrator: The method; the other arguments are those of `Flow`.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> LinearFlow(frame, ("m1",), duration=1.0, step=0.1).values([[900.0], [1100.0]]).shape
+        (2, 11, 1)
     """
 
     system: LinearSystem

@@ -39,6 +39,13 @@ class Midpoint:
 
     Eliminating the velocity gives (M/h + D/2 + hK/4) q[k+1] = (2M/h − hK/2) q[k] − (M/h − D/2 +
     hK/4) q[k−1]. On a linear structure this is Newmark's method with β = 1/4 and γ = 1/2.
+
+    Example:
+        >>> from alphacut.frame import LinearFlow, StoreyFrame
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> flow = LinearFlow(frame, ("m1",), duration=1.0, step=0.1, integrator=Midpoint())
+        >>> flow.values([[1e3]])[0, -1].round(4).tolist()
+        [0.0988]
     """
 
     name: ClassVar[str] = "midpoint"
@@ -61,7 +68,15 @@ class Midpoint:
 
 @dataclass(frozen=True)
 class RungeKutta4:
-    """The classical explicit method of order 4."""
+    """The classical explicit method of order 4.
+
+    Example:
+        >>> from alphacut.frame import LinearFlow, StoreyFrame
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> flow = LinearFlow(frame, ("m1",), duration=1.0, step=0.1, integrator=RungeKutta4())
+        >>> flow.values([[1e3]])[0, -1].round(4).tolist()
+        [0.0995]
+    """
 
     name: ClassVar[str] = "rk4"
     order: ClassVar[float] = 4
@@ -78,7 +93,15 @@ class RungeKutta4:
 
 @dataclass(frozen=True)
 class Exact:
-    """Exact propagator exp(A h) by scaling and squaring, for a load linear in each step."""
+    """Exact propagator exp(A h) by scaling and squaring, for a load linear in each step.
+
+    Example:
+        >>> from alphacut.frame import LinearFlow, StoreyFrame
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> flow = LinearFlow(frame, ("m1",), duration=1.0, step=0.1, integrator=Exact())
+        >>> flow.values([[1e3]])[0, -1].round(4).tolist()
+        [0.0999]
+    """
 
     name: ClassVar[str] = "exact"
     order: ClassVar[float] = inf

@@ -24,7 +24,13 @@ Expressions = tuple[list[Any], list[Any], list[Any]]
 
 @dataclass(frozen=True, eq=False)
 class LagrangianFlow(Flow):
-    """Trajectories of a general system by the midpoint variational integrator."""
+    """Trajectories of a general system by the midpoint variational integrator.
+
+    Example:
+        >>> from alphacut.frame import pendulum
+        >>> LagrangianFlow(pendulum(), ("l",), duration=1.0, step=0.1).values([[1.0]]).shape
+        (1, 11, 2)
+    """
 
     system: LagrangianSystem
 

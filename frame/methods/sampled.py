@@ -25,6 +25,14 @@ class Sampled:
 
     Raises:
         RefusedError: No trajectory is asked for.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame, envelope
+        >>> from alphacut.fuzzy import Triangular
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
+        >>> str(envelope(frame, inputs, Sampled(samples=64), duration=0.5, step=0.1).nature)
+        'attained'
     """
 
     name: ClassVar[str] = "quasi-monte-carlo"

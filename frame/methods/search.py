@@ -80,6 +80,14 @@ class Search:
 
     Raises:
         RefusedError: A value is not positive.
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame, envelope
+        >>> from alphacut.fuzzy import Triangular
+        >>> frame = StoreyFrame(masses=[1e3], stiffness=[4e4], q0=[0.1])
+        >>> inputs = {"m1": Triangular(900, 1000, 1100)}
+        >>> str(envelope(frame, inputs, Search(), duration=0.5, step=0.1).nature)
+        'estimated'
     """
 
     name: ClassVar[str] = "search"

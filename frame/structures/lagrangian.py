@@ -39,6 +39,17 @@ class LagrangianSystem:
         RefusedError: L is not quadratic in v, so that momenta cannot be turned back into
             velocities, some coordinate has no inertia, or a function asks for what is not there or
             gives a list of another length. Functions that are not smooth are refused by a motion.
+
+    Example:
+        >>> oscillator = LagrangianSystem(
+        ...     coordinates=1,
+        ...     parameters={"m": 1.0, "k": 4.0},
+        ...     lagrangian=lambda q, v, p: p["m"] * v[0] ** 2 / 2 - p["k"] * q[0] ** 2 / 2,
+        ...     initial=lambda p: ([0.1], [0.0]),
+        ...     observed={"q1": lambda q, v, p: q[0]},
+        ... )
+        >>> oscillator.coordinates
+        1
     """
 
     coordinates: int
@@ -161,6 +172,10 @@ def pendulum(
 
     Raises:
         RefusedError: Mass, length or gravity is not positive, or the damping is negative.
+
+    Example:
+        >>> [str(name) for name in pendulum(length=2.0).observed]
+        ['force', 'phi']
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         real(name, value, positive=True)

@@ -56,6 +56,12 @@ class Accelerogram:
 
     Raises:
         RefusedError: The step is not positive, or there are not two samples, or one is not finite.
+
+    Example:
+        >>> import numpy as np
+        >>> ground = Accelerogram(0.01, np.array([0.0, 1.5, 0.0]))
+        >>> float(ground.acceleration.max())
+        1.5
     """
 
     step: float

@@ -52,6 +52,15 @@ class MatrixStructure:
             array is not symmetric, the modal mass of the unknowns that have mass is not positive
             definite, one without mass has a damper or no stiffness, or the modal ratio is outside
             [0, 1).
+
+    Example:
+        >>> import numpy as np
+        >>> springs = np.array([[2.0, -1.0], [-1.0, 1.0]])
+        >>> parts = {"mass": [("m", np.eye(2))], "stiffness": [("k", springs)]}
+        >>> rows = {"q2": np.array([0.0, 1.0])}
+        >>> frame = MatrixStructure({"m": 1e3, "k": 4e4}, **parts, observed=rows)
+        >>> list(frame.parameters)
+        ['m', 'k']
     """
 
     parameters: Mapping[str, float]

@@ -30,6 +30,10 @@ class Output(str):
         name: As ``q3``, or any word.
         unit: SI unit, as ``m/s``. Where none is given, that of the storey frame's output of this
             kind; "SI" of names that are none.
+
+    Example:
+        >>> Output("v1").unit, Output("moment", "N m").unit
+        ('m/s', 'N m')
     """
 
     unit: str
@@ -66,6 +70,11 @@ class Parameter:
         name: As ``m2``.
         unit: SI unit; empty where it has none, or none is known.
         range: `POSITIVE`, `NOT_NEGATIVE`, `RATIO`, or empty for any number.
+
+    Example:
+        >>> from alphacut.frame.structures.quantities import POSITIVE
+        >>> Parameter("m2", "kg", POSITIVE).admits(-1.0, 1.0)
+        False
     """
 
     name: str

@@ -71,6 +71,11 @@ class StoreyFrame:
         RefusedError: A length of the lists differs, a mass, length, modulus, moment, stiffness or
             number of columns is not positive, a damper or gravity is negative, a ratio is outside
             [0, 1), the weight buckles a storey, or a stiffness stands beside what makes one.
+
+    Example:
+        >>> frame = StoreyFrame(masses=[1e3, 1e3], stiffness=[4e4, 4e4], q0=[0.1, 0.2])
+        >>> frame.floors, frame.outputs
+        (2, ('q1', 'q2'))
     """
 
     masses: Sequence[float]

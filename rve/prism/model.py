@@ -65,6 +65,14 @@ class PrismModel:
 
     Raises:
         RefusedError: An option out of range or unknown.
+
+    Example:
+        >>> from alphacut.rve import Phase
+        >>> from alphacut.stochastic import HermiteMap
+        >>> model = PrismModel(mesh_size=0.5, layers=2, estimate=False)
+        >>> [result] = model.solve(HermiteMap(0.2, 0.1, 0.6, 0.1), Phase(20e9), [Phase(80e9)])
+        >>> 20e9 < result.modulus < 26e9
+        True
     """
 
     mesh_size: float = 0.15

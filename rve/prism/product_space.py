@@ -47,6 +47,7 @@ class ProductSpace:
         FoldedMeshError: The map bends more than the layers can follow.
 
     Example:
+        >>> from alphacut.stochastic import HermiteMap
         >>> space = ProductSpace(PrismModel(0.5, 2), HermiteMap(0.2, 0.1, 0.6, 0.1))
         >>> particle = space.mean(space.density * space.dx["inclusion"])
         >>> 0.1 < particle < 0.15  # share of area, mean of π r² / 4

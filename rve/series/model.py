@@ -36,6 +36,14 @@ class SeriesModel:
 
     Raises:
         RefusedError: A value lies outside its range.
+
+    Example:
+        >>> from alphacut.rve import Phase
+        >>> from alphacut.stochastic import HermiteMap
+        >>> model = SeriesModel(points=8)
+        >>> [result] = model.solve(HermiteMap(0.2, 0.1, 0.6, 0.1), Phase(20e9), [Phase(80e9)])
+        >>> f"{result.modulus / 1e9:.3f} GPa"
+        '22.773 GPa'
     """
 
     points: int | None = None

@@ -65,6 +65,14 @@ class SlicesModel:
 
     Raises:
         RefusedError: A value lies outside its range.
+
+    Example:
+        >>> from alphacut.rve import Phase
+        >>> from alphacut.stochastic import HermiteMap
+        >>> model = SlicesModel(order=3, mesh_size=0.5, points=2)
+        >>> [result] = model.solve(HermiteMap(0.2, 0.1, 0.6, 0.1), Phase(20e9), [Phase(80e9)])
+        >>> 20e9 < result.modulus < 26e9
+        True
     """
 
     order: int = 4
