@@ -18,9 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from alphacut.export.mesh import VTK_ORDER
-from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase
-from alphacut.rve.prism.fields import cell_fields
+from alphacut.rve import Ellipse, Phase, PrismModel, SlicesModel, VoigtPhase, cell_fields
 from alphacut.stochastic import HermiteMap
 
 radius, resin = HermiteMap(0.25, 0.1, 0.6, 0.1), Phase(4e9, 0.35)
@@ -98,7 +96,7 @@ def picture(folder: Path) -> None:
     """Draw the particle and the shear stress, by PyVista."""
     import pyvista
 
-    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.cells[:, VTK_ORDER]])
+    cells = np.hstack([np.full((len(drawn.cells), 1), 15), drawn.vtk_cells])
     wedges = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), 26), drawn.points)
     assert (wedges.compute_cell_sizes()["Volume"] > 0).all()
     wedges.point_data["stress 12 in MPa"] = drawn.stress[:, 2, 1] / 1e6

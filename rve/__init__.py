@@ -16,6 +16,7 @@ from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 
 if TYPE_CHECKING:
+    from alphacut.rve.prism.fields import cell_fields
     from alphacut.rve.prism.model import PrismModel
     from alphacut.rve.prism.product_space import ProductSpace
 
@@ -32,6 +33,7 @@ __all__ = [
     "SlicesModel",
     "StressCurve",
     "VoigtPhase",
+    "cell_fields",
     "effective_modulus",
 ]
 
@@ -46,4 +48,8 @@ def __getattr__(name: str) -> Any:
         from alphacut.rve.prism.product_space import ProductSpace
 
         return ProductSpace
+    if name == "cell_fields":
+        from alphacut.rve.prism.fields import cell_fields
+
+        return cell_fields
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.export.mesh import COMPONENTS, ORDER, wedges
+from alphacut.export.mesh import COMPONENTS, wedges
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import say, whole_file
 from alphacut.rve.mesh.file import write
+from alphacut.rve.mesh.wedge_orders import MESHIO_ORDER
 
 if TYPE_CHECKING:
     from alphacut.rve.prism.fields import CellFields
@@ -78,6 +79,6 @@ def _abaqus(fields: CellFields) -> object:
     count = int(fields.node.max()) + 1
     points: Array = np.empty((count, 3))
     points[fields.node] = fields.points
-    cells = fields.node[fields.cells][:, ORDER]
+    cells = fields.node[fields.cells][:, MESHIO_ORDER]
     sets = {name: [np.flatnonzero(fields.phase == k)] for k, name in enumerate(fields.names)}
     return meshio.Mesh(points, [("wedge15", cells)], cell_sets=sets)

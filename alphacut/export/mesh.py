@@ -20,16 +20,12 @@ from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
 from alphacut.rve.cell import Cell
+from alphacut.rve.mesh.wedge_orders import VTK_ORDER
 
 if TYPE_CHECKING:
     import meshio
     from pyvista import PolyData, UnstructuredGrid
 
-# From Basix's order of a wedge's edges to that of meshio, Abaqus and Gmsh: lower triangle, upper
-# triangle, vertical edges; from there to VTK's, the lower triangle seen from outside.
-ORDER = [0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11]
-MIRRORED = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]
-VTK_ORDER = [ORDER[k] for k in MIRRORED]
 COMPONENTS = ("11", "22", "12")
 MATRIX, PARTICLE = "#f0a860", "#b79ad9"  # orange and lilac, as in the paper
 PIXELS = (1000, 1100)

@@ -12,6 +12,7 @@ from alphacut.rve.cell import THREE_LOADS, AnyPhase, Cell
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.form import strain
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
+from alphacut.rve.mesh.wedge_orders import VTK_ORDER
 from alphacut.rve.prism.model import PrismModel
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.krylov import solve
@@ -44,6 +45,11 @@ class CellFields:
     names: tuple[str, ...]
     node: Rows
 
+    @property
+    def vtk_cells(self) -> Rows:
+        """Nodes of the wedges in the order of VTK's quadratic wedge, shape (m, 15)."""
+        return self.cells[:, VTK_ORDER]
+
 
 def cell_fields(
     model: PrismModel, radius_map: RadiusMap, matrix: AnyPhase, inclusion: AnyPhase
@@ -53,6 +59,14 @@ def cell_fields(
     Raises:
         ConvergenceError: The linear solver stopped early.
         FoldedMeshError: The map bends more than the layers can follow.
+
+    Example:
+        >>> from alphacut.rve import Phase
+        >>> from alphacut.stochastic import HermiteMap
+        >>> model, radius = PrismModel(mesh_size=0.5, layers=2), HermiteMap(0.2, 0.1, 0.6, 0.1)
+        >>> fields = cell_fields(model, radius, Phase(20e9), Phase(80e9))
+        >>> fields.vtk_cells.shape == fields.cells.shape
+        True
     """
     cell, problem = Cell(matrix, inclusion, radius_map, model.outline), model.problem(radius_map)
     return _fields(problem, cell.stiffness, model.loads(cell), model.options)

@@ -9,11 +9,11 @@ import pytest
 pytest.importorskip("dolfinx")
 
 from alphacut.export.cell_files import FORMATS, write_cell
-from alphacut.export.mesh import MIRRORED, ORDER
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.file import read_grid
+from alphacut.rve.mesh.wedge_orders import MESHIO_ORDER, VTK_OF_MESHIO
 from alphacut.rve.prism.fields import cell_fields
 from alphacut.stochastic import HermiteMap
 from tests.rve.mesh.test_prisms import volumes
@@ -84,7 +84,11 @@ def test_meshio_reads_xdmf_mirrored_and_abaqus_not(written):
     mesh = meshio.read(written)
     (block,) = mesh.cells
     assert block.type == "wedge15"
-    order = np.array(ORDER)[MIRRORED] if written.suffix == ".xdmf" else np.array(ORDER)
+    order = (
+        np.array(MESHIO_ORDER)[VTK_OF_MESHIO]
+        if written.suffix == ".xdmf"
+        else np.array(MESHIO_ORDER)
+    )
     each = volumes(mesh.points, block.data[:, np.argsort(order)])
     assert (each > 0).all()
     assert each.sum() == pytest.approx(VOLUME, rel=1e-10)
