@@ -13,8 +13,13 @@ from itertools import combinations_with_replacement
 from math import comb
 
 import numpy as np
+from numba import njit
 
 from alphacut.fuzzy.arrays import Array, Rows
+
+SMALL = 300_000
+"""Multiplications by one coefficient up to which a loop over all pairs is faster than products of
+arrays, one for each coefficient."""
 
 
 def count(d: int, degree: int) -> int:
@@ -72,7 +77,17 @@ def convolve(
         bilinear: Product that broadcasts over the leading axes.
     """
     at, total = product_places(d, *degrees), count(d, sum(degrees))
-    out = np.zeros((total, *bilinear(a[0], b[0]).shape))
+    shape = bilinear(a[0], b[0]).shape
+    out = np.zeros((total, *shape))
+    inner, longer = (a.shape[-1] if bilinear is matmul else 1), max(len(a), len(b))
+    if longer * out[0].size * inner <= SMALL:
+        if bilinear is matmul and a.ndim == b.ndim == 3:
+            _add_matrix_products(a, b, at, out)
+            return out
+        if bilinear is np.multiply:
+            wide = (np.broadcast_to(c, (len(c), *shape)).reshape(len(c), -1) for c in (a, b))
+            _add_products(*wide, at, out.reshape(total, -1))
+            return out
     if len(a) <= len(b):
         for x in np.flatnonzero(a.reshape(len(a), -1).any(1)):
             out[at[x]] += bilinear(a[x][None], b)
@@ -80,6 +95,33 @@ def convolve(
         for y in np.flatnonzero(b.reshape(len(b), -1).any(1)):
             out[at[:, y]] += bilinear(a, b[y][None])
     return out
+
+
+@njit(cache=True, nogil=True)
+def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
+    """Add entry-by-entry products of all pairs of coefficients (…, v)."""
+    for x in range(len(a)):
+        if not a[x].any():
+            continue
+        for y in range(len(b)):
+            p = at[x, y]
+            for k in range(a.shape[1]):
+                out[p, k] += a[x, k] * b[y, k]
+
+
+@njit(cache=True, nogil=True)
+def _add_matrix_products(a: Array, b: Array, at: Rows, out: Array) -> None:
+    """Add products of all pairs of matrices (…, p, q) and (…, q, r)."""
+    for x in range(len(a)):
+        if not a[x].any():
+            continue
+        for y in range(len(b)):
+            p = at[x, y]
+            for i in range(a.shape[1]):
+                for j in range(a.shape[2]):
+                    factor = a[x, i, j]
+                    for k in range(b.shape[2]):
+                        out[p, i, k] += factor * b[y, j, k]
 
 
 def matmul(a: Array, b: Array) -> Array:

@@ -284,6 +284,25 @@ def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
     return TaylorModel(parts, rest, models[0].inputs, max(x.order for x in models))
 
 
+def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
+    """Taylor models over a part of the box, low ≤ u ≤ high, at the cost of one."""
+    flat = [
+        TaylorModel(
+            tuple(part.reshape(len(part), -1) for part in x.parts),
+            x.rest.ravel(),
+            x.inputs,
+            x.order,
+        )
+        for x in models
+    ]
+    moved, end, found = concatenate(flat, -1).within(low, high), 0, list[TaylorModel]()
+    for x in models:
+        begin, end = end, end + x.rest.size
+        parts = tuple(part[:, begin:end].reshape(len(part), *x.shape) for part in moved.parts)
+        found.append(TaylorModel(parts, moved.rest[begin:end].reshape(x.shape), x.inputs, x.order))
+    return found
+
+
 def inverse_bound(matrix: TaylorModel) -> Array:
     """Bound of |A⁻¹| over the box, entry by entry, by Neumann's series, shape (n, n).
 

@@ -158,16 +158,23 @@ def subspace_series(
     return rate, shape, moved
 
 
-def sharpest(block: Rows, rotation: Array, centre: Centre) -> Block | None:
-    """The block by the least degree that is fine, or the greatest affordable; None if rough."""
+def sharpest(block: Rows, rotation: Array, centre: Centre, enough: float) -> Block | None:
+    """The block by the least degree that is fine, or the greatest affordable; None if rough.
+
+    Args:
+        block: Numbers of its modes.
+        rotation: Of its modes.
+        centre: The structure.
+        enough: Doubt that suffices, `FINE` at least and half of `ROUGH` at most.
+    """
     series: Series | None = None
-    found = None
+    found, enough = None, min(max(enough, FINE), ROUGH / 2)
     for degree in range(DEGREES[0], _max_degree(centre.mass.inputs) + 1):
         series = subspace_series(block, degree, centre, series)
         found = enclosed(block, rotation, series, centre)
         if found is None and degree > DEGREES[0]:
             break  # sizes of all degrees together stand in the way; more of them do not help
-        if found is not None and found.doubt < FINE:
+        if found is not None and found.doubt < enough:
             break
     return found if found is not None and found.doubt < ROUGH else None
 

@@ -53,13 +53,14 @@ class Subspaces:
         return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
 
 
-def subspaces(centre: Centre, used: Rows, wanted: int) -> Subspaces:
+def subspaces(centre: Centre, used: Rows, wanted: int, doubts: Array | None = None) -> Subspaces:
     """Blocks of the lowest modes, from below until one is not enclosed.
 
     Args:
         centre: The structure in the coordinates of the middle of the box.
         used: Inputs that it depends on, among all.
         wanted: How many modes.
+        doubts: Doubt of each mode's λ, as a share of it, that suffices; none unless given.
 
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
@@ -72,7 +73,8 @@ def subspaces(centre: Centre, used: Rows, wanted: int) -> Subspaces:
         steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
         what = "the structure may lose its stiffness"
         raise UnprovedError(what, "take narrower inputs", steepest)
-    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes))
+    doubts = np.zeros(centre.modes) if doubts is None else doubts
+    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), doubts)
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
     slack = gamma(100 * len(weight))  # of norms
     low, high = (1 - slack) * (1 - stiff) / (1 + heavy), (1 + slack) * (1 + stiff) / (1 - heavy)
@@ -157,14 +159,17 @@ def _nearness(centre: Centre, slopes: Array) -> Array:
 
 
 def _from_below(
-    centre: Centre, slopes: Array, wanted: int
+    centre: Centre, slopes: Array, wanted: int, doubts: Array
 ) -> tuple[list[Block], tuple[int, int] | None]:
     """Blocks of the lowest modes; modes that are nearest one another where it ends before."""
     near, blocks = _nearness(centre, slopes), list[Block]()
     free: Rows = np.arange(centre.modes)
     while len(free) and free[0] < wanted:
         modes = _component(near > NEAR, free[:1], free)
-        while (found := sharpest(modes, rotation(centre, modes), centre)) is None:
+        while True:
+            enough = float(doubts[modes].min())
+            if (found := sharpest(modes, rotation(centre, modes), centre, enough)) is not None:
+                break
             outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
             inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)
             if outside[inner, outer] < LEAST_NEAR or len(modes) >= MAX_BLOCK:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -24,8 +25,10 @@ from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.waves import Grid
 from alphacut.fuzzy.arrays import Array, Rows
 
-DEGREE = 6
-"""Degree to which shares are expanded, before those above the third are left to the rest."""
+MAX_PAIRS = 700_000
+"""Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""
+DEGREES = (4, 6)
+"""Least and greatest degree of shares, before what is above the third is left to the rest."""
 Ends = tuple[float, float]
 
 
@@ -49,10 +52,14 @@ class Oscillator:
     omega_range: Ends
     quotient_range: Ends
 
-    def within(self, low: Array, high: Array) -> Oscillator:
-        """The same over a part of the box, low ≤ u ≤ high."""
-        models = (self.omega, self.decay, self.quotient, self.share)
-        omega, decay, quotient, share = (x.within(low, high) for x in models)
+    @property
+    def models(self) -> list[TaylorModel]:
+        """All its models: ω, g, g/ω, c."""
+        return [self.omega, self.decay, self.quotient, self.share]
+
+    def on_part(self, models: Sequence[TaylorModel]) -> Oscillator:
+        """The same over a part of the box, with its models there."""
+        omega, decay, quotient, share = models
         ends = _overlap(_ends(omega), self.omega_range)
         quotients = _overlap(_ends(quotient), self.quotient_range)
         return Oscillator(omega, decay, quotient, share, ends, quotients)
@@ -89,7 +96,7 @@ class BlockShares:
             used: Inputs of the block.
         """
         fixed, varying = excited.value, excited - excited.value
-        block = block.cut(DEGREE)
+        block = block.cut(min(degree_of_shares(block.norm.inputs), block.norm.order))
         if len(varying.present()):
             block = block.cut(excited.order).among(used, excited.inputs)
             driven = block.moved @ fixed.T + block.moved @ varying.T
@@ -113,6 +120,14 @@ class BlockShares:
     def of_sources(self) -> TaylorModel:
         """β·N β of each source, V = (sources,)."""
         return dots(self.driven, self.answer)
+
+
+def degree_of_shares(inputs: int) -> int:
+    """Greatest degree to which products are affordable."""
+    degree = DEGREES[0]
+    while degree < DEGREES[1] and comb(2 * inputs + degree + 1, degree + 1) <= MAX_PAIRS:
+        degree += 1
+    return degree
 
 
 def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -> list[Oscillator]:

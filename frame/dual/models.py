@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.frame.calculus.rounding import gamma
-from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.taylor_model import TaylorModel, all_within
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.clusters import Subspaces, centred, subspaces
 from alphacut.frame.dual.coupling import coupling_of
@@ -38,8 +38,14 @@ class Models:
 
     def within(self, low: Array, high: Array) -> Models:
         """The same over a part of the box, low ≤ u ≤ high."""
-        single = [mode.within(low, high) for mode in self.single]
-        return replace(self, single=single, rests=[x.within(low, high) for x in self.rests])
+        models = [x for mode in self.single for x in mode.models]
+        models += [x for rest in self.rests for x in (rest.share, rest.doubt)]
+        moved = all_within(models, low, high)
+        count = 4 * len(self.single)
+        single = [mode.on_part(moved[4 * k : 4 * k + 4]) for k, mode in enumerate(self.single)]
+        pairs = zip(self.rests, moved[count::2], moved[count + 1 :: 2], strict=True)
+        rests = [replace(rest, share=share, doubt=doubt) for rest, share, doubt in pairs]
+        return replace(self, single=single, rests=rests)
 
     @classmethod
     def of(
@@ -58,10 +64,10 @@ class Models:
         """
         centre, used = centred(structure.mass, structure.stiffness)
         excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
-        wanted = centre.modes
+        wanted, doubts = centre.modes, np.zeros(centre.modes)
         if allowed is not None:
-            wanted = max(1, modes_wanted(structure, centre, excited, excitation, allowed))
-        found = subspaces(centre, used, wanted)
+            wanted, doubts = modes_wanted(structure, centre, excited, excitation, allowed)
+        found = subspaces(centre, used, wanted, doubts)
         if not found.blocks:
             raise UnprovedError(
                 "no mode keeps clear of the others", "take narrower inputs", found.along

@@ -20,6 +20,8 @@ REFINED = 8
 """Rounds that improve bounds of single entries by those of the others."""
 CORNERS = 12
 """Inputs whose signs are all tried together."""
+SMALL = 0.1
+"""Norm of linear terms, as a share of what they are taken from, up to which signs are not tried."""
 
 
 def form_variation(matrix: TaylorModel, scale: Array) -> float:
@@ -33,8 +35,11 @@ def form_variation(matrix: TaylorModel, scale: Array) -> float:
     return low + float(np.linalg.norm(weight * higher, 2))
 
 
-def _linear_norm(terms: Array) -> float:
+def _linear_norm(terms: Array, enough: float = 0.0) -> float:
     """Greatest norm of Σ_i u_i V_i over the box: the largest V_i at all corners, others in sum."""
+    in_sum = _norm_of_terms(terms, np.zeros(len(terms), bool))
+    if in_sum <= enough:
+        return in_sum
     terms = terms[np.argsort(-np.linalg.norm(terms, axis=(1, 2)))]
     first, others = terms[:CORNERS], terms[CORNERS:]
     signs = 1 - 2 * (np.arange(2 ** (len(first) - 1))[:, None] >> np.arange(len(first)) & 1)
@@ -109,7 +114,7 @@ class Pencil:
         norms = [float(np.linalg.norm(size[block] * weight, 2)) for size in self.sizes[1:]]
         line, bend = (part[:, o[:, None], o] * weight for part in (self.linear, self.quadratic))
         of_rounding = [float(np.linalg.norm(x[block] * weight, 2)) for x in self.rounding]
-        norms[0] = min(norms[0], _linear_norm(line) + of_rounding[0])
+        norms[0] = min(norms[0], _linear_norm(line, SMALL) + of_rounding[0])
         squares = _squares(len(line))
         norms[1] = min(norms[1], _norm_of_terms(bend, squares) + of_rounding[1])
         return sum(norms) + gamma(100 * len(o))

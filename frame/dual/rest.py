@@ -15,14 +15,14 @@ a Taylor model: at inputs where A is large B is often small.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from alphacut.frame.calculus.monomials import convolve, matmul
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.dual.clusters import Subspaces
-from alphacut.frame.dual.intervening import DEGREE, BlockShares, Ends, damped_range, dots
+from alphacut.frame.dual.intervening import BlockShares, Ends, damped_range, dots
 from alphacut.frame.dual.ranges import Ranges, response_ranges
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.structures.linear import Accelerogram
@@ -56,11 +56,6 @@ class Rest:
     def width(self) -> Array:
         """Bound of the half width at the node where it is greatest, shape (m,)."""
         return np.asarray((self.doubt.size()[..., None] * self.half).max(-1).sum(0))
-
-    def within(self, low: Array, high: Array) -> Rest:
-        """The same over a part of the box, low ≤ u ≤ high."""
-        share, doubt = (x.within(low, high) for x in (self.share, self.doubt))
-        return replace(self, share=share, doubt=doubt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +100,7 @@ def rest_of_modes(
     others = found.others
     if not len(others):
         return None
-    sums = _of_all(found, *coordinates)
+    sums = _of_all(found, *coordinates, max(x.block.norm.order for x in shares))
     for of_block in shares:
         sums = sums.less(_of_block(of_block))
     low, high = float(found.low[others].min()), float(found.high[others].max())
@@ -138,10 +133,9 @@ def _known_by(
     return _least(structure, _bounds(sums, structure, found), ranges)
 
 
-def _of_all(found: Subspaces, read: TaylorModel, excited: TaylorModel) -> _Sums:
+def _of_all(found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int) -> _Sums:
     """Sums over all modes of outputs `read` and sources, which may depend on the inputs."""
-    centre, order = found.centre, DEGREE
-    mass, stiffness = centre.mass, centre.stiffness
+    centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
     if len(excited.present()):
         order, d = excited.order, excited.inputs
         mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))

@@ -1,4 +1,4 @@
-"""How many modes are worth enclosing: an estimate at the middle of the box."""
+"""How many modes are worth enclosing, and how well: an estimate at the middle of the box."""
 
 from __future__ import annotations
 
@@ -23,10 +23,14 @@ def modes_wanted(
     excited: TaylorModel,
     excitation: Excitation,
     allowed: Array,
-) -> int:
+) -> tuple[int, Array]:
     """Least number of modes from below beside which the others' doubt is allowed.
 
     The doubt is that of `rest`, with sums and responses in the middle of the box.
+
+    Returns:
+        The number, and the doubt of each mode's λ, as a share of it, that moves an output by what
+        is allowed, shape (n,).
 
     Args:
         structure: The structure.
@@ -44,12 +48,14 @@ def modes_wanted(
     a, b = structure.rayleigh.value
     decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
     omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
-    doubt = np.zeros((n, len(allowed)))
+    doubt, moved = np.zeros((n, len(allowed))), np.zeros((n, len(allowed)))
     sigma = -decay + 1j * omega
     motions = {source: _motion(source, sigma, ground, time) for source in sources}
     for o, order in enumerate(structure.order):
         for s, source in enumerate(sources):
-            waves = _waves(source, sigma, motions[source], int(order))
+            waves = _waves(source, sigma, motions[source][0], int(order))
+            steep = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
+            moved[:, o] += np.abs(read[o] * given[s]) * steep  # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
             each = []
             for power in POWERS:
                 row, share = (
@@ -62,14 +68,16 @@ def modes_wanted(
                 each.append(np.sqrt(row * share) * half.max(1))
             doubt[:, o] += np.min(each[light[o] :], axis=0)
     enough = np.flatnonzero((doubt <= allowed).all(1))
-    return int(enough[0]) if len(enough) else n
+    wanted = max(int(enough[0]), 1) if len(enough) else n
+    return wanted, np.min(allowed / np.maximum(moved, 1e-300), axis=1)
 
 
 def _motion(source: str, sigma: Array, ground: Accelerogram | None, time: Array) -> Array:
-    """ρ(σ; t) of a load, or exp(σ t), at nodes, shape (modes, T)."""
+    """ρ(σ; t) of a load, or exp(σ t), and its derivative by σ at nodes, shape (2, modes, T)."""
     if source == "load" and ground is not None:
-        return np.asarray(responses_at_nodes(sigma, ground, time, 1)[0][0].T)
-    return np.asarray(np.exp(sigma[:, None] * time))
+        return np.asarray(responses_at_nodes(sigma, ground, time, 1)[0].swapaxes(1, 2))
+    free = np.exp(sigma[:, None] * time)
+    return np.stack([free, time * free])
 
 
 def _waves(source: str, sigma: Array, motion: Array, order: int) -> Array:

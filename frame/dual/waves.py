@@ -21,12 +21,13 @@ from dataclasses import dataclass
 from math import comb, perm
 
 import numpy as np
+from numba import njit
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.response.step_integrals import require_in_range
 from alphacut.frame.structures.linear import Accelerogram
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,23 +186,33 @@ def absolute_moments(decay: float, ground: Accelerogram, time: Array) -> Array:
     a, h = np.abs(np.asarray(ground.acceleration)), ground.step
     largest = np.append(np.maximum(a[1:], a[:-1]), 0.0)
     last = np.minimum((time / h * (1 + 1e-12)).astype(int), 10**9)
-    out: Array = np.zeros((5, len(time)))
-    state: Array = np.zeros(5)
-    node = 0
-    for i in range(int(last.max()) + 1):
-        size = largest[i] if i < len(largest) else 0.0
-        while node < len(time) and last[node] == i:
-            out[:, node] = _moved(state, decay, max(time[node] - i * h, 0.0), size)
-            node += 1
-        state = _moved(state, decay, h, size)
+    out: Array = np.empty((5, len(time)))
+    _walk_moments(largest, last, np.maximum(time - last * h, 0.0), decay, h, out)
     return out
 
 
-def _moved(state: Array, decay: float, h: float, size: float) -> Array:
+@njit(cache=True, nogil=True)
+def _walk_moments(
+    largest: Array, last: Rows, phase: Array, decay: float, h: float, out: Array
+) -> None:
+    """Moments at nodes `phase` after samples `last`, which rise."""
+    state, moved, node = np.zeros(5), np.empty(5), 0
+    for i in range(last[-1] + 1):
+        size = largest[i] if i < len(largest) else 0.0
+        while node < len(last) and last[node] == i:
+            _move_moments(state, decay, phase[node], size, out[:, node])
+            node += 1
+        _move_moments(state, decay, h, size, moved)
+        state[:] = moved
+
+
+@njit(cache=True, nogil=True)
+def _move_moments(state: Array, decay: float, h: float, size: float, out: Array) -> None:
     """Moments a time h later, under an acceleration of at most `size`."""
-    turned = [
-        np.exp(-decay * h) * sum(comb(n, j) * h ** (n - j) * state[j] for j in range(n + 1))
-        + size * h ** (n + 1) / (n + 1)
-        for n in range(5)
-    ]
-    return np.array(turned)
+    fade = np.exp(-decay * h)
+    for n in range(5):
+        total, choices = 0.0, 1.0
+        for j in range(n, -1, -1):  # Σ C(n, j) h^(n − j) state_j
+            total += choices * h ** (n - j) * state[j]
+            choices *= j / (n - j + 1)
+        out[n] = fade * total + size * h ** (n + 1) / (n + 1)

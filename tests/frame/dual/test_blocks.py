@@ -181,7 +181,7 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         return least(structure, narrow, ranges)
 
     monkeypatch.setattr(rest, "_least", chosen)
-    monkeypatch.setattr("alphacut.frame.dual.models.modes_wanted", lambda *_: 1)
+    monkeypatch.setattr("alphacut.frame.dual.models.modes_wanted", lambda *_: (1, np.zeros(9)))
     models = Models.of(structure, (RECORD, time, ("load",)), np.ones(1))
     (others,) = models.rests
     assert len(models.single) == 1
