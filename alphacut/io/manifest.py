@@ -55,7 +55,8 @@ class ResultsFolder:
     Args:
         path: The folder; it may be a link itself.
         parts: Files by the name of their stage.
-        is_lost: Whether there is a manifest that cannot be read.
+        is_lost: Whether there was a manifest that could not be read, so that a run replaces its
+            files although none lists them.
     """
 
     path: Path
@@ -192,7 +193,7 @@ class ResultsFolder:
         """Removes every file that is listed, and the list; links are removed, not followed."""
         for name in _names(self.parts):
             self._remove(name)
-        self.parts = {}
+        self.parts, self.is_lost = {}, False
         self._write()
 
     def _remove(self, name: str, digest: str = "") -> None:
@@ -216,7 +217,6 @@ class ResultsFolder:
         }
         with whole_file(self.path / MANIFEST, follow_links=False) as partial:
             partial.write_text(as_json(document, indent=1), encoding="utf-8")
-        self.is_lost = False
 
 
 def read_regular(file: Path) -> bytes:

@@ -185,6 +185,45 @@ def test_fresh_removes_what_is_listed_and_nothing_else(finished, tmp_path):
     assert {x.name for x in copy.iterdir()} == before - {"report.html", "figures.json"}
 
 
+def test_what_was_changed_or_is_no_file_is_not_removed(tmp_path):
+    source, out = tmp_path / "source", tmp_path / "out"
+    source.mkdir()
+    names = ("changed", "pipe", "same")
+    for name in names:
+        (source / name).write_text(name)
+    folder = ResultsFolder(out)
+    folder.put("figures", "1", source)
+    (out / "changed").write_text("precious")
+    (out / "pipe").unlink()
+    os.mkfifo(out / "pipe")
+    for name in names:
+        (source / name).unlink()
+    (source / "other").write_text("other")
+    folder.put("figures", "2", source)
+    assert sorted(x.name for x in out.iterdir()) == ["changed", "manifest.json", "other", "pipe"]
+    folder.list_files("figures", "3", {"pipe": ""})
+    folder.clear()
+    assert (out / "pipe").is_fifo()
+
+
+def test_a_manifest_lists_no_file_outside(tmp_path):
+    (tmp_path / "precious").write_text("precious")
+    (tmp_path / "out").mkdir()
+    ResultsFolder(tmp_path / "out").list_files("figures", "1", {"../precious": ""})
+    folder = ResultsFolder.opened(tmp_path / "out")
+    folder.clear()
+    assert (tmp_path / "precious").exists()
+
+
+def test_a_name_damaged_in_the_manifest_costs_a_computation(finished, tmp_path):
+    case, out, _ = finished
+    shutil.copytree(out, tmp_path / "out")
+    manifest = tmp_path / "out" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace("modulus.nc", "modulur.nc"))
+    assert run(case, tmp_path / "out", "--no-figures") == 0
+    assert numbers(tmp_path / "out")["modulus"] == numbers(out)["modulus"]
+
+
 def test_fresh_does_not_use_a_store_that_it_may_not_remove(finished, tmp_path, capfd):
     case, out, _ = finished
     copy = tmp_path / "out"

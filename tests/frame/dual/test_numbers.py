@@ -1,13 +1,17 @@
 """Numbers of the dual proof: fast modes, crisp inputs, threads, and what is not finite."""
 
+from collections import defaultdict
+from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from alphacut.frame import StoreyFrame, envelope
+from alphacut.frame import StoreyFrame, envelope, parts
 from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.certificate import branch_and_bound
+from alphacut.frame.dual import level, proof
 from alphacut.frame.dual.dual_function import deflected, require_in_range
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.proof import DualProof
@@ -120,15 +124,68 @@ def test_threads_do_not_change_a_bit():
             assert (getattr(first, name) == getattr(other, name)).all()
 
 
-def test_a_pass_compares_with_what_is_known_when_it_begins():
-    """A peak found by one block while the pass runs does not change what another block does."""
-    model, fuzzy = CASES["matrices"]
-    level, _, _ = level_of(model, fuzzy, np.arange(0, 3.01, 0.1))
-    problem = Problem.of(level, 0, 1, 1e-6)
-    effort = problem.effort(4, 20, 1.0, 0.0)
-    problem.out[1, 5] = 99.0
-    assert problem.effort(4, 20, 1.0, 0.0).top == 99.0
-    assert effort.top == 0.0
+class LastFirst:
+    """Executor that runs what waits when a result is asked for, last submitted first."""
+
+    def __init__(self, workers):
+        self.waiting = []
+
+    def submit(self, function, *arguments):
+        future = Future()
+        future.result = lambda timeout=None: self.finished(future)
+        self.waiting.append((future, function, arguments))
+        return future
+
+    def finished(self, future):
+        while self.waiting:
+            other, function, arguments = self.waiting.pop()
+            other.set_result(function(*arguments))
+        return Future.result(future)
+
+    def map(self, function, *arguments):
+        futures = [self.submit(function, *row) for row in zip(*arguments, strict=False)]
+        return (future.result() for future in futures)
+
+    def shutdown(self, **_):
+        self.waiting.clear()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        assert not self.waiting
+
+
+@pytest.mark.parametrize(
+    ("case", "method"),
+    [("matrices", DualProof(peaks=0.01)), ("record", Proof(tolerance=1e-2))],
+    ids=["dual", "proof"],
+)
+def test_the_order_in_which_threads_end_changes_no_bit(monkeypatch, case, method):
+    model, fuzzy = CASES[case][0], dict([*CASES[case][1].items()][:2])
+    given = {"duration": 2.0, "step": 0.02, "alpha": (0, 0.5), "progress": False}
+    usual = envelope(model, fuzzy, method=replace(method, workers=1), **given)
+    monkeypatch.setattr(branch_and_bound, "PIECE", 100)
+    for module in (branch_and_bound, level, parts, proof):
+        monkeypatch.setattr(module, "ThreadPoolExecutor", LastFirst)
+    adverse = envelope(model, fuzzy, method=replace(method, workers=3), **given)
+    for name in ("lower", "upper", "lower_at", "upper_at", "between"):
+        assert (getattr(usual, name) == getattr(adverse, name)).all()
+
+
+def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
+    """A peak that a block finds changes nothing for the other blocks of its pass."""
+    tops = defaultdict(set)
+
+    def improve(problem, nodes, effort):
+        tops[id(problem), effort.slabs].add(effort.top)
+        problem.out[1, nodes] = problem.top + 1.0
+
+    monkeypatch.setattr(Problem, "improve", improve)
+    over, _, _ = level_of(*CASES["matrices"], np.arange(0, 3.01, 0.02))
+    over.bounds(np.full(len(over.structure.order), 1e-6), 2, 20, workers=1)
+    assert len(tops) > 3
+    assert {len(seen) for seen in tops.values()} == {1}
 
 
 def problem_of_matrices():
