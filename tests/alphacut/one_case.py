@@ -30,7 +30,7 @@ samples = 20
 [decision]
 limits = ["q2 <= 300 mm", "drift1 <= 5 %"]
 [tolerances]
-limits = ["q2 <= 400 mm"]
+limits = ["q2 <= 280 mm"]
 most = 3
 """
 

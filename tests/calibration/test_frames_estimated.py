@@ -40,6 +40,16 @@ def wide(rng):
     return replace(drawn, inputs={"k1": Interval(0.03 * value, 30 * value)})
 
 
+def require_reached(found, flow, rng, count=20):
+    """Requires that the motions which an envelope names take its values, at random nodes."""
+    _, nodes, outputs = found.upper.shape
+    at = rng.integers(nodes, size=count), rng.integers(outputs, size=count)
+    for bound, points in ((found.lower, found.lower_at), (found.upper, found.upper_at)):
+        values = flow.values(points[0][at])[np.arange(count), *at]
+        size = np.abs(bound[0]).max(0)[at[1]]
+        assert (np.abs(values - bound[0][at]) <= 1e-6 * size).all()
+
+
 KINDS = {"usual": usual, "undamped": undamped, "large steps": large_steps, "wide": wide}
 
 
@@ -60,5 +70,7 @@ def test_errors_of_searches_and_followers_cover(kind):
             natures.add(found.nature)
             case = number, method.name, *drawn.inputs
             judged(table, found, ends, method.name, case, tolerance=TOLERANCE)
-    if natures != {Nature.ATTAINED}:  # which promise nothing
+            if found.nature is Nature.ATTAINED:  # which promises what some motion does
+                require_reached(found, exact_flow(drawn), rng)
+    if natures != {Nature.ATTAINED}:
         table.judge()

@@ -103,12 +103,12 @@ CELLS = [
     ("a2 = [0.1, 0.2, 0.3]\n", "", "radius.a2"),
     ("matrix_poisson = 0.3", "matrix_poisson = 0.5", "cell.matrix_poisson"),
     ('method = "series"', 'method = "prism"\n[cell2]\n', "cell2"),
-    ("[cell]", '[cell]\nparticles = "spheres"', ""),
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "key"), CELLS[:-1])
+@pytest.mark.parametrize(("old", "new", "key"), CELLS)
 def test_what_is_wrong_with_a_cell(tmp_path, old, new, key):
+    assert old in CELL
     assert key in [p.key for p in problems(tmp_path, CELL.replace(old, new))]
 
 
