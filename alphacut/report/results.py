@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from alphacut.frame.structures.quantities import Output
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, between
 from alphacut.questions.all import QUESTIONS
@@ -79,13 +79,18 @@ def width_text(image: Document) -> str:
 
 
 def motion(summary: Document) -> Table:
-    """Peak of the magnitude of each output: nominal, on two levels, error, limit and verdict."""
+    """Peaks of all outputs: nominal, on one or two levels, error or gap, limit and verdict."""
     studies = summary.get("envelopes", {})
     if not studies:
         return (), []
     alpha = [float(x) for x in next(iter(studies.values()))["alpha"]]
     middle = min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5))
-    levels = list(dict.fromkeys((len(alpha) - 1, middle, 0)))
+    has_gaps = any(
+        peak["nature"] == Nature.GUARANTEED
+        for study in studies.values()
+        for peak in study["peak"].values()
+    )
+    levels = list(dict.fromkeys((len(alpha) - 1, *([] if has_gaps else [middle]), 0)))
     titles = [f"α = {alpha[k]:g}" for k in levels]
     limits = limits_of(summary)
     rows: list[Row] = []
@@ -101,10 +106,26 @@ def motion(summary: Document) -> Table:
                     cuts.append(between(factor * low, factor * high, nature, 4 - (k > 0)))
                 limit, verdict = limits.get(output, (None, ""))
                 words = "" if limit is None else f"{limit * factor:.4g}", EXCEEDED.get(verdict, "")
-                rows.append((label + where, *cuts, error_text(factor * error, nature), *words))
+                cuts += [error_text(factor * error, nature), *reached(peak, factor)]
+                rows.append((label + where, *cuts, *words))
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
-    return filled(("peak of", *titles, "± error", "limit", "exceeded"), rows)
+    head = ("peak of", *titles, "± error", "reached", "gap", "limit", "exceeded")
+    return filled(head, rows)
+
+
+def reached(peak: Document, factor: float) -> tuple[str, str]:
+    """What a motion reaches of a proved peak on the lowest level, and the gap, a share of it."""
+    if Nature(peak["nature"]) is not Nature.GUARANTEED:
+        return "", ""
+    value = rounded(factor * float(peak["reached"][0]), "upper", Nature.ATTAINED)
+    return f"{value:.4g}", f"{peak_gap(peak, 0):.1%}"
+
+
+def peak_gap(peak: Document, level: int) -> float:
+    """Distance of a peak that is not exceeded from one that is reached, as a share of it."""
+    above = float(peak["upper"][level])
+    return 1 - float(peak["reached"][level]) / above if above > 0 else 0.0
 
 
 def nominal(peak: Document, factor: float, nature: Nature) -> str:

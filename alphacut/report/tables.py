@@ -24,6 +24,7 @@ from alphacut.report.results import (
     material,
     motion,
     natures,
+    peak_gap,
 )
 
 if TYPE_CHECKING:
@@ -144,9 +145,10 @@ def peaks(studies: Document) -> Table:
                 reached = rounded(peak["reached"][level], "upper", Nature.ATTAINED, DIGITS)
                 error = f"{peak['error'][level]:.2g}"
                 first = (name, output, Output(output).unit, f"{alpha:g}")
-                rows.append((*first, *values, error, str(nature), _number(reached)))
+                last = _number(reached), f"{peak_gap(peak, level):.2g}"
+                rows.append((*first, *values, error, str(nature), *last))
     head = ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature")
-    return (*head, "peak reached"), rows
+    return (*head, "peak reached", "gap, share"), rows
 
 
 def records(part: Document) -> Table:

@@ -60,6 +60,8 @@ def test_one_peak_has_one_value_in_every_place(building):
         for level, row in enumerate(here):
             upper = rounded(peak["upper"][level], "upper", nature, 6)
             assert float(row["greatest peak"]) == pytest.approx(upper, rel=1e-9)
+            gap = 1 - peak["reached"][level] / peak["upper"][level]
+            assert float(row["gap, share"]) == pytest.approx(gap, rel=0.06)
         factor, _ = axis_prefix(peak["upper"][0], "m")
         shown = between(factor * peak["lower"][0], factor * peak["upper"][0], nature)
         assert shown in page

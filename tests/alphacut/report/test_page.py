@@ -101,6 +101,14 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
     assert rows[4][:4] == ("  % of weight", "2.000", "1.00 … 3.00", "1.000 … 4.000")
 
 
+def test_a_proved_peak_stands_beside_the_reached_one_and_their_gap():
+    case = peaks_of(q1=([0.001, 0.0015, 0.002], [0.004, 0.003, 0.002]))
+    case["envelopes"]["all"]["peak"]["q1"] |= {"nature": "guaranteed", "reached": [0.0039, 0, 0]}
+    head, rows = motion(case)
+    assert head[-2:] == ("reached", "gap")
+    assert rows[0][-2:] == ("3.9", "2.5%")
+
+
 def test_what_drives_the_peak_is_one_line_of_the_largest_shares():
     shares = {"q1": {"E": 0.1}, "q2": {"E": 0.2, "m1": 0.5, "d": 0.05, "l": 0.3}}
     peaks = {f"the peak of {name}": one for name, one in shares.items()}
