@@ -48,18 +48,30 @@ def reuss_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
     return np.asarray(np.linalg.inv(voigt_of_phases(fractions, compliance)), float)
 
 
-def bulk_bounds_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Bounds of the in-plane bulk modulus of any number of isotropic phases, shape (2, …).
+def hashin_shtrikman_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
+    """Bounds of K and G of phases that are isotropic across their fibres, in plane strain, in Pa.
 
-    Hashin and Shtrikman's with the extreme shear moduli of all phases (Walpole 1969).
+    Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); of any number of
+    phases and with the extreme moduli of either Walpole (ibid. 17, 235, 1969). That of K holds for
+    hydrostatic strain of any arrangement, that of G for isotropic ones.
+
+    Args:
+        fractions: Of area, shape (phases, …).
+        stiffness: Of the phases, (3, 3) each.
+
+    Returns:
+        Shape (2 moduli, 2 ends, …).
     """
     bulk = np.array([float(bulk_modulus(one)) for one in stiffness])
-    shear = [float(one[2, 2]) for one in stiffness]
-    ends = [
-        1 / np.tensordot(1 / (bulk + around), fractions, axes=1) - around
-        for around in (min(shear), max(shear))
-    ]
-    return np.array(ends)
+    shear = np.array([float(one[2, 2]) for one in stiffness])
+    ends = []
+    for end in (np.min, np.max):
+        k, g = end(bulk), end(shear)
+        pairs = ((bulk, g), (shear, g * k / (k + 2 * g)))
+        ends.append(
+            [1 / np.tensordot(1 / (moduli + x), fractions, axes=1) - x for moduli, x in pairs]
+        )
+    return np.swapaxes(np.array(ends), 0, 1)
 
 
 def bulk_modulus(stiffness: Array) -> Array:
@@ -74,25 +86,10 @@ def harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> 
 
 
 def hashin_shtrikman(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
-    """Bounds of K and G of parallel fibres that are isotropic across, in plane strain, in Pa.
-
-    Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); with the extreme
-    moduli of either phase Walpole (ibid. 17, 235, 1969).
-
-    Returns:
-        Shape (2 moduli, 2 ends, …) for area fractions of shape (…).
-    """
+    """Bounds of K and G of two phases, as `hashin_shtrikman_of_phases`, for fractions (…)."""
     share = np.asarray(fraction, float)
     phases = (matrix.stiffness, inclusion.stiffness)
-    first, second = (float(bulk_modulus(stiffness)) for stiffness in phases)
-    bulks, shears = (first, second), (float(phases[0][2, 2]), float(phases[1][2, 2]))
-    ends = []
-    for end in (min, max):
-        bulk, shear = end(bulks), end(shears)
-        around = (shear, shear * bulk / (bulk + 2 * shear))
-        pairs = zip((bulks, shears), around, strict=True)
-        ends.append([harmonic_about(share, pair, x) for pair, x in pairs])
-    return np.swapaxes(np.array(ends), 0, 1)
+    return hashin_shtrikman_of_phases(np.array([1 - share, share]), phases)
 
 
 def mori_tanaka(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:

@@ -188,6 +188,23 @@ class HomogenisedStiffness:
             return np.full(3, np.nan)
         return np.asarray(np.prod([1 + error for error in self.errors.values()], axis=0) - 1)
 
+    @property
+    def stiffness_errors(self) -> Array | None:
+        """Declared absolute errors of the entries of the mean plane stiffness, (3, 3), in Pa.
+
+        Those of the diagonal follow from C11 + C12 and C11 − C12, also with C22 in place of C11.
+        Approximate fields can only have more energy: the error is a positive semidefinite matrix,
+        whose entries are at most √(δC_ii δC_jj).
+        """
+        C, (bulk, deviator, shear) = self.stiffness, self.modulus_errors
+        if C is None or C.shape != (3, 3):
+            return None
+        axial = [
+            (bulk * abs(C[k, k] + C[0, 1]) + deviator * abs(C[k, k] - C[0, 1])) / 2 for k in (0, 1)
+        ]
+        diagonal = np.array([*axial, shear * C[2, 2]])
+        return np.asarray(np.sqrt(np.outer(diagonal, diagonal)))
+
     def error_of(self, function: Callable[[Array], Array | float]) -> Array:
         """Declared absolute error of a function of the three moduli, of its shape.
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
+
+import numpy as np
 
 from alphacut.case.content import Content
 from alphacut.commands.options import Command, add_common, answer, read
@@ -118,6 +121,7 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
     ]
     for key, number in document["fibres"].items():
         rows.append((fibre_label(key), f"{number['value']:.6g}", f"{number['error']:.1e}"))
+    rows += [*plane_rows(document)]
     if ends := document["references"].get("hashin_shtrikman_E_GPa"):
         rows.append((f"{ISOTROPIC}, GPa", f"{ends[0]:.4f} … {ends[1]:.4f}", ""))
     if "difference" in document:
@@ -129,5 +133,20 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
     )
 
 
+def plane_rows(document: Document) -> Iterator[tuple[str, str, str]]:
+    """Entries of the plane stiffness, and the constants along x and y of both definitions."""
+    stiffness, errors = document["stiffness_GPa"], document["stiffness_error_GPa"]
+    if not document["plane"]:
+        return
+    for i, j in zip(*np.triu_indices(3), strict=True):
+        off = "not declared" if errors is None else f"{errors[i, j]:.1e}"
+        yield f"C{VOIGT[i]}{VOIGT[j]}, GPa", f"{stiffness[i, j]:.6g}", off
+    for definition, constants in document["plane"].items():
+        for key, number in constants.items():
+            off = "not declared" if number["error"] is None else f"{number['error']:.1e}"
+            yield f"{fibre_label(key)} ({definition})", f"{number['value']:.6g}", off
+
+
+VOIGT = "126"  # 11, 22 and 12
 ABOUT = "effective modulus and stresses of the cell at the modal values"
 COMMANDS = dict.fromkeys(("cell", "solve"), Command(ABOUT, arguments, run))

@@ -14,8 +14,10 @@ from alphacut.io.netcdf import read_dataset
 from alphacut.io.quantity import between
 from alphacut.report.results import ISOTROPIC, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
+from alphacut.rve.phase_energies import CONSTANTS
 from alphacut.stages.identify import learned
 from alphacut.stages.pipeline import Pipeline
+from alphacut.stages.plane import ONLY, cut_tables
 from alphacut.stages.results import Results
 from alphacut.stochastic.microstructure_summary import fragment
 
@@ -56,12 +58,32 @@ def summary(document: Document) -> str:
     ]
     head = ("of fibres", *(f"α = {document['alpha'][k]:g}" for k in levels))
     ends = document["references"].get("hashin_shtrikman_E_GPa")
+    plane = document["plane"]
     return (
         (text_table(head, fibres) if fibres else "")
+        + (plane_text(plane) if plane else "")
+        + (loss_text(document["loss"]) if "loss" in document else "")
         + (f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else "")
         + f"{document['samples']} samples, {document['solves']} linear systems,"
         f" {document['seconds']:.1f} s, {document['method']}\n"
     )
+
+
+def plane_text(cuts: Document) -> str:
+    """Constants along x and y."""
+    text = "".join(text_table(*table) for table in cut_tables(cuts))
+    return text if "nu_xy_free" in cuts else f"{text}{ONLY}\n"
+
+
+def loss_text(losses: Document) -> str:
+    """Loss factors on two levels, with their errors."""
+    rows = []
+    for name in CONSTANTS:
+        low, high = losses[name]["lower"], losses[name]["upper"]
+        ends = (between(low[k], high[k], Nature.ATTAINED, 4) for k in (0, -1))
+        error = f"{losses['error'][name]:.1e}" if losses["error"] else "not declared"
+        rows.append((f"loss factor of {name}", *ends, error))
+    return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
 
 
 def add_envelope(parser: argparse.ArgumentParser) -> None:

@@ -51,10 +51,14 @@ def material(summary: Document) -> Table:
         off = error_text(error, nature) if part.get("particles") != "mesh" else "not declared"
         rows.append((name, *ends, str(nature), off))
         others = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
-        others |= {"loss factor of E": part.get("loss", {}).get("E")}
         for label, of in others.items():
             if of:
                 rows.append((label, cut(of, -1, nature), cut(of, 0, nature), str(nature), ""))
+        if loss := part.get("loss"):
+            nature, error = Nature(loss["nature"]), loss["error"].get("E")
+            ends = cut(loss["E"], -1, nature), cut(loss["E"], 0, nature)
+            off = "" if error is None else error_text(error, nature)
+            rows.append(("loss factor of E", *ends, str(nature), off))
     for name, (low, modal, high) in summary.get("damping", {}).items():
         ends = (between(*pair, Nature.ATTAINED, 4) for pair in ((modal, modal), (low, high)))
         rows.append((f"damping ratio {name}", *ends, str(Nature.ATTAINED), ""))

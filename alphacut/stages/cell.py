@@ -12,12 +12,14 @@ import numpy as np
 from alphacut.case.material import AnyRadius, Mesh, ModulusSection, RoundCell, ThetaSection
 from alphacut.case.meshed import MeshedCell
 from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.io.files import Document
 from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
 from alphacut.rve import bounds
 from alphacut.rve.cell import STRAIN, Cell, Phase
+from alphacut.rve.engineering_constants import NAMES, engineering_constants
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.outline import circle
 from alphacut.rve.result import HomogenisedStiffness, effective_modulus
@@ -153,8 +155,8 @@ def references(
 ) -> Document:
     """Fraction of the particles, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E in GPa.
 
-    They are of the modal inputs; the fraction alone of particles that are not round and isotropic,
-    none of a mesh from a file.
+    They are of the modal inputs; the fraction alone of particles that are not isotropic, none of a
+    mesh from a file.
 
     Args:
         radius: Random radius.
@@ -168,24 +170,35 @@ def references(
     map_of, matrix, inclusion = modal.radius, modal.matrix, modal.inclusion
     rule, spheres = gauss_rule(map_of.distribution, points=40), cell.particles == "spheres"
     radii = map_of(rule.nodes)
-    share = np.asarray(rule.mean(volume_fraction(radii) if spheres else np.pi / 4 * radii**2))
-    if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or not modal.square:
+    shares = volume_fraction(radii) if spheres else modal.fraction(rule.nodes)
+    share = np.asarray(rule.mean(shares))
+    if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase):
         return {"fraction": float(share)}
     beside = {} if stated is None else {"fraction_of_case": stated}
     fraction, share = float(share), share if stated is None else np.asarray(stated)
     if spheres:
         ends = space_bounds.hashin_shtrikman(share, matrix, inclusion).T
-        moduli = [_young(*k) for k in (*ends, space_bounds.mori_tanaka(share, matrix, inclusion))]
+        limits = [_young(*k) / GPA for k in ends]
+        estimate = _young(*space_bounds.mori_tanaka(share, matrix, inclusion))
     else:
-        ends = bounds.hashin_shtrikman(share, matrix, inclusion).T
+        fractions = np.array([1 - share, share])
+        limits = isotropic_bounds(fractions, [matrix.stiffness, inclusion.stiffness])
         whole, _, shear = bounds.mori_tanaka(share, matrix, inclusion)
-        moduli = [_across(*k) for k in (*ends, (whole / 2, shear))]
-    return {
-        "fraction": fraction,
-        **beside,
-        "hashin_shtrikman_E_GPa": [moduli[0] / GPA, moduli[1] / GPA],
-        "mori_tanaka_E_GPa": moduli[2] / GPA,
-    }
+        estimate = _across(whole / 2, shear)
+    found = {"fraction": fraction, **beside, "hashin_shtrikman_E_GPa": limits}
+    # the estimate is of round particles
+    return found | ({"mori_tanaka_E_GPa": estimate / GPA} if modal.square or spheres else {})
+
+
+def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> list[float]:
+    """Hashin and Shtrikman's bounds of E of an isotropic plane in GPa, from those of K and G.
+
+    Args:
+        fractions: Of area of the phases, shape (phases,).
+        stiffness: Of the phases in Pa, (3, 3) each.
+    """
+    ends = bounds.hashin_shtrikman_of_phases(fractions, stiffness).T
+    return [_across(*end) / GPA for end in ends]
 
 
 def _across(bulk: float, shear: float) -> float:
@@ -207,6 +220,8 @@ def document(result: HomogenisedStiffness) -> Document:
         "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA},
         "fibres": fibres(result),
         "stiffness_GPa": None if result.stiffness is None else result.stiffness / GPA,
+        "stiffness_error_GPa": stiffness_errors(result),
+        "plane": plane_constants(result),
         "curve": {
             "theta": result.curve.theta,
             "weights": result.curve.weights,
@@ -234,6 +249,23 @@ def fibres(result: HomogenisedStiffness) -> Document:
         key, unit = (name, 1.0) if name == "nu_LT" else (f"{name}_GPa", GPA)
         fibres[key] = {"value": value / unit, "error": constants.errors[name] / unit}
     return fibres
+
+
+def stiffness_errors(result: HomogenisedStiffness) -> Array | None:
+    """Declared errors of the entries of a plane stiffness, in GPa; None where there are none."""
+    errors = result.stiffness_errors if result.errors else None
+    return None if errors is None else errors / GPA
+
+
+def plane_constants(result: HomogenisedStiffness) -> Document:
+    """Constants along x and y by definition and name, with their declared errors, in GPa."""
+    document: Document = {}
+    for definition, constants in engineering_constants(result).items():
+        for name, value, error in zip(NAMES, constants.values, constants.errors, strict=True):
+            key, unit = (name, 1.0) if name == "nu_xy" else (f"{name}_GPa", GPA)
+            shown = None if np.isnan(error) else error / unit
+            document.setdefault(definition, {})[key] = {"value": value / unit, "error": shown}
+    return document
 
 
 def declared_errors(result: HomogenisedStiffness) -> Document | None:

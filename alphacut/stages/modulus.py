@@ -24,7 +24,7 @@ from alphacut.fuzzy import (
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.refused import require
-from alphacut.fuzzy.result import Bounds
+from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest, source_digest, versions
@@ -43,6 +43,7 @@ from alphacut.stages.cell import (
     solve,
 )
 from alphacut.stages.losses import LossCuts, loss_bounds
+from alphacut.stages.plane import PLANE, plane_outputs
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
 
@@ -107,6 +108,7 @@ class CellTask:
             "nu": result.poisson,
             **dict(zip(("s11", "s12"), curve.mean, strict=True)),
             **{name: fibres[name] for name in FIBRES if name in fibres},
+            **plane_outputs(result),
             "systems": len(result.iterations),
             "curve11": between_nodes(curve.theta, curve.s11, theta_of(self.radius)),
             **{f"error:{name}": result.error.get(name, 0.0) for name in ("space", "theta")},
@@ -259,7 +261,9 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
     assert samples is not None
     variables: dict[str, Any] = {}
     cuts: dict[str, Document] = {}
-    for name, (unit, about) in (BOUNDS | (FIBRES if campaign.cell.fibres else {})).items():
+    for name, (unit, about) in (BOUNDS | FIBRES | PLANE).items():
+        if name not in result.outputs:
+            continue
         words, column = {"units": unit, "long_name": about}, result.column(name)
         ends = np.stack(result.bounds(name), axis=1)
         places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
@@ -287,6 +291,7 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         "E_GPa": cuts["E_GPa"],
         "nu_cuts": cuts["nu"],
         "fibres": {key: of for key, of in cuts.items() if key.removesuffix("_GPa") in FIBRES},
+        "plane": {key: of for key, of in cuts.items() if key.removesuffix("_GPa") in PLANE},
         "method": campaign.modulus.method,
         "plan": result.method,
         "samples": result.evaluations,
@@ -301,7 +306,8 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
     }
     data = xarray.Dataset(variables, coordinates)
     if campaign.losses is not None:
-        document["loss"] = loss_document(data) | {"error": campaign.loss_errors(result)}
+        facts = {"error": campaign.loss_errors(result), "nature": str(Nature.ATTAINED)}
+        document["loss"] = loss_document(data) | facts
     return StageResult(document, data)
 
 

@@ -6,7 +6,8 @@ Round cells of isotropic phases (contrasts of 1e-3 to 1e3, Poisson's ratios of 0
 phase, random maps with radii to nearly touching) are judged by the multipole series; ellipses and
 orthotropic particles (`--any`) by prisms and slices against one another. Each result has a random
 resolution. Prints by quantity how many numbers lie outside their declared errors, and the median of
-declared over true; exit status 1 if one lies outside or a median is above 10.
+declared over true; exit status 1 if one lies outside
+or a median of E, ν, moduli or stresses is above 10.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ import numpy as np
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.cell import Cell, Phase, VoigtPhase
+from alphacut.rve.engineering_constants import NAMES, engineering_constants
+from alphacut.rve.loss_factors import loss_factors
 from alphacut.rve.outline import Ellipse, circle
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.model import PrismModel
@@ -31,6 +34,8 @@ from alphacut.stochastic import HermiteMap
 
 NOISE = 1e-10  # of the truth, relative
 MOST_MEDIAN = 10.0
+TIGHT = ("E", "ν", "C11 + C12", "C11 − C12", "C33", "s11", "s12")
+"""Quantities whose declared errors are not to be far above the true ones."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,10 @@ def any_cell(rng: np.random.Generator) -> Cell:
         [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
     )
     particle = VoigtPhase((turn.T @ own @ turn).tolist())
-    outline = Ellipse(float(rng.choice([0.5, 2.0]))) if rng.random() < 0.75 else circle
+    turned = Ellipse(float(rng.choice([0.5, 2.0])), float(rng.choice([0.0, 30.0])))
+    outline = turned if rng.random() < 0.75 else circle
+    if rng.random() < 0.5:
+        particle = Phase(20e9 * 10 ** rng.uniform(-2, 2), float(rng.uniform(0, 0.4)))
     return Cell(Phase(20e9, 0.3), particle, random_map(rng, 0.66), outline)
 
 
@@ -95,7 +103,7 @@ def draw_prism(rng: np.random.Generator, cell: Cell) -> PrismModel:
 def draw_slices(rng: np.random.Generator, cell: Cell) -> SlicesModel:
     """Slices at a random resolution."""
     size, points = float(rng.uniform(0.2, 1.0)), int(rng.integers(3, 10))
-    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline)
+    return SlicesModel(int(rng.integers(2, 5)), size, points, cell.outline, energies=True)
 
 
 def judged(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> Iterator[Judgement]:
@@ -111,9 +119,30 @@ def judged(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> Iterator[J
     for name, one, two in zip(("s11", "s12"), own.curve.mean, truth.curve.mean, strict=True):
         error = own.modulus_errors[0 if name == "s11" else 2]
         yield Judgement(name, error + slack, abs(one / two - 1))
-    first, second = np.asarray(own.stiffness), np.asarray(truth.stiffness)
-    entries = abs(first - second).max() / second.max()
-    yield Judgement("stiffness", own.largest_error + slack, float(entries))
+    yield from judged_entries(own, truth)
+
+
+def judged_entries(own: HomogenisedStiffness, truth: HomogenisedStiffness) -> Iterator[Judgement]:
+    """Entries of C over C11, engineering constants of both definitions, and loss factors."""
+    pairs = [(x.stiffness, x.stiffness_errors) for x in (own, truth)]
+    (first, declared), (second, slack) = ([np.asarray(x) for x in pair] for pair in pairs)
+    for i, j in zip(*np.triu_indices(3), strict=True):
+        error = (declared + slack)[i, j] / second[0, 0]
+        true = abs(first - second)[i, j] / second[0, 0]
+        yield Judgement(f"C{i + 1}{j + 1}", float(error), float(true))
+    constants, others = engineering_constants(own), engineering_constants(truth)
+    for definition, one in constants.items():
+        other = others[definition]
+        errors = (one.errors + other.errors) / abs(other.values)
+        true_errors = abs(one.values / other.values - 1)
+        for row in zip(NAMES, errors, true_errors, strict=True):
+            yield Judgement(*row)
+    if own.energies is not None and truth.energies is not None:
+        losses = np.array([[0.02, 0.03], [0.005, 0.001]])
+        loss, true_loss = loss_factors(own, losses), loss_factors(truth, losses)
+        for name, value in loss.values.items():
+            errors = loss.errors[name] + true_loss.errors[name]
+            yield Judgement(f"loss {name}", errors, abs(value - true_loss.values[name]))
 
 
 def solved(model: PrismModel, cell: Cell) -> HomogenisedStiffness:
@@ -134,9 +163,11 @@ def judge(cell: Cell, rng: np.random.Generator) -> list[Judgement]:
         print(f"refused: {refusal}", flush=True)
         return []
     if cell.square:
-        truth = SeriesModel(accuracy=1e-12).solve(*parts)[0]
+        truth = SeriesModel(accuracy=1e-12, energies=True).solve(*parts)[0]
     else:
-        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline).solve(*parts)[0]
+        truth = SlicesModel(points=16, mesh_size=0.15, outline=cell.outline, energies=True).solve(
+            *parts
+        )[0]
     return [one for result in results for one in judged(result, truth)]
 
 
@@ -159,7 +190,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, numbers in rows.items():
         missed = sum(not one.covered for one in numbers)
         median = float(np.median([one.declared / max(one.true, NOISE) for one in numbers]))
-        outside, worst = outside + missed, max(worst, median)
+        outside = outside + missed
+        worst = max(worst, median) if name in TIGHT else worst
         print(f"{name:12} {len(numbers):8} {missed:8} {median:14.2f}")
     return int(outside > 0 or worst > MOST_MEDIAN)
 

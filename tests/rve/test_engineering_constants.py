@@ -1,0 +1,105 @@
+"""Engineering constants of both definitions, and the declared errors of the stiffness."""
+
+import numpy as np
+import pytest
+
+from alphacut.rve import Ellipse, Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
+from alphacut.rve.axial import AxialStiffness
+from alphacut.rve.engineering_constants import FREE, PLANE_STRAIN, engineering_constants
+from alphacut.rve.mesh.curved import plane_mesh
+from alphacut.rve.slices.plane_cell import PlaneCell
+from alphacut.stochastic import HermiteMap
+
+MATRIX, PARTICLE = Phase(68.3e9, 0.3), Phase(379.3e9, 0.1)
+R = float(np.sqrt(4 * 0.47 / np.pi))
+
+
+def fibres():
+    return SeriesModel().solve(HermiteMap(R, 0, R, 0), MATRIX, [PARTICLE])[0]
+
+
+def test_young_s_modulus_of_boron_aluminium_depends_on_what_is_meant():
+    constants = engineering_constants(fibres())
+    young = [constants[x].values[0] / 1e9 for x in (PLANE_STRAIN, FREE)]
+    assert young == pytest.approx([147.69, 143.96], abs=5e-3)
+
+
+def test_one_material_has_its_own_constants_without_stress_along_the_fibres():
+    result = SlicesModel(2, 0.5, 2).solve(HermiteMap(0.5, 0, 0.5, 0), MATRIX, [MATRIX])[0]
+    young, nu = MATRIX.modulus, MATRIX.poisson
+    constants = engineering_constants(result)
+    shear = young / (2 * (1 + nu))
+    assert constants[FREE].values == pytest.approx([young, young, nu, shear], rel=1e-9)
+    plane = young / (1 - nu**2)
+    assert constants[PLANE_STRAIN].values == pytest.approx([plane, plane, nu / (1 - nu), shear])
+
+
+@pytest.mark.parametrize("particle", [PARTICLE, Phase(2e9, 0.4)], ids=["stiff", "soft"])
+def test_hill_s_relations_are_what_a_strain_along_the_fibres_gives(particle):
+    """Against a load ε33 by the operator of the plane cell, of a turned ellipse."""
+    outline, radius = Ellipse(2.0, 30.0), 0.5
+    model = SlicesModel(4, 0.3, 2, outline)
+    result = model.solve(HermiteMap(radius, 0, radius, 0), MATRIX, [particle])[0]
+    axial = AxialStiffness.of_result(result)
+    cell = PlaneCell(plane_mesh(radius, size=0.3, outline=outline), 4)
+    lateral, own = strained_along(cell, (MATRIX, particle), result.cell.fraction(np.zeros(1))[0])
+    assert (abs(axial.lateral - lateral) <= axial.lateral_errors + 1e-9 * lateral[0]).all()
+    assert axial.axial == pytest.approx(own, rel=1e-7)
+    assert abs(axial.lateral[2]) > 1e-4 * axial.lateral[0]
+
+
+def strained_along(cell, phases, fraction):
+    """C13, C23, C63 and C33 by fields under ε33 = 1: an eigenstress C13 of the phases."""
+    from alphacut.rve.cell import AREA
+    from alphacut.rve.solver.numbering import reduced
+
+    cell.stiffness(tuple(phase.stiffness for phase in phases))
+    column = [
+        np.outer([phase.stiffness[0, 1], phase.stiffness[0, 1], 0], [1, 0, 0]) for phase in phases
+    ]
+    cell._form.set_phases(column)
+    force = cell._form.load(np.array([1.0, 0, 0]))
+    load = reduced(force, cell._local, cell.unknowns, cell.unknowns)
+    mixed = -cell._affine().T @ force - [load.dot(field) for field in cell._fields]
+    cell._form.set_phases([phase.stiffness for phase in phases])
+    cell._matrix.zeroEntries()
+    cell._form.add_stiffness(cell._matrix)
+    from alphacut.rve.fenicsx import cholesky
+    from alphacut.rve.solver.krylov import solve
+
+    (field,) = solve(cholesky(cell._matrix, "test_"), [load]).vectors
+    shares = np.array([1 - fraction, fraction])
+    mean = shares @ [phase.stiffness[0, 0] for phase in phases]
+    return mixed / AREA, mean - load.dot(field) / AREA
+
+
+def test_a_cell_turned_by_a_right_angle_exchanges_x_and_y():
+    particle = Phase(5e9, 0.2)
+    results = [
+        SlicesModel(3, 0.4, 3, Ellipse(2.0, turn)).solve(
+            HermiteMap(0.4, 0, 0.5, 0), MATRIX, [particle]
+        )[0]
+        for turn in (30.0, 120.0, -30.0)
+    ]
+    first, turned, mirrored = (result.stiffness for result in results)
+    swap = np.ix_([1, 0, 2], [1, 0, 2])
+    signs = np.outer([1, 1, -1], [1, 1, -1])
+    slack = sum(result.stiffness_errors for result in results[:2])
+    assert (abs(turned[swap] * signs - first) <= slack).all()
+    assert (abs(mirrored * signs - first) <= slack).all()
+    assert abs(first[0, 2]) > 10 * slack[0, 2]
+    for definition in (PLANE_STRAIN, FREE):
+        x, y = (engineering_constants(r)[definition].values for r in results[:2])
+        assert x[[0, 1, 3]] == pytest.approx(y[[1, 0, 3]], rel=1e-5)
+
+
+def test_declared_errors_of_prisms_hold_slices_of_an_orthotropic_ellipse():
+    particle = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0), (5e9, 0, 30e9)))
+    radius, outline = HermiteMap(0.2, 0.1, 0.5, 0.1), Ellipse(2.0, 30.0)
+    prism, slices = (
+        model.solve(radius, MATRIX, [particle])[0]
+        for model in (PrismModel(0.4, 4, outline=outline), SlicesModel(4, 0.3, 8, outline))
+    )
+    error = abs(prism.stiffness - slices.stiffness)
+    assert (error <= prism.stiffness_errors + slices.stiffness_errors).all()
+    assert list(engineering_constants(prism)) == [PLANE_STRAIN]  # no isotropic phases
