@@ -9,7 +9,7 @@ Example:
 
 from typing import TYPE_CHECKING, Any
 
-from alphacut.rve.cell import LOADS, STRAIN, Cell, Phase, VoigtPhase
+from alphacut.rve.cell import LOADS, STRAIN, Cell, Interphase, Phase, VoigtPhase
 from alphacut.rve.outline import Ellipse
 from alphacut.rve.result import HomogenisedStiffness, StressCurve, effective_modulus
 from alphacut.rve.series.model import SeriesModel
@@ -26,6 +26,7 @@ __all__ = [
     "Cell",
     "Ellipse",
     "HomogenisedStiffness",
+    "Interphase",
     "Phase",
     "PrismModel",
     "ProductSpace",

@@ -15,6 +15,7 @@ from alphacut.stochastic import RadiusMap
 
 AREA = 4.0  # of the cell, in halves of its side
 STRAIN = 0.01  # eq. 15
+THINNEST = 1e-4  # interphase, in halves of the cell's side
 IN_GPA = (0.01, 1e4)  # E that is no solid's in Pa (soft gels have 1e4) and is one's in GPa or MPa
 # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
 LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])
@@ -122,6 +123,37 @@ AnyPhase = Phase | VoigtPhase
 
 
 @dataclass(frozen=True)
+class Interphase:
+    """Ring of a third material around a round particle.
+
+    Args:
+        thickness: In halves of the cell's side, from `THINNEST` on; the same at all θ.
+        phase: Its material.
+
+    Raises:
+        RefusedError: The thickness is less, or the ring as wide as the cell.
+
+    Example:
+        >>> ring = Interphase(0.02, Phase(12e9, 0.2))
+        >>> ring.thickness
+        0.02
+    """
+
+    thickness: float
+    phase: Phase
+
+    def __post_init__(self) -> None:
+        if not THINNEST <= self.thickness < 1:
+            allowed = f"values from {THINNEST:g} below 1, in halves of the cell's side"
+            raise RefusedError("thickness of the interphase", f"{self.thickness:g}", allowed)
+
+
+def thickness_of(interphase: Interphase | None) -> float:
+    """Thickness of an interphase, 0 where there is none."""
+    return 0.0 if interphase is None else interphase.thickness
+
+
+@dataclass(frozen=True)
 class Cell:
     """Periodic square cell of side 2 with one centred particle of random radius r(θ).
 
@@ -130,6 +162,7 @@ class Cell:
         inclusion: Material of the particle.
         radius: Map θ ↦ r(θ) in (0, 1), with the law of θ.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
+        interphase: Ring around a round particle, if there is one.
 
     Example:
         >>> from alphacut.stochastic import HermiteMap
@@ -142,20 +175,30 @@ class Cell:
     inclusion: AnyPhase
     radius: RadiusMap
     outline: Outline = circle
+    interphase: Interphase | None = None
 
     @property
-    def phases(self) -> tuple[AnyPhase, AnyPhase]:
-        """Matrix and particle."""
-        return self.matrix, self.inclusion
+    def phases(self) -> tuple[AnyPhase, ...]:
+        """Matrix, particle and interphase."""
+        ring = () if self.interphase is None else (self.interphase.phase,)
+        return self.matrix, self.inclusion, *ring
 
     def fraction(self, theta: Array) -> Array:
         """Area fraction of the particle at θ of any shape."""
         return np.asarray(area(self.outline) / AREA * self.radius(theta) ** 2)
 
+    def fractions(self, theta: Array) -> Array:
+        """Area fractions of the phases at θ, shape (phases, n)."""
+        inner, rings = self.fraction(theta), []
+        if self.interphase is not None:
+            outer = self.radius(theta) + self.interphase.thickness
+            rings = [np.pi * outer**2 / AREA - inner]
+        return np.stack([1 - inner - sum(rings), inner, *rings])
+
     @property
-    def stiffness(self) -> tuple[Array, Array]:
-        """Of matrix and particle, (3, 3) each, in Pa."""
-        return self.matrix.stiffness, self.inclusion.stiffness
+    def stiffness(self) -> tuple[Array, ...]:
+        """Of the phases, (3, 3) each, in Pa."""
+        return tuple(phase.stiffness for phase in self.phases)
 
     @property
     def square(self) -> bool:

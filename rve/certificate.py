@@ -64,7 +64,7 @@ def certified(result: HomogenisedStiffness) -> HomogenisedStiffness:
     assert cell is not None
     assert curve.stiffness is not None
     checks = stress_checks(
-        curve.stiffness, np.eye(3), cell.fraction(curve.theta), curve.weights, cell.phases
+        curve.stiffness, np.eye(3), cell.fractions(curve.theta), curve.weights, cell.phases
     )
     checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
     return replace(result, checks=checks)

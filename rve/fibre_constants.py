@@ -50,8 +50,8 @@ def fibre_constants(result: HomogenisedStiffness) -> FibreConstants:
         RefusedError: It does not, or they are not.
     """
     cell = result.cell
-    if cell is None or not cell.square:
-        raise RefusedError("cell", cell, "a result of round particles and isotropic phases")
+    if cell is None or not cell.square or cell.interphase is not None:
+        raise RefusedError("cell", cell, "a result of round particles and two isotropic phases")
     mixture, bulk, shear = Mixture.of_cell(cell), result.moduli[0] / 2, result.shear
     across = float(result.error_of(result.shear_of)) / shear
     along, error = _mean_longitudinal_shear(cell)

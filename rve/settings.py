@@ -8,7 +8,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
+from alphacut.rve.cell import AnyPhase, Interphase, Phase, VoigtPhase
+from alphacut.rve.outline import Outline, is_round
 from alphacut.stochastic import RadiusMap, require_map
 
 HALVES = "in halves of the cell's side"
@@ -68,6 +69,19 @@ def require_compressible(*phases: AnyPhase) -> None:
     if ratio > STIFFEST:
         cure = "finite elements lock above: take the series"
         raise RefusedError("Poisson's ratio", f"{ratio:g}", f"values up to {STIFFEST:g}", cure)
+
+
+def require_interphase(interphase: Interphase | None, outline: Outline) -> None:
+    """Refuse an interphase in which elements lock, or around a particle that is not round.
+
+    Raises:
+        RefusedError: It is one.
+    """
+    if interphase is None:
+        return
+    require_compressible(interphase.phase)
+    if not is_round(outline):
+        raise RefusedError("interphase", "around an outline", "one around round particles")
 
 
 def require_parts(

@@ -19,7 +19,7 @@ from alphacut.case.material import Mesh
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import FailedError
 from alphacut.io.files import say, whole_file
-from alphacut.rve.cell import Cell
+from alphacut.rve.cell import Cell, thickness_of
 from alphacut.rve.mesh.wedge_orders import VTK_ORDER
 
 if TYPE_CHECKING:
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
 
 COMPONENTS = ("11", "22", "12")
-MATRIX, PARTICLE = "#f0a860", "#b79ad9"  # orange and lilac, as in the paper
+COLOURS = "#f0a860", "#b79ad9", "#7fb59a"
+"""Of matrix and particle, orange and lilac as in the paper, and of an interphase."""
 PIXELS = (1000, 1100)
 FLATTENED = 0.6  # scale of the θ-axis in the picture
 EDGES = np.column_stack([[0, 1, 2, 3, 4, 5, 0, 1, 2], range(6, 15), [1, 2, 0, 4, 5, 3, 3, 4, 5]])
@@ -45,7 +46,7 @@ def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
 def wedges(
     points: Array, cells: Rows, phase: Rows, data: dict[str, Array] | None = None
 ) -> meshio.Mesh:
-    """Quadratic wedges in VTK's order with their phase, 0 the matrix, 1 the particle.
+    """Quadratic wedges in VTK's order with their phase: matrix 0, particle 1, interphase 2.
 
     Args:
         points: (x1, x2, θ), shape (n, 3).
@@ -70,12 +71,17 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
         layers: In θ.
     """
     from alphacut.rve.mesh.columns import extrude
-    from alphacut.rve.mesh.triangulation import reference_radius
+    from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
 
-    outline = cell.outline
-    radius = reference_radius(cell.radius, outline)
-    grid = extrude(size=size, radius=radius, layers=layers, outline=outline)
-    return wedges(grid.positions(cell.radius), grid.cells, grid.inside.astype(np.int64))
+    thickness = thickness_of(cell.interphase)
+    grid = extrude(
+        size=size,
+        radius=reference_radius(cell.radius, cell.outline, thickness),
+        layers=layers,
+        outline=cell.outline,
+        thickness=RING_THICKNESS if thickness else 0.0,
+    )
+    return wedges(grid.positions(cell.radius, thickness), grid.cells, grid.phase)
 
 
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
@@ -108,8 +114,8 @@ def mesh(file: str, picture: str) -> None:
     grid = pyvista.read(file)
     plotter = pyvista.Plotter(off_screen=True, window_size=list(PIXELS))
     plotter.set_background("white")
-    for phase, colour in ((0, MATRIX), (1, PARTICLE)):
-        part = grid.extract_cells(grid.cell_data["phase"] == phase)
+    for phase in np.unique(grid.cell_data["phase"]):
+        part, colour = grid.extract_cells(grid.cell_data["phase"] == phase), COLOURS[phase]
         if phase == 0:
             centres = part.cell_centers().points
             part = part.extract_cells(~((centres[:, 0] > 0) & (centres[:, 1] < 0)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,11 +11,11 @@ from scipy.sparse.csgraph import connected_components
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.mesh import square
-from alphacut.rve.mesh.gmsh_prisms import INCLUSION, Prisms, extruded
+from alphacut.rve.mesh.gmsh_prisms import INCLUSION, INTERPHASE, Prisms, extruded
 from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading
 from alphacut.rve.mesh.periodicity import SAME_PLACE, MeshError
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.triangulation import Triangulation
+from alphacut.rve.mesh.triangulation import Ring, Triangulation
 from alphacut.rve.outline import Outline, circle, is_round
 
 BELOW, ABOVE = [0, 1, 2, 6, 7, 9], [3, 4, 5, 12, 13, 14]
@@ -30,6 +31,7 @@ def extrude(
     layers: int,
     outline: Outline = circle,
     refinement: float = REFINEMENTS[0],
+    thickness: float = 0.0,
 ) -> PrismGrid:
     """Gmsh's prisms over triangles of about `size`, opposite sides matching.
 
@@ -40,12 +42,25 @@ def extrude(
         layers: Along θ, at least 1.
         outline: Of the particle.
         refinement: Of the edges along an outline that is not round; see `bend_grading`.
+        thickness: Of a ring around a round particle in the mesh, 0 for none.
     """
     sizes = None
     if radius and not is_round(outline):
         sizes = partial(_at_most, size, bend_grading(outline, radius, refinement))
-    prisms = extruded(size, radius, outline, layers, sizes)
-    return grid_of(prisms, radius, outline)
+    prisms = extruded(size, radius, outline, layers, sizes, thickness)
+    grid = grid_of(prisms, radius, outline)
+    return replace(grid, plane=replace(grid.plane, ring=_ring(grid, thickness)))
+
+
+def _ring(grid: PrismGrid, thickness: float) -> Ring | None:
+    """The interphase of a mesh; None where it has none."""
+    if not thickness:
+        return None
+    plane = grid.plane
+    own = grid.phase[: len(plane.triangles)] == grid.names.index(INTERPHASE)
+    nodes: Mask = np.zeros(len(plane.points), bool)
+    nodes[plane.triangles[own]] = True
+    return Ring(thickness, nodes)
 
 
 def grid_of(

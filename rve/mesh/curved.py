@@ -16,6 +16,7 @@ from alphacut.rve.mesh.jacobian import LEAST_RATIO, jacobian_ratios
 from alphacut.rve.outline import Outline, circle, is_round, require_fit
 from alphacut.rve.settings import require_mesh_size
 
+MATRIX, PARTICLE, INTERPHASE = range(3)
 _CLOSEST = 0.9995
 COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
 
@@ -31,35 +32,45 @@ class PlaneMesh:
         points: Vertices, shape (n, 2).
         triangles: Vertices of each triangle in rising order, shape (m, 3), so that two neighbours
             run along their edge the same way.
-        inside: Whether a triangle belongs to the particle, shape (m,).
+        phase: Phase of a triangle: matrix 0, particle 1, interphase 2, shape (m,).
         radius: Radius of the particle.
         outline: Of the particle.
+        thickness: Of the interphase around a round one, 0 for none.
     """
 
     points: Array
     triangles: Rows
-    inside: Mask
+    phase: Rows
     radius: float
     outline: Outline = circle
+    thickness: float = 0.0
+
+    @property
+    def inside(self) -> Mask:
+        """Mask of the triangles in the particle."""
+        return self.phase == PARTICLE
 
 
-def plane_mesh(radius: float, *, size: float, outline: Outline = circle) -> PlaneMesh:
+def plane_mesh(
+    radius: float, *, size: float, outline: Outline = circle, thickness: float = 0.0
+) -> PlaneMesh:
     """Mesh one cell, finer where the particle is small or nearly touches its images.
 
     Args:
         radius: Radius of the particle over half the cell's side.
         size: Edge length far from the interface, in halves of the cell's side, in (0, 1].
         outline: Of the particle.
+        thickness: Of an interphase around a round one, 0 for none.
 
     Raises:
         RefusedError: A value out of range, or particles nearly touch: the mesh between them would
             have no end; or an outline is so sharp that elements fold however short they are.
     """
     require_mesh_size(size)
-    require_fit(outline, radius, _CLOSEST)
-    size, local = min(size, COARSEST), particle_grading(outline, radius)
+    require_fit(outline, radius + thickness, _CLOSEST)
+    size, local = min(size, COARSEST), particle_grading(outline, radius, thickness)
     if is_round(outline):
-        return _graded(radius, size, outline, local)
+        return _graded(radius, size, outline, local, thickness)
     for refinement in REFINEMENTS:
         bend = bend_grading(outline, radius, refinement)
         sizes = partial(_smaller, local, bend)
@@ -84,15 +95,18 @@ def _smaller(first: Sizes, second: Sizes, x: float, y: float) -> float:
     return min(first(x, y), second(x, y))
 
 
-def _graded(radius: float, size: float, outline: Outline, sizes: Sizes) -> PlaneMesh:
+def _graded(
+    radius: float, size: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
+) -> PlaneMesh:
     """Mesh with edges of `size` times `sizes`, the vertices of the interface on the outline."""
-    points, triangles, inside = square.triangles(
-        size, radius, outline, lambda x, y: size * sizes(x, y)
+    points, triangles, phase = square.triangles(
+        size, radius, outline, lambda x, y: size * sizes(x, y), thickness
     )
+    inside = phase == PARTICLE
     shared = np.intersect1d(triangles[inside], triangles[~inside])
     x, y = points[shared].T  # Gmsh's splines are near the outline only
     points[shared] *= (radius * outline(np.arctan2(y, x)) / np.hypot(x, y))[:, None]
-    return PlaneMesh(points, np.sort(triangles, axis=1), inside, radius, outline)
+    return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline, thickness)
 
 
 def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
@@ -109,11 +123,16 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
     )
     lattice: Array = np.asarray(element.points, float)
     barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
-    ends, edges, on_interface = square.edges(mesh.triangles, mesh.inside)
+    ends, edges, _ = square.edges(mesh.triangles, mesh.inside)
     places = np.einsum("nl,eld->end", barycentric, mesh.points[mesh.triangles])
-    for k, (a, b) in enumerate(square.EDGES):
-        bent = np.flatnonzero(on_interface[edges[:, k]])
-        places[bent] += _bend(mesh, mesh.triangles[bent][:, [a, b]], barycentric[:, [a, b]])
+    for mask, radius in _interfaces(mesh):
+        on_interface = square.edges(mesh.triangles, mask)[2]
+        for k, (a, b) in enumerate(square.EDGES):
+            bent = np.flatnonzero(on_interface[edges[:, k]])
+            pairs = mesh.triangles[bent][:, [a, b]]
+            places[bent] += _bend(mesh, radius, pairs, barycentric[:, [a, b]])
+    ring = mesh.phase == INTERPHASE
+    places[ring] = _polar_places(mesh.points[mesh.triangles[ring]], barycentric)
     cells = _number_nodes(
         mesh.triangles, edges, vertices=len(mesh.points), edge_count=len(ends), order=order
     )
@@ -133,14 +152,39 @@ def _number_nodes(
     )
 
 
-def _bend(mesh: PlaneMesh, ends: Rows, weights: Array) -> Array:
+def _interfaces(mesh: PlaneMesh) -> list[tuple[Mask, float]]:
+    """Triangles inside each interface, and its radius."""
+    inner = [(mesh.inside, mesh.radius)]
+    if not mesh.thickness:
+        return inner
+    return [*inner, (mesh.phase != MATRIX, mesh.radius + mesh.thickness)]
+
+
+def _polar_places(corners: Array, barycentric: Array) -> Array:
+    """Nodes of triangles in a ring: radius and angle are linear in them, shape (k, nodes, 2).
+
+    Both circles are copies of one curve at other scales, which do not meet however thin the ring.
+
+    Args:
+        corners: Of the triangles, shape (k, 3, 2).
+        barycentric: Of the nodes, shape (nodes, 3).
+    """
+    angle = np.arctan2(corners[..., 1], corners[..., 0])
+    turn = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi
+    angles = (angle[:, :1] + turn) @ barycentric.T
+    distance = np.hypot(corners[..., 0], corners[..., 1]) @ barycentric.T
+    unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return np.asarray(distance[..., None] * unit)
+
+
+def _bend(mesh: PlaneMesh, radius: float, ends: Rows, weights: Array) -> Array:
     """Displacement of all nodes of triangles with the edge `ends` (k, 2) on the outline."""
     a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
     start, stop = (np.arctan2(p[:, 1], p[:, 0]) for p in (a, b))
     turn = (stop - start + np.pi) % (2 * np.pi) - np.pi
     along = (1 + weights[:, 1] - weights[:, 0]) / 2
     angle = start[:, None] + turn[:, None] * along
-    distance = mesh.radius * np.asarray(mesh.outline(angle))
+    distance = radius * np.asarray(mesh.outline(angle))
     arc = distance[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     chord = a[:, None] + (b - a)[:, None] * along[:, None]
     bubble = weights.prod(axis=1)

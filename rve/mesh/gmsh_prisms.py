@@ -18,7 +18,8 @@ from alphacut.rve.outline import Outline
 
 PRISM_15 = 18
 """Gmsh's type of the element."""
-MATRIX, INCLUSION = "matrix", "inclusion"
+MATRIX, INCLUSION, INTERPHASE = NAMES = "matrix", "inclusion", "interphase"
+"""Names of the phases in their order."""
 SIDES = {"x1 = -1": (0, -1.0), "x1 = 1": (0, 1.0), "x2 = -1": (1, -1.0), "x2 = 1": (1, 1.0)}
 """Names of the sides with their axis and place."""
 LEVELS = "lowest level", "highest level"
@@ -42,7 +43,12 @@ class Prisms:
 
 
 def extruded(
-    size: float, radius: float, outline: Outline, layers: int, sizes: square.Sizes | None = None
+    size: float,
+    radius: float,
+    outline: Outline,
+    layers: int,
+    sizes: square.Sizes | None = None,
+    thickness: float = 0.0,
 ) -> Prisms:
     """Prisms over the triangulation of the cell, θ from 0 to 1 in equal layers.
 
@@ -52,17 +58,17 @@ def extruded(
         outline: Of the particle.
         layers: Along θ.
         sizes: Edge length at (x1, x2), in place of `size`.
+        thickness: Of a ring around the particle, 0 for none.
     """
     with square.model() as gmsh:
-        names = (INCLUSION, MATRIX) if radius else (MATRIX,)
-        surfaces = square.surfaces(gmsh, size, radius, outline)
-        made = gmsh.model.geo.extrude(
-            [(2, surface) for surface in surfaces], 0, 0, 1, numElements=[layers], recombine=True
-        )
+        parts = square.surfaces(gmsh, size, radius, outline, thickness)
+        planes = [(2, surface) for surfaces in parts.values() for surface in surfaces]
+        extrusion = gmsh.model.geo.extrude(planes, 0, 0, 1, numElements=[layers], recombine=True)
         gmsh.model.geo.synchronize()
-        volumes = [tag for dimension, tag in made if dimension == 3]
-        for name, volume in sorted(zip(names, volumes, strict=True), reverse=True):
-            gmsh.model.addPhysicalGroup(3, [volume], name=name)
+        volumes = iter([tag for dimension, tag in extrusion if dimension == 3])
+        groups = {phase: [next(volumes) for _ in surfaces] for phase, surfaces in parts.items()}
+        for phase in sorted(groups):
+            gmsh.model.addPhysicalGroup(3, groups[phase], name=NAMES[phase])
         _name_surfaces(gmsh)
         if sizes:
             square.grade(gmsh, sizes)

@@ -19,10 +19,16 @@ REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
 """Factors of `bend_grading` that are tried one after the other until all elements are sound."""
 
 
-def particle_grading(outline: Outline, radius: float) -> Sizes:
-    """Edge length near a small particle and in gaps over the nominal one, at (x1, x2)."""
+def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) -> Sizes:
+    """Edge length near a small particle and in gaps over the nominal one, at (x1, x2).
+
+    Args:
+        outline: Of the particle.
+        radius: Its radius.
+        thickness: Of a ring around it.
+    """
     wide, high, least = (radius * extent for extent in extents(outline))
-    return lambda x, y: _around(x, y, wide, high, least)
+    return lambda x, y: _around(x, y, wide + thickness, high + thickness, least)
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:

@@ -11,34 +11,57 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.rve.mesh.triangulation import Triangulation
+from alphacut.rve.mesh.triangulation import Ring, Triangulation
 from alphacut.stochastic import RadiusMap, ThetaLaw
 
 
-def moved(mesh: Triangulation, radii: Array) -> Array:
+def moved(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
     """Positions of all nodes at k radii, shape (k, n, 2), curved edges on the outline.
 
     Nodes slide along rays from the centre: inside the particle in proportion, outside between the
     outline and the side of the square. Edge midpoints slide too, so that the layers between a large
     particle and the side bend with it; only an edge across a diagonal of the square, where sliding
-    has a kink, stays straight.
+    has a kink, stays straight. Nodes of an interphase of some thickness slide inside it.
     """
     radius, (x, y) = radii[:, None], mesh.points.T
     distance, shape = np.hypot(x, y), np.asarray(mesh.outline(np.arctan2(y, x)))
     inner = np.zeros(len(distance), bool)
     inner[mesh.triangles[mesh.inside]] = True
     old, new = mesh.radius * shape, radius * shape
+    if mesh.ring is not None:
+        old, new = old + mesh.ring.thickness, new + thickness
     with np.errstate(divide="ignore", invalid="ignore"):  # at the centre
         side = distance / abs(mesh.points).max(axis=1)
         outer = (new + (distance - old) * (side - new) / (side - old)) / distance
         scale = np.where(inner, radius / mesh.radius, outer)
-        scale = np.where(mesh.arc, new / distance, scale)  # z = 0 of eq. 14
+        scale = np.where(mesh.arc, radius * shape / distance, scale)  # z = 0 of eq. 14
     points = mesh.points * scale[..., None]
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
     across = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
     straight = np.flatnonzero(across & ~mesh.arc[mesh.vertices :])
     points[:, mesh.vertices + straight] = points[:, mesh.ends[straight]].mean(axis=2)
+    if mesh.ring is not None:
+        points[:, mesh.ring.nodes] = _ring_positions(mesh, mesh.ring, radii, thickness)
     return np.asarray(points)
+
+
+def _ring_positions(mesh: Triangulation, ring: Ring, radii: Array, thickness: float) -> Array:
+    """Positions of the nodes of an interphase, shape (k, nodes of it, 2).
+
+    Middles of edges have the mean radius and the mean angle of their ends. So both circles and all
+    that lies between are copies of one curve at other scales, which do not meet however thin the
+    ring and however long the edges are.
+    """
+    x, y = mesh.points[: mesh.vertices].T
+    share = (np.hypot(x, y) - mesh.radius) / ring.thickness
+    angle = np.arctan2(y, x)
+    first, second = mesh.ends.T
+    turn = (angle[second] - angle[first] + np.pi) % (2 * np.pi) - np.pi
+    shares = np.concatenate([share, (share[first] + share[second]) / 2])[ring.nodes]
+    angles = np.concatenate([angle, angle[first] + turn / 2])[ring.nodes]
+    distance = radii[:, None] + thickness * shares
+    unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return np.asarray(distance[..., None] * unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,23 +107,24 @@ class PrismGrid:
         """θ of all levels, shape (layers + 1,)."""
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
-    def positions(self, radius: RadiusMap) -> Array:
-        """(x1, x2, θ) of all nodes, shape (nodes, 3)."""
+    def positions(self, radius: RadiusMap, thickness: float = 0.0) -> Array:
+        """(x1, x2, θ) of all nodes at a map and a thickness of the interphase, shape (nodes, 3)."""
         if self.fixed is not None:
             return self.fixed
         theta = self.levels(radius.distribution)
         middle = (theta[1:] + theta[:-1]) / 2
-        planes = self._at(radius, theta), self._at(radius, middle)[:, : self.plane.vertices]
+        above = self._at(radius, middle, thickness)[:, : self.plane.vertices]
+        planes = self._at(radius, theta, thickness), above
         stacked = [
             np.dstack([xy, np.broadcast_to(t[:, None, None], (*xy.shape[:2], 1))])
             for xy, t in zip(planes, (theta, middle), strict=True)
         ]
         return np.concatenate([s.reshape(-1, 3) for s in stacked])
 
-    def _at(self, radius: RadiusMap, theta: Array) -> Array:
+    def _at(self, radius: RadiusMap, theta: Array, thickness: float) -> Array:
         if not self.conforming:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
-        return moved(self.plane, radius(theta))
+        return moved(self.plane, radius(theta), thickness)
 
     def sign(self, points: Array, radius: RadiusMap) -> Array:
         """1 where z < 0 in eq. 14, at points (…, 3), else 0; shape (…)."""

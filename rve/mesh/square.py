@@ -11,7 +11,9 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.outline import Outline, bend_radii, is_round
 
-Triangles = tuple[Array, Rows, Mask]
+Triangles = tuple[Array, Rows, Rows]
+RING_LAYERS = 2
+"""Layers of elements across an interphase; with quadratic ones E is off by some (thickness/2)⁴."""
 Sizes = Callable[[float, float], float]
 EDGES = ((1, 2), (0, 2), (0, 1))
 """Of a triangle by their vertices, in Basix's order."""
@@ -21,18 +23,20 @@ so that the spline keeps lobes apart. Vertices are put on the outline itself aft
 
 
 def triangles(
-    size: float, radius: float, outline: Outline, sizes: Sizes | None = None
+    size: float, radius: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
 ) -> Triangles:
-    """Vertices (n, 2), triangles (m, 3) and the particle's triangles (m,).
+    """Vertices (n, 2), triangles (m, 3) and their phases (m,): matrix 0, particle 1, interphase 2.
 
     Args:
         size: Edge length, in halves of the cell's side.
-        radius: Radius of the particle; 0 for a mesh that knows nothing of it.
+        radius: Radius of the particle.
         outline: Of the particle.
         sizes: Edge length at (x1, x2), in place of `size`.
+        thickness: Of a ring around it, 0 for none.
     """
     with model() as gmsh:
-        tags_of_surfaces = surfaces(gmsh, size, radius, outline)
+        parts = surfaces(gmsh, size, radius, outline, thickness, sizes)
+        phases = [phase for phase, tags in parts.items() for _ in tags]
         if sizes:
             grade(gmsh, sizes)
         gmsh.model.mesh.generate(2)
@@ -41,18 +45,41 @@ def triangles(
         number[tags] = np.arange(len(tags))
         blocks = [
             number[gmsh.model.mesh.getElementsByType(2, s)[1].astype(np.int64)].reshape(-1, 3)
-            for s in tags_of_surfaces
+            for tags in parts.values()
+            for s in tags
         ]
-    inside = np.concatenate([np.full(len(b), radius > 0 and k == 0) for k, b in enumerate(blocks)])
+    phase = np.repeat(phases, [len(block) for block in blocks])
     # the centres of arcs are points without triangles
     used, packed = np.unique(np.concatenate(blocks), return_inverse=True)
-    return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), inside
+    return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), phase
 
 
-def surfaces(gmsh: Any, size: float, radius: float, outline: Outline) -> tuple[int, ...]:
-    """Surfaces of the particle, if there is one, and of the matrix."""
+def surfaces(
+    gmsh: Any,
+    size: float,
+    radius: float,
+    outline: Outline,
+    thickness: float = 0.0,
+    sizes: Sizes | None = None,
+) -> dict[int, list[int]]:
+    """Surfaces of each phase: particle 1, if there is one, matrix 0, interphase 2, if there is one.
+
+    Args:
+        gmsh: With an empty model.
+        size: Edge length, in halves of the cell's side.
+        radius: Of the particle, 0 for none.
+        outline: Of the particle.
+        thickness: Of a ring around it, 0 for none.
+        sizes: Edge length at (x1, x2), which the arcs of a ring take; `size` if left out.
+    """
     geo = gmsh.model.geo
-    return _particle(geo, size, radius, outline) if radius else _square(geo, size)
+    if not radius:
+        return {0: _square(geo, size)}
+    if not thickness:
+        particle, matrix = _particle(geo, size, radius, outline)
+        return {1: [particle], 0: [matrix]}
+    steps = _quarter_steps(radius, radius + thickness, sizes or (lambda x, y: size))
+    return _particle_in_ring(geo, size, (radius, radius + thickness), steps)
 
 
 def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
@@ -104,11 +131,47 @@ def _sides(geo: Any, size: float) -> int:
     return int(geo.addCurveLoop(sides))
 
 
-def _square(geo: Any, size: float) -> tuple[int]:
+def _square(geo: Any, size: float) -> list[int]:
     """The cell without a particle: its surface."""
     surface = geo.addPlaneSurface([_sides(geo, size)])
     geo.synchronize()
-    return (surface,)
+    return [surface]
+
+
+def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
+    """Elements along a quarter of a ring: the shortest edge that is wanted on its outer circle."""
+    angles = np.linspace(0, np.pi / 2, 181)
+    least = min(sizes(outer * np.cos(angle), outer * np.sin(angle)) for angle in angles)
+    return max(2, int(np.ceil(np.pi / 2 * inner / least)))
+
+
+def _particle_in_ring(
+    geo: Any, size: float, radii: tuple[float, float], steps: int
+) -> dict[int, list[int]]:
+    """Cell with a round particle in a ring of structured layers: surfaces of each phase."""
+    import gmsh
+
+    axes, centre = ((1, 0), (0, 1), (-1, 0), (0, -1)), geo.addPoint(0, 0, 0, size)
+    poles = [[geo.addPoint(r * x, r * y, 0, size) for x, y in axes] for r in radii]
+    turns = [(k, (k + 1) % 4) for k in range(4)]
+    arcs = [[geo.addCircleArc(circle[a], centre, circle[b]) for a, b in turns] for circle in poles]
+    spokes = [geo.addLine(*ends) for ends in zip(*poles, strict=True)]
+    loops = [geo.addCurveLoop(circle) for circle in arcs]
+    particle = geo.addPlaneSurface([loops[0]])
+    matrix = geo.addPlaneSurface([_sides(geo, size), loops[1]])
+    ring = [
+        geo.addPlaneSurface([geo.addCurveLoop([spokes[a], arcs[1][a], -spokes[b], -arcs[0][a]])])
+        for a, b in turns
+    ]
+    for curve in (*arcs[0], *arcs[1]):
+        geo.mesh.setTransfiniteCurve(curve, steps + 1)
+    for curve in spokes:
+        geo.mesh.setTransfiniteCurve(curve, RING_LAYERS + 1)
+    for surface in ring:
+        geo.mesh.setTransfiniteSurface(surface)
+    geo.synchronize()
+    gmsh.model.mesh.embed(0, [centre], 2, particle)
+    return {1: [particle], 0: [matrix], 2: ring}
 
 
 def _spline_steps(outline: Outline) -> int:

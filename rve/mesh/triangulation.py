@@ -11,6 +11,23 @@ from alphacut.rve.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, require_map
 
 
+RING_THICKNESS = 0.05
+"""Of an interphase in the mesh that is moved to all others, in halves of the cell's side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Interphase around a round particle in a planar mesh.
+
+    Args:
+        thickness: In this mesh, in halves of the cell's side.
+        nodes: Whether a node belongs to it, its edges included, shape (n,).
+    """
+
+    thickness: float
+    nodes: Mask
+
+
 @dataclass(frozen=True, eq=False)
 class Triangulation:
     """Six-node triangles of the cell [−1, 1]², vertices numbered before edge midpoints.
@@ -26,6 +43,7 @@ class Triangulation:
         arc: Whether a node lies on the interface, shape (n,).
         radius: Radius of the particle in this mesh, 0 if the mesh has none.
         outline: Of the particle.
+        ring: Interphase around it, if there is one.
     """
 
     points: Array
@@ -36,9 +54,12 @@ class Triangulation:
     arc: Mask
     radius: float
     outline: Outline = circle
+    ring: Ring | None = None
 
 
-def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
+def reference_radius(
+    radius_map: RadiusMap, outline: Outline = circle, thickness: float = 0.0
+) -> float:
     """Radius of the planar mesh: the middle of the map's range, rounded, in [0.1, 0.9 / reach].
 
     Raises:
@@ -47,6 +68,6 @@ def reference_radius(radius_map: RadiusMap, outline: Outline = circle) -> float:
     require_map(radius_map)
     law = radius_map.distribution
     radii = radius_map(np.linspace(law.lower, law.upper, 65))
-    require_fit(outline, float(radii.max()))
+    require_fit(outline, float(radii.max()) + thickness)
     middle = np.round((radii.min() + radii.max()) * 10) / 20
     return float(np.clip(middle, 0.1, 0.9 / reach(outline)))

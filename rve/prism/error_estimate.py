@@ -57,12 +57,17 @@ def _judged_energies(
 def _exact(cell: Cell) -> HomogenisedStiffness:
     """Result of another model of the cell, far more accurate than wedges are."""
     matrix, inclusion = cell.matrix, cell.inclusion
-    if cell.square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
+    if (
+        cell.square
+        and cell.interphase is None
+        and isinstance(matrix, Phase)
+        and isinstance(inclusion, Phase)
+    ):
         return SeriesModel(accuracy=_ACCURACY, energies=True).solve(
             cell.radius, matrix, [inclusion]
         )[0]
     model = SlicesModel(points=_POINTS, outline=cell.outline, energies=True)
-    return model.solve(cell.radius, matrix, [inclusion])[0]
+    return model.solve(cell.radius, matrix, [inclusion], cell.interphase)[0]
 
 
 def _readings(curve: StressCurve) -> Sequence[Array]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.rve.cell import THREE_LOADS, AnyPhase, Cell
+from alphacut.rve.cell import THREE_LOADS, AnyPhase, Cell, Interphase, thickness_of
 from alphacut.rve.fenicsx import at_points, fem
 from alphacut.rve.form import strain
 from alphacut.rve.mesh.wedge import vertices_and_midpoints
@@ -52,7 +52,11 @@ class CellFields:
 
 
 def cell_fields(
-    model: PrismModel, radius_map: RadiusMap, matrix: AnyPhase, inclusion: AnyPhase
+    model: PrismModel,
+    radius_map: RadiusMap,
+    matrix: AnyPhase,
+    inclusion: AnyPhase,
+    interphase: Interphase | None = None,
 ) -> CellFields:
     """Fields of one cell, on one rank, by a mesh that follows the interface.
 
@@ -68,7 +72,8 @@ def cell_fields(
         >>> fields.vtk_cells.shape == fields.cells.shape
         True
     """
-    cell, problem = Cell(matrix, inclusion, radius_map, model.outline), model.problem(radius_map)
+    cell = Cell(matrix, inclusion, radius_map, model.outline, interphase)
+    problem = model.problem(radius_map, thickness_of(interphase))
     return _fields(problem, cell.stiffness, model.loads(cell), model.options)
 
 
@@ -94,7 +99,7 @@ def _fields(
     vectors = solve(problem.solver(options), problem.loads(loads)).vectors
     fluctuation, own = fem.Function(form.space), np.arange(len(form.wedge), dtype=np.int32)
     at_nodes = at_points(strain(fluctuation), vertices_and_midpoints())
-    positions = grid.positions(problem.map)
+    positions = grid.positions(problem.map, problem.thickness)
     total = np.empty((grid.nodes, 2, len(vectors)))
     wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, vector in enumerate(vectors):

@@ -75,8 +75,10 @@ class PrismForm:
         self._strain = at_points(strain(self._u), points)
         self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
 
-    def place(self, radius: RadiusMap) -> None:
+    def place(self, radius: RadiusMap, thickness: float = 0.0) -> None:
         """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
+
+        An interphase, of a grid that has one, gets its thickness.
 
         Raises:
             FoldedMeshError: An element is inverted; the form then stays where it was.
@@ -86,15 +88,15 @@ class PrismForm:
         nodes = self.mesh.geometry.x.copy()
         state = {name: getattr(self, name) for name in names if hasattr(self, name)}
         try:
-            self._move(radius)
+            self._move(radius, thickness)
         except (FoldedMeshError, RefusedError):
             self.mesh.geometry.x[:] = nodes
             self.__dict__.update(state)
             raise
 
-    def _move(self, radius: RadiusMap) -> None:
+    def _move(self, radius: RadiusMap, thickness: float) -> None:
         """Moves the nodes, and marks the particle where they are sound."""
-        positions, geometry = self.grid.positions(radius), self.mesh.geometry
+        positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.levels(radius.distribution)
         self._law = radius.distribution

@@ -19,12 +19,21 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import LOADS, THREE_LOADS, AnyPhase, Cell, Phase, moduli_of_energies
+from alphacut.rve.cell import (
+    LOADS,
+    THREE_LOADS,
+    AnyPhase,
+    Cell,
+    Interphase,
+    Phase,
+    moduli_of_energies,
+    thickness_of,
+)
 from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.grading import REFINEMENTS
-from alphacut.rve.mesh.triangulation import reference_radius
+from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
 from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.prism.error_estimate import judged
@@ -33,7 +42,12 @@ from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_ba
 from alphacut.rve.prism.own_mesh import NamedPhases, own_mesh_problem, require_own_mesh
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
-from alphacut.rve.settings import require_compressible, require_mesh_size, require_parts
+from alphacut.rve.settings import (
+    require_compressible,
+    require_interphase,
+    require_mesh_size,
+    require_parts,
+)
 from alphacut.rve.solver.krylov import Solutions, solve
 from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap, ThetaLaw
@@ -99,6 +113,7 @@ class PrismModel:
         radius_map: RadiusMap | ThetaLaw,
         matrix: AnyPhase | Mapping[str, AnyPhase],
         inclusions: Sequence[AnyPhase] = (),
+        interphase: Interphase | None = None,
     ) -> list[HomogenisedStiffness]:
         """One result for each of `inclusions`, in their order, on one mesh.
 
@@ -120,14 +135,15 @@ class PrismModel:
         radius_map = cast("RadiusMap", radius_map)
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
+        require_interphase(interphase, self.outline)
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
-            problem = self.problem(radius_map)
+            problem = self.problem(radius_map, thickness_of(interphase))
         with timed(seconds, "solve"):
-            basis = self._basis(problem, matrix, inclusions)
+            basis = None if interphase else self._basis(problem, matrix, inclusions)
         results = []
         for inclusion in inclusions:
-            cell = Cell(matrix, inclusion, radius_map, self.outline)
+            cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
             if basis is not None and isinstance(inclusion, Phase):
                 strains, residual = basis.project(inclusion.modulus), basis.error
                 iterations = basis.iterations
@@ -182,28 +198,34 @@ class PrismModel:
         problem.move(named.law)
         return problem, named
 
-    def problem(self, radius_map: RadiusMap) -> PrismProblem:
+    def problem(self, radius_map: RadiusMap, thickness: float = 0.0) -> PrismProblem:
         """The mesh and the form, moved to a map; kept for the next map.
+
+        Args:
+            radius_map: The map.
+            thickness: Of the interphase, 0 for none.
 
         Raises:
             FoldedMeshError: The map bends more than the layers can follow.
             RefusedError: A radius does not fit into the cell.
         """
-        radius = reference_radius(radius_map, self.outline)
+        radius = reference_radius(radius_map, self.outline, thickness)
         if self.interface != "conforming":
             return self._moved(radius_map, 0.0, REFINEMENTS[0])
         if is_round(self.outline):
-            return self._moved(radius_map, radius, REFINEMENTS[0])
+            return self._moved(radius_map, radius, REFINEMENTS[0], thickness)
         for refinement in REFINEMENTS[:-1]:
             with suppress(FoldedMeshError):
                 return self._moved(radius_map, radius, refinement)
         return self._moved(radius_map, radius, REFINEMENTS[-1])
 
-    def _moved(self, radius_map: RadiusMap, radius: float, refinement: float) -> PrismProblem:
+    def _moved(
+        self, radius_map: RadiusMap, radius: float, refinement: float, thickness: float = 0.0
+    ) -> PrismProblem:
         """The problem on a mesh made at a radius, moved to a map."""
-        size, layers = self.mesh_size, self.layers
-        problem = _problem(size, radius, self.outline, refinement, layers, self.parallel)
-        problem.move(radius_map)
+        mesh = (self.mesh_size, radius, self.outline, refinement, self.layers, self.parallel)
+        problem = _problem(*mesh, RING_THICKNESS if thickness else 0.0)
+        problem.move(radius_map, thickness)
         return problem
 
     @property
@@ -324,9 +346,22 @@ def timed(seconds: Seconds, stage: str) -> Iterator[None]:
 
 @lru_cache(maxsize=2)
 def _problem(
-    size: float, radius: float, outline: Outline, refinement: float, layers: int, parallel: bool
+    size: float,
+    radius: float,
+    outline: Outline,
+    refinement: float,
+    layers: int,
+    parallel: bool,
+    thickness: float,
 ) -> PrismProblem:
     """Mesh, form and numbering: they do not depend on the map, only on these."""
-    grid = extrude(size=size, radius=radius, layers=layers, outline=outline, refinement=refinement)
+    grid = extrude(
+        size=size,
+        radius=radius,
+        layers=layers,
+        outline=outline,
+        refinement=refinement,
+        thickness=thickness,
+    )
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     return PrismProblem(grid, comm)

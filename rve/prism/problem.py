@@ -97,15 +97,19 @@ class PrismProblem:
         self.matrix = zero_matrix(pairs[cells], self.local_map, rows, self.numbering.size)
         self._to_nodes = NodeScatter(pairs[self.form.node], self.matrix.createVecRight())
 
-    def move(self, radius_map: RadiusMap) -> None:
+    def move(self, radius_map: RadiusMap, thickness: float = 0.0) -> None:
         """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
+
+        Args:
+            radius_map: The map.
+            thickness: Of the interphase, of a grid that has one.
 
         Raises:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive everywhere.
         """
-        self.map = radius_map
-        self.form.place(radius_map)
+        self.map, self.thickness = radius_map, thickness
+        self.form.place(radius_map, thickness)
 
     def assemble(self, stiffness: Sequence[Array], parts: slice = WHOLE) -> PETSc.Mat:
         """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa.

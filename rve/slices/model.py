@@ -17,7 +17,15 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve.cell import STRAIN, AnyPhase, Cell, axial_moduli, square_moduli
+from alphacut.rve.cell import (
+    STRAIN,
+    AnyPhase,
+    Cell,
+    Interphase,
+    axial_moduli,
+    square_moduli,
+    thickness_of,
+)
 from alphacut.rve.certificate import certified
 from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
@@ -25,6 +33,7 @@ from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import (
     require_compressible,
     require_continuous,
+    require_interphase,
     require_mesh_size,
     require_parts,
     require_points,
@@ -89,7 +98,11 @@ class SlicesModel:
         require_points(self.points)
 
     def solve(
-        self, radius_map: RadiusMap, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+        self,
+        radius_map: RadiusMap,
+        matrix: AnyPhase,
+        inclusions: Sequence[AnyPhase],
+        interphase: Interphase | None = None,
     ) -> list[HomogenisedStiffness]:
         """One result for each of `inclusions`, in their order.
 
@@ -99,17 +112,18 @@ class SlicesModel:
         """
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
+        require_interphase(interphase, self.outline)
         every = require_continuous(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
         solved = np.concatenate([radius_map(rule.nodes), [every.min(), every.max()]])
         radii, places = np.unique(np.round(solved, DIGITS), return_inverse=True)
         nodes = places[: rule.nodes.size]
-        slices = [self._slice(radius, matrix, inclusions) for radius in radii]
+        slices = [self._slice(radius, matrix, inclusions, interphase) for radius in radii]
         seconds = {"total": perf_counter() - start}
         results = []
         for m, inclusion in enumerate(inclusions):
-            cell = Cell(matrix, inclusion, radius_map, self.outline)
+            cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
             stiffness = np.array([one.stiffness(self.order)[m] for one in slices])
             moduli = square_moduli(stiffness)
             error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
@@ -123,7 +137,12 @@ class SlicesModel:
                 errors={
                     "space": mean_errors(curve, error[nodes], square=cell.square),
                     "theta": theta_error(
-                        radius_map, rule, radii=radii, moduli=moduli, phases=cell.phases
+                        radius_map,
+                        rule,
+                        radii=radii,
+                        moduli=moduli,
+                        phases=cell.phases,
+                        thickness=thickness_of(interphase),
                     ),
                 },
                 cell=cell,
@@ -144,31 +163,43 @@ class SlicesModel:
     def _mean_energies(
         self, result: HomogenisedStiffness, radii: Array, nodes: Array, values: Array, errors: Array
     ) -> PhaseEnergies:
-        """Means of energies at `radii`, (n, 2, 2, 3); those of the rule are at `nodes` of them."""
+        """Means of energies at `radii`, (n, phases, 2, 3); the rule's nodes are `nodes` of them."""
         cell, rule = result.cell, ThetaRule(result.curve.theta, result.curve.weights)
         assert cell is not None
         moduli = values.sum(axis=(1, 2))
 
         def missed(at_radii: Array) -> Array:
             relative = theta_error(
-                cell.radius, rule, radii=radii, moduli=at_radii, phases=cell.phases
+                cell.radius,
+                rule,
+                radii=radii,
+                moduli=at_radii,
+                phases=cell.phases,
+                thickness=thickness_of(cell.interphase),
             )
             return relative * rule.mean(at_radii[nodes])
 
         # moduli of stiffer phases, c + X ∂c/∂X, are averaged as well as moduli are
-        in_theta = [[missed(moduli + values[:, p, x]) for x in range(2)] for p in range(2)]
+        in_theta = [
+            [missed(moduli + values[:, p, x]) for x in range(2)] for p in range(len(cell.phases))
+        ]
         error = rule.mean(errors[nodes]) + np.array(in_theta) + missed(moduli)
         return PhaseEnergies(rule.mean(values[nodes]), error)
 
     def _slice(
-        self, radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
+        self,
+        radius: float,
+        matrix: AnyPhase,
+        inclusions: Sequence[AnyPhase],
+        interphase: Interphase | None,
     ) -> Slice | OutlineSlice:
         """One plane cell by what tells its error."""
         size, outline = self.mesh_size, self.outline
         options = {"mesh_size": size, "outline": outline, "energies": self.energies}
-        if is_round(outline):
+        if is_round(outline) and interphase is None:
             return solve_slice(radius, matrix, inclusions, **options)
-        return solve_outline_slice(radius, matrix, inclusions, order=self.order, **options)
+        options |= {"order": self.order, "interphase": interphase}
+        return solve_outline_slice(radius, matrix, inclusions, **options)
 
 
 def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
@@ -254,7 +285,8 @@ def solve_slice(
 
     mesh = plane_mesh(radius, size=mesh_size, outline=outline)
     cells = {order: PlaneCell(mesh, order) for order in _ORDERS}
-    stiffness, parts = _by_order(cells, matrix, inclusions, energies=energies)
+    phases = [(matrix, inclusion) for inclusion in inclusions]
+    stiffness, parts = _by_order(cells, phases, energies=energies)
     return Slice(
         np.array([*stiffness.values()]),
         {order: cell.unknowns for order, cell in cells.items()},
@@ -273,8 +305,9 @@ def solve_outline_slice(
     outline: Outline,
     order: int = ACCURATE,
     energies: bool = False,
+    interphase: Interphase | None = None,
 ) -> OutlineSlice:
-    """Solve one plane cell with a particle that is not round, on two meshes.
+    """Solve one plane cell with a particle that is not round, or in a ring, on two meshes.
 
     Args:
         radius: Of the particle.
@@ -284,18 +317,24 @@ def solve_outline_slice(
         outline: Of the particle.
         order: Of the result.
         energies: Whether to compute the energies of the phases.
+        interphase: Ring around a round particle.
     """
     from alphacut.rve.mesh.curved import plane_mesh
     from alphacut.rve.slices.plane_cell import PlaneCell
 
-    mesh = plane_mesh(radius, size=mesh_size, outline=outline)
-    second = plane_mesh(radius, size=second_size(mesh_size), outline=outline)
-    cells = {one: PlaneCell(mesh, one) for one in {order, ACCURATE, JUDGE}}
-    stiffness, parts = _by_order(cells, matrix, inclusions, energies=energies)
+    thickness = thickness_of(interphase)
+    ring = () if interphase is None else (interphase.phase,)
+    phases = [(matrix, inclusion, *ring) for inclusion in inclusions]
+    first, second = (
+        plane_mesh(radius, size=size, outline=outline, thickness=thickness)
+        for size in (mesh_size, second_size(mesh_size))
+    )
+    cells = {degree: PlaneCell(first, degree) for degree in {order, ACCURATE, JUDGE}}
+    stiffness, parts = _by_order(cells, phases, energies=energies)
     judge = {JUDGE: PlaneCell(second, JUDGE)}
     return OutlineSlice(
         by_order=stiffness,
-        on_second_mesh=_by_order(judge, matrix, inclusions)[0][JUDGE],
+        on_second_mesh=_by_order(judge, phases)[0][JUDGE],
         unknowns={one: cell.unknowns for one, cell in cells.items()},
         round_off=_ROUND_OFF + _cancelled(radius, matrix, inclusions),
         energies=parts,
@@ -303,18 +342,14 @@ def solve_outline_slice(
 
 
 def _by_order(
-    cells: Mapping[int, PlaneCell],
-    matrix: AnyPhase,
-    inclusions: Sequence[AnyPhase],
-    *,
-    energies: bool = False,
+    cells: Mapping[int, PlaneCell], samples: Sequence[Sequence[AnyPhase]], *, energies: bool = False
 ) -> tuple[dict[int, Array], dict[int, Array]]:
-    """Stiffness, (m, 3, 3), and energies if wanted, (m, 2, 2, 3), for all inclusions by order."""
+    """Stiffness, (m, 3, 3), and energies if wanted, (m, phases, 2, 3), of samples by order."""
     stiffness, parts = defaultdict(list), defaultdict(list)
-    for (order, cell), inclusion in product(cells.items(), inclusions):
-        stiffness[order].append(cell.stiffness((matrix.stiffness, inclusion.stiffness)))
+    for (order, cell), phases in product(cells.items(), samples):
+        stiffness[order].append(cell.stiffness([phase.stiffness for phase in phases]))
         if energies:
-            parts[order].append(cell.phase_energies((matrix, inclusion)))
+            parts[order].append(cell.phase_energies(phases))
     return tuple({order: np.array(x) for order, x in of.items()} for of in (stiffness, parts))
 
 

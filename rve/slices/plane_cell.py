@@ -39,8 +39,9 @@ class PlaneCell:
         plane.geometry.x[:, :2] = nodes[plane.geometry.input_global_indices]
         space = fem.functionspace(plane, element)
         rule = {"quadrature_degree": quadrature_degree(order)}
-        inside = mesh.inside[plane.topology.original_cell_index]
-        parts = [measure_of(plane, np.flatnonzero(inside == flag), rule) for flag in (False, True)]
+        phase = mesh.phase[plane.topology.original_cell_index]
+        count = int(mesh.phase.max()) + 1
+        parts = [measure_of(plane, np.flatnonzero(phase == k), rule) for k in range(count)]
         self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), parts)
         self._form.density.x.array[:] = 1.0
         self._places: Array = np.empty((len(nodes), 2))
@@ -51,7 +52,7 @@ class PlaneCell:
         rows = range(self.unknowns)
         self._matrix = zero_matrix(pairs[space.dofmap.list], self._local, rows, self.unknowns)
 
-    def stiffness(self, phases: tuple[Array, Array]) -> Array:
+    def stiffness(self, phases: Sequence[Array]) -> Array:
         """Homogenised stiffness in Pa, Voigt order, shape (3, 3), for the phases' matrices.
 
         Raises:
@@ -74,16 +75,16 @@ class PlaneCell:
         gained = [[load.dot(x) for x in solved.vectors] for load in loads]
         return np.asarray((uniform - gained) / AREA)  # ⟨σ⟩ by Hill–Mandel
 
-    def phase_energies(self, phases: tuple[AnyPhase, AnyPhase]) -> Array:
-        """Parts of K and G of the phases in the three moduli, shape (2, 2, 3), in Pa.
+    def phase_energies(self, phases: Sequence[AnyPhase]) -> Array:
+        """Parts of K and G of the phases in the three moduli, shape (phases, 2, 3), in Pa.
 
         They are of the fields of the last `stiffness`, which was of these phases.
         """
-        energies = np.zeros((2, 2, 3))
+        energies = np.zeros((len(phases), 2, 3))
         fields = [self._field(strain) for strain in THREE_LOADS]
         for kind in range(2):
             self._form.set_phases([phase.stiffness_parts[kind] for phase in phases])
-            for k in range(2):
+            for k in range(len(phases)):
                 of_loads = self._energies(fields, slice(k, k + 1))
                 energies[k, kind] = moduli_of_energies(of_loads, THREE_LOADS)
         return energies

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
@@ -22,7 +24,8 @@ def theta_error(
     *,
     radii: Array,
     moduli: Array,
-    phases: tuple[AnyPhase, AnyPhase],
+    phases: Sequence[AnyPhase],
+    thickness: float = 0.0,
 ) -> Array:
     """Declared relative errors of the mean C11 + C12, C11 − C12 and C33 by `rule`, shape (3,).
 
@@ -37,7 +40,8 @@ def theta_error(
         rule: Its n nodes.
         radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
         moduli: C11 + C12, C11 − C12 and C33 at `radii`, shape (m, 3).
-        phases: Matrix and inclusion.
+        phases: Matrix and inclusion first.
+        thickness: Of an interphase, which rings that nearly touch add to their radii.
     """
     places = np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
     weights = np.maximum(np.bincount(places, rule.weights, minlength=radii.size), 1e-6)
@@ -46,7 +50,7 @@ def theta_error(
     between = radius_map(fine.nodes)
     scale, logarithm = _dilute(between, phases), np.log(moduli / _dilute(radii, phases))
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
-    touch, target = np.sqrt(1 - radii**2), np.sqrt(1 - between**2)
+    touch, target = np.sqrt(1 - (radii + thickness) ** 2), np.sqrt(1 - (between + thickness) ** 2)
     ends, width = touch.min() + touch.max(), max(np.ptp(touch), 1e-12)
     own, gaps = rule.weights @ moduli[places], []
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
@@ -57,6 +61,6 @@ def theta_error(
     return np.asarray(_SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
 
 
-def _dilute(radii: Array, phases: tuple[AnyPhase, AnyPhase]) -> Array:
-    """The moduli of Mori and Tanaka at radii, shape (n, 3)."""
-    return mori_tanaka(np.pi / 4 * radii**2, *phases)
+def _dilute(radii: Array, phases: Sequence[AnyPhase]) -> Array:
+    """The moduli of Mori and Tanaka of matrix and inclusion at radii, shape (n, 3)."""
+    return mori_tanaka(np.pi / 4 * radii**2, *phases[:2])
