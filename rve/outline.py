@@ -14,6 +14,8 @@ Outline = Callable[[Array], Array]
 """Takes angles φ of any shape, gives s(φ) > 0 of the same; smooth, of period 2π."""
 _ANGLES: Array = np.asarray(np.linspace(0, 2 * np.pi, 721), float)
 _BENDS = 720
+CLOSEST = 0.9995
+"""Largest reach of what slices mesh: between particles that are nearer elements have no end."""
 _ROUND = 1e-12
 
 

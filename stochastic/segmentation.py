@@ -119,7 +119,7 @@ class Segmentation:
             f" drift of light of {self.drift:.3g} grey levels"
             + (f", and by impulses or scratches on {impulses:.1%}" if impulses else "")
         )
-        cure = "smooth = true takes noise away, level = true the drift of light"
+        cure = 'remove = ["noise", "light"] takes noise and the drift of light away'
         require(share <= most, "threshold", value=value, allowed=f"up to {most:.0%}", cure=cure)
 
 

@@ -33,6 +33,7 @@ from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
 from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.rve.outline import CLOSEST
 
 Stage = Literal["microstructure", "modulus", "envelope"]
 
@@ -189,6 +190,21 @@ class Content(Section):
             value=self.modulus.tolerance,
             allowed=allowed,
             cure=cure,
+        )
+        return self
+
+    @model_validator(mode="after")
+    def _ring(self) -> Self:
+        """Refuses an interphase that reaches to the sides of the cell."""
+        thickness = None if self.round is None else self.round.interphase_thickness
+        has_map = self.radius_map is not None or self.stated_fraction is not None
+        if thickness is None or not has_map or "microstructure" in self.stages:
+            return self
+        radius = self.round_cell[0].largest_radius
+        most = thickness.support.upper
+        allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
+        require(
+            radius + most < CLOSEST, "cell.interphase_thickness", value=f"{most:g}", allowed=allowed
         )
         return self
 

@@ -34,6 +34,11 @@ class FractionMap:
         """Law of θ, a normal one cut off at both ends."""
         return TruncatedNormal(*self.theta)
 
+    @property
+    def largest_radius(self) -> float:
+        """Largest radius of the support."""
+        return float(self.shape.reduced_radius(self.fraction.support.upper))
+
     def at(self, values: Mapping[str, float]) -> HermiteMap:
         """The map at a crisp fraction."""
         radius = self.shape.reduced_radius(values["fraction"])

@@ -28,13 +28,14 @@ from alphacut.case.types import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.rve.cell import VoigtPhase
+from alphacut.rve.cell import THINNEST, VoigtPhase
 from alphacut.rve.outline import Ellipse, circle, reach
 from alphacut.stochastic import HermiteMap, TruncatedNormal
 from alphacut.stochastic.particles.particles import DISCS, SPHERES, Shape
 
 Radius = Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)]
 Number = Annotated[FuzzyNumber, Quantity(fuzzy=True)]
+Thickness = Annotated[FuzzyNumber, Quantity(least=THINNEST, below=1, fuzzy=True)]
 Theta = Annotated[float, Quantity(least=-10, most=10)]
 ELLIPSES = re.compile(r"^ellipses\(([^,]*),([^,]*)\)$")
 SHAPES = (
@@ -72,6 +73,13 @@ class RadiusMapSection(ThetaSection):
         """The map at crisp values of its parameters."""
         a1, a2, a3, a4 = (values[name] for name in self.numbers)
         return HermiteMap(a1, a2, a3, a4, self.law)
+
+    @property
+    def largest_radius(self) -> float:
+        """Largest radius at the corners of the supports."""
+        corners = itertools.product(*(x.support for x in self.numbers.values()))
+        maps = (self.at(dict(zip(self.numbers, corner, strict=True))) for corner in corners)
+        return max(radius.extremes()[1] for radius in maps)
 
     @model_validator(mode="after")
     def _inside(self) -> Self:
@@ -125,6 +133,16 @@ class RoundCell(Section):
     inclusion_loss_bulk: Loss | None = Field(
         default=None, description="that of its bulk modulus, where it is another"
     )
+    interphase_thickness: Thickness | None = Field(
+        default=None,
+        description="thickness of a ring around the particle over half the cell's side",
+    )
+    interphase_modulus: Modulus | None = Field(
+        default=None, description="Young's modulus of the ring"
+    )
+    interphase_poisson: Ratio | None = Field(
+        default=None, description="Poisson's ratio of the ring"
+    )
     fraction: Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)] | None = Field(
         default=None,
         description="share of area, below π/4, or of volume of spheres, below π/6, that particles"
@@ -133,10 +151,11 @@ class RoundCell(Section):
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """The elastic constants by name."""
-        names = [f"{x}_{y}" for x in ("matrix", "inclusion") for y in ("modulus", "poisson")]
-        every = ((name, getattr(self, name)) for name in names)
-        return {name: number for name, number in every if isinstance(number, FuzzyNumber)}
+        """The elastic constants by name, and the thickness of an interphase."""
+        phases = ("matrix", "inclusion", "interphase")
+        names = [f"{phase}_{constant}" for phase in phases for constant in ("modulus", "poisson")]
+        pairs = [(name, getattr(self, name)) for name in (*names, "interphase_thickness")]
+        return {name: number for name, number in pairs if isinstance(number, FuzzyNumber)}
 
     @property
     def outline(self) -> Ellipse | None:
@@ -155,11 +174,16 @@ class RoundCell(Section):
         return self.outline is None and self.stiffness is None
 
     @property
+    def has_series(self) -> bool:
+        """True where the series has a formula: round particles of one isotropic material."""
+        return self.square and self.interphase_thickness is None
+
+    @property
     def methods(self) -> tuple[str, ...]:
         """Models that can solve it."""
         if self.particles == "spheres":
             return "series", "auto"
-        return (*(["series"] if self.square else []), "auto", "slices", "prism")
+        return (*(["series"] if self.has_series else []), "auto", "slices", "prism")
 
     @property
     def shape(self) -> Shape:
@@ -181,8 +205,8 @@ class RoundCell(Section):
 
     @property
     def fibres(self) -> bool:
-        """True for round fibres of an isotropic material."""
-        return self.square and self.particles == "cylinders"
+        """True for round fibres of an isotropic material in a matrix alone."""
+        return self.has_series and self.particles == "cylinders"
 
     @model_validator(mode="after")
     def _one_material(self) -> Self:
@@ -204,6 +228,20 @@ class RoundCell(Section):
             most = self.fraction.support.upper
             allowed = f"values below {touching:.6g}, where particles touch"
             require(most < touching, "cell.fraction", value=f"{most:g}", allowed=allowed)
+        return self
+
+    @model_validator(mode="after")
+    def _interphase(self) -> Self:
+        """Refuses a ring that lacks a number, one around other particles, and losses beside it."""
+        names = [f"interphase_{name}" for name in ("thickness", "modulus", "poisson")]
+        missing = [name for name in names if getattr(self, name) is None]
+        if len(missing) == len(names):
+            return self
+        allowed = f"all of {', '.join(names)}"
+        require(not missing, f"cell.{(missing or names)[0]}", value=None, allowed=allowed)
+        key, fits = "cell.interphase_thickness", self.particles == "cylinders"
+        require(fits, key, value=f"beside {self.particles}", allowed="a ring around cylinders")
+        require(not self.losses, "cell.matrix_loss", value="beside a ring", allowed="no losses")
         return self
 
     @model_validator(mode="after")
@@ -260,8 +298,9 @@ class ImageCell(Section):
     loss: Annotated[tuple[Loss, ...], Each] | None = Field(
         default=None, description="loss factor tan δ of each phase's Young's modulus at real ν"
     )
-    smooth: bool = Field(default=False, description="whether noise is taken away first")
-    level: bool = Field(default=False, description="whether the drift of light is taken away first")
+    remove: Annotated[tuple[Literal["noise", "light"], ...], Each] = Field(
+        default=(), description="what is taken away first: noise, the drift of light"
+    )
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:

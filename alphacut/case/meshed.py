@@ -87,6 +87,6 @@ class MeshedCell(Section):
         return False
 
     @property
-    def square(self) -> bool:
+    def has_series(self) -> bool:
         """False: a file may hold any phases."""
         return False

@@ -102,7 +102,7 @@ def export(content: Content, path: Path) -> Document:
     else:
         modal = cell.modal_cell(*content.round_cell)
         model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)
-        fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion)
+        fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion, modal.interphase)
     return {"file": str(path), "nodes": write_cell(fields, path)}
 
 

@@ -58,7 +58,7 @@ def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
         return content.structure_section.structure().linear
     number = None
     if not content.frame.is_whole:
-        if content.round is None or not content.round.square:
+        if content.round is None or not content.round.has_series:
             return None
         if content.radius_map is None and content.round.fraction is None:
             return None

@@ -18,7 +18,7 @@ from alphacut.io.files import Document
 from alphacut.io.problem import missing
 from alphacut.io.provenance import versions
 from alphacut.rve import bounds
-from alphacut.rve.cell import STRAIN, Cell, Phase
+from alphacut.rve.cell import STRAIN, Cell, Interphase, Phase
 from alphacut.rve.engineering_constants import NAMES, engineering_constants
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.outline import circle
@@ -56,7 +56,8 @@ def solve_cells(
 ) -> list[HomogenisedStiffness]:
     """One result for each cell; they share all but their inclusion."""
     first = cells[0]
-    return model(first.radius, first.matrix, [cell.inclusion for cell in cells])
+    ring = () if first.interphase is None else (first.interphase,)
+    return model(first.radius, first.matrix, [cell.inclusion for cell in cells], *ring)
 
 
 def meaning(cell: AnyCell, modulus: ModulusSection) -> str:
@@ -102,7 +103,7 @@ def _model_of_particle(
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
         return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11)).solve
-    if cell.square and method in ("auto", "series"):
+    if cell.has_series and method in ("auto", "series"):
         own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
         return SeriesModel(accuracy=own, energies=bool(cell.losses)).solve
     outline = cell.outline or circle
@@ -135,7 +136,11 @@ def particle_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell)
     """The cell with one particle at crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
     inclusion = cell.stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-    return Cell(matrix, inclusion, radius.at(values), cell.outline or circle)
+    ring = None
+    if cell.interphase_thickness is not None:
+        phase = Phase(values["interphase_modulus"], values["interphase_poisson"])
+        ring = Interphase(values["interphase_thickness"], phase)
+    return Cell(matrix, inclusion, radius.at(values), cell.outline or circle, ring)
 
 
 def modal_cell(radius: AnyRadius, cell: RoundCell) -> Cell:
@@ -172,7 +177,7 @@ def references(
     radii = map_of(rule.nodes)
     shares = volume_fraction(radii) if spheres else modal.fraction(rule.nodes)
     share = np.asarray(rule.mean(shares))
-    if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase):
+    if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or modal.interphase:
         return {"fraction": float(share)}
     beside = {} if stated is None else {"fraction_of_case": stated}
     fraction, share = float(share), share if stated is None else np.asarray(stated)
@@ -242,7 +247,8 @@ def document(result: HomogenisedStiffness) -> Document:
 
 def fibres(result: HomogenisedStiffness) -> Document:
     """Constants of fibres with their declared errors, moduli in GPa; none of other particles."""
-    if isinstance(result, HomogenisedSpheres) or result.cell is None or not result.cell.square:
+    of = result.cell
+    if isinstance(result, HomogenisedSpheres) or of is None or not of.square or of.interphase:
         return {}
     constants, fibres = fibre_constants(result), {}
     for name, value in constants.values.items():

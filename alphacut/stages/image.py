@@ -185,7 +185,7 @@ def _thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
-    judged = segmented(grey, modal, smooth=cell.smooth, level=cell.level)
+    judged = segmented(grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove)
     judged.require()
     moved = [new - old for new, old in zip(judged.thresholds, modal, strict=True)]
     fuzzy = any(number.support.width > 0 for number in numbers)

@@ -211,7 +211,7 @@ class CellCampaign:
         modulus and both averages of the shear modulus. The radius rises with a1, a2, a3 and falls
         with a4, since h1, h2, h3 >= 0 >= h4 (eq. 12).
         """
-        if not self.cell.square or self.modulus.method == "prism":
+        if not self.cell.has_series or self.modulus.method == "prism":
             return Knowledge()
         of = {name: number.support for name, number in self.cell.constants.items()}
         matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]

@@ -13,11 +13,10 @@ from alphacut.rve.fenicsx import basix
 from alphacut.rve.mesh import square
 from alphacut.rve.mesh.grading import REFINEMENTS, Sizes, bend_grading, particle_grading
 from alphacut.rve.mesh.jacobian import LEAST_RATIO, jacobian_ratios
-from alphacut.rve.outline import Outline, circle, is_round, require_fit
+from alphacut.rve.outline import CLOSEST, Outline, circle, is_round, require_fit
 from alphacut.rve.settings import require_mesh_size
 
 MATRIX, PARTICLE, INTERPHASE = range(3)
-_CLOSEST = 0.9995
 COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
 
 ORDERS = 2, 3, 4, 5
@@ -67,7 +66,7 @@ def plane_mesh(
             have no end; or an outline is so sharp that elements fold however short they are.
     """
     require_mesh_size(size)
-    require_fit(outline, radius + thickness, _CLOSEST)
+    require_fit(outline, radius + thickness, CLOSEST)
     size, local = min(size, COARSEST), particle_grading(outline, radius, thickness)
     if is_round(outline):
         return _graded(radius, size, outline, local, thickness)

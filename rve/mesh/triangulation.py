@@ -10,7 +10,6 @@ from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.rve.outline import Outline, circle, reach, require_fit
 from alphacut.stochastic import RadiusMap, require_map
 
-
 RING_THICKNESS = 0.05
 """Of an interphase in the mesh that is moved to all others, in halves of the cell's side."""
 

@@ -236,7 +236,7 @@ def test_a_map_that_folds_the_mesh_leaves_the_model_as_it_was(monkeypatch):
     form = problem.form
     before = form.mesh.geometry.x.copy(), form.areas.copy(), form.slices()[0].copy()
     mirrored = form.grid.positions(HermiteMap(0.2, 0, 0.6, 0)) * [-1, 1, 1]
-    monkeypatch.setattr(type(form.grid), "positions", lambda grid, radius: mirrored)
+    monkeypatch.setattr(type(form.grid), "positions", lambda *_: mirrored)
     with pytest.raises(FoldedMeshError):
         form.place(HermiteMap(0.2, 0, 0.6, 0))
     after = form.mesh.geometry.x, form.areas, form.slices()[0]
