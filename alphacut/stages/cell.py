@@ -46,7 +46,7 @@ AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness in words."""
 
 
-def averaged(model: Solve, cells: Sequence[Any]) -> list[HomogenisedStiffness]:
+def averaged(model: Solve, cells: Sequence[AnySample]) -> list[HomogenisedStiffness]:
     """Results whose E and ν are those of the isotropic average of the plane stiffness."""
     return [result.averaged("isotropic") for result in model(cells)]
 

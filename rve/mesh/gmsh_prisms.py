@@ -61,7 +61,7 @@ def extruded(
         thickness: Of a ring around the particle, 0 for none.
     """
     with square.model() as gmsh:
-        parts = square.surfaces(gmsh, size, radius, outline, thickness)
+        parts = square.surfaces(size, radius, outline, thickness)
         planes = [(2, surface) for surfaces in parts.values() for surface in surfaces]
         extrusion = gmsh.model.geo.extrude(planes, 0, 0, 1, numElements=[layers], recombine=True)
         gmsh.model.geo.synchronize()

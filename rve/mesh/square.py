@@ -35,7 +35,7 @@ def triangles(
         thickness: Of a ring around it, 0 for none.
     """
     with model() as gmsh:
-        parts = surfaces(gmsh, size, radius, outline, thickness, sizes)
+        parts = surfaces(size, radius, outline, thickness, sizes)
         phases = [phase for phase, tags in parts.items() for _ in tags]
         if sizes:
             grade(gmsh, sizes)
@@ -55,23 +55,23 @@ def triangles(
 
 
 def surfaces(
-    gmsh: Any,
     size: float,
     radius: float,
     outline: Outline,
     thickness: float = 0.0,
     sizes: Sizes | None = None,
 ) -> dict[int, list[int]]:
-    """Surfaces of each phase: particle 1, if there is one, matrix 0, interphase 2, if there is one.
+    """Surfaces in Gmsh's model of each phase: particle 1, if there is one, matrix 0, interphase 2, if there is one.
 
     Args:
-        gmsh: With an empty model.
         size: Edge length, in halves of the cell's side.
         radius: Of the particle, 0 for none.
         outline: Of the particle.
         thickness: Of a ring around it, 0 for none.
         sizes: Edge length at (x1, x2), which the arcs of a ring take; `size` if left out.
     """
+    import gmsh
+
     geo = gmsh.model.geo
     if not radius:
         return {0: _square(geo, size)}

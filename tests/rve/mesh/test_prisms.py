@@ -106,7 +106,7 @@ def test_phases_sides_and_levels_have_names():
 
 def test_a_volume_without_a_name_is_refused():
     with square.model() as gmsh:
-        gmsh.model.geo.extrude([(2, square.surfaces(gmsh, 0.5, 0.0, circle)[0][0])], 0, 0, 1)
+        gmsh.model.geo.extrude([(2, square.surfaces(0.5, 0.0, circle)[0][0])], 0, 0, 1)
         gmsh.model.geo.synchronize()
         gmsh.model.mesh.generate(3)
         with pytest.raises(MeshError, match="volume 1 has no physical group"):
