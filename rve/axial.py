@@ -100,7 +100,8 @@ class AxialStiffness:
         cell, stiffness, errors = result.cell, result.stiffness, result.stiffness_errors
         if cell is None or stiffness is None or errors is None:
             return None
-        if not all(isinstance(phase, Phase) for phase in cell.phases):
+        isotropic = all(isinstance(phase, Phase) for phase in cell.phases)
+        if not isotropic or len(cell.phases) > 2:
             return None
         mixture, uneven = Mixture.of_cell(cell), stiffness @ EVEN / 2
         z, *ends = mixture.between(float(uneven @ EVEN / 2), float(result.modulus_errors[0]))

@@ -61,7 +61,7 @@ def surfaces(
     thickness: float = 0.0,
     sizes: Sizes | None = None,
 ) -> dict[int, list[int]]:
-    """Surfaces in Gmsh's model of each phase: particle 1, if there is one, matrix 0, interphase 2, if there is one.
+    """Surfaces in Gmsh of each phase by its number: particle 1, matrix 0, interphase 2.
 
     Args:
         size: Edge length, in halves of the cell's side.
