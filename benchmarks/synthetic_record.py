@@ -2,6 +2,7 @@
 
     python -m benchmarks.synthetic_record > cases/building.record.csv
     python -m benchmarks.synthetic_record --suite cases/suite
+    python -m benchmarks.synthetic_record --gust > cases/wind.force.csv
 
 The spectrum is that of Kanai and Tajimi with the high-pass of Clough and Penzien (Dynamics of
 Structures, 1975), the amplitude rises, stays and fades like a moderate earthquake. The seed is
@@ -112,8 +113,27 @@ def write_suite(folder: Path) -> None:
         (folder / f"record-{seed}.AT2").write_text(at2_text(record), encoding="utf-8")
 
 
+def gust_text(
+    seed: int = 1961, step: float = 0.25, count: int = 121, intensity: float = 0.18
+) -> str:
+    """Wind force over its mean as CSV, of turbulence in the spectrum of Davenport (1961)."""
+    frequencies = np.arange(1, 61) / 30  # Hz
+    x = 1200 * frequencies / 25  # of a mean wind of 25 m/s at 10 m
+    power = x**2 / (frequencies * (1 + x**2) ** (4 / 3))
+    phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, len(x))
+    time = np.arange(count) * step
+    turning = np.cos(np.outer(time, 2 * np.pi * frequencies) + phases)
+    turbulence = turning @ np.sqrt(power)
+    speed = 1 + intensity * turbulence / turbulence.std()
+    rows = "".join(f"{t:.2f},{f:.4f}\n" for t, f in zip(time, speed**2, strict=True))
+    head = f"# synthetic: made by python -m benchmarks.synthetic_record --gust, seed {seed}\n"
+    return f"{head}time [s],force\n{rows}"
+
+
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--suite"]:
+    if sys.argv[1:2] == ["--gust"]:
+        sys.stdout.write(gust_text())
+    elif sys.argv[1:2] == ["--suite"]:
         write_suite(Path(sys.argv[2]))
     else:
         sys.stdout.write(text(SyntheticRecord()))

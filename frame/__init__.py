@@ -18,14 +18,14 @@ from alphacut.frame.methods.sampled import Sampled
 from alphacut.frame.methods.search import Search
 from alphacut.frame.propagation import METHODS, envelope, require_envelope
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram, Force, History
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.frame.structures.quantities import Output, Parameter
 from alphacut.frame.structures.storey import StoreyFrame
 
 __all__ = [
-    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact",
-    "GraphFollower", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
+    "INTEGRATORS", "METHODS", "Accelerogram", "Auto", "DualProof", "Envelope", "Exact", "Force",
+    "GraphFollower", "History", "ImprovedFollower", "LagrangianFlow", "LagrangianSystem",
     "LinearFlow", "MatrixStructure", "Midpoint", "Output", "Parameter", "Proof", "RungeKutta4",
     "Sampled", "Search", "StoreyFrame", "envelope", "pendulum", "require_envelope",
 ]  # fmt: skip

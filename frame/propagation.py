@@ -275,7 +275,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     if isinstance(system, StoreyFrame):
         ends = zip(cuts.lower[0].tolist(), cuts.upper[0].tolist(), strict=True)
         system.require_standing(dict(zip(cuts.names, ends, strict=True)))
-    moved = system.ground is not None and np.any(system.ground.acceleration)
+    moved = system.ground is not None and np.any(system.ground.samples)
     for point in cuts.probes:
         at = ", ".join(f"{name} = {x:g}" for name, x in zip(cuts.names, point, strict=True))
         try:
@@ -289,11 +289,11 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             value=f"not positive definite at {at}",
             allowed="a mass for every unknown",
         )
-        moved = moved or matrices.q0.value.any() or matrices.v0.value.any()
+        pushed = matrices.forces is not None and matrices.forces.value.any()
+        moved = moved or pushed or matrices.start.value.any()
     _require_modal_order(system, cuts)
-    require(
-        moved, "q0, v0 and ground", value="zero", allowed="a start or a record that moves something"
-    )
+    key, allowed = "q0, v0, ground and loads", "a start, a record or a force that moves something"
+    require(moved, key, value="zero", allowed=allowed)
 
 
 def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:

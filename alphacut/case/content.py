@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from alphacut.case.forces import ForceSection, with_forces
 from alphacut.case.limits import (
     DecisionSection,
     FragilitySection,
@@ -32,6 +33,7 @@ from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
 from alphacut.case.types import Section, Some, after, unlike
+from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.outline import CLOSEST
 
@@ -55,6 +57,7 @@ class Content(Section):
     pendulum: Pendulum | None = None
     matrices: MatricesSection | None = None
     records: RecordsSection | None = None
+    force: tuple[ForceSection, ...] = ()
     study: tuple[Study, ...] = ()
     envelope: EnvelopeSection | None = None
     identify: Identify | None = None
@@ -142,8 +145,24 @@ class Content(Section):
     @property
     def structure(self) -> Structure | None:
         """The structure, with a stand-in for a modulus that is yet to be computed."""
-        section = self.structure_section
-        return None if section is None else section.structure()
+        return None if self.structure_section is None else self.structure_of()
+
+    def structure_of(
+        self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
+    ) -> Structure:
+        """The structure with its forces.
+
+        Args:
+            modulus: Young's modulus in Pa; its own by default.
+            loss: Loss factor of its material, where the case takes damping from there.
+
+        Raises:
+            RefusedError: There is no structure, or it takes no such force.
+        """
+        if self.structure_section is None:
+            raise RefusedError("envelope", None, "a structure and a section [envelope]")
+        unknowns = () if self.matrices is None else self.matrices.unknowns
+        return with_forces(self.structure_section.structure(modulus, loss), self.force, unknowns)
 
     @property
     def structure_section(self) -> Frame | Pendulum | MatricesSection | None:
@@ -254,8 +273,9 @@ class Content(Section):
         """Refuses a structure that nothing moves, and questions that a suite does not answer."""
         section, suite = self.structure_section, self.records
         ground = getattr(section, "accelerogram", None)
-        moves = suite is not None or getattr(section, "starts", True) or ground is not None
-        allowed = "a start, an accelerogram, or a section [records]"
+        pushed = suite is not None or ground is not None or bool(self.force)
+        moves = pushed or getattr(section, "starts", True)
+        allowed = "a start, an accelerogram, a section [records] or [[force]]"
         require(
             moves,
             "frame.displacements",
@@ -272,6 +292,8 @@ class Content(Section):
             )
             return self
         require(ground is None, "records", value="beside an accelerogram", allowed="one of them")
+        if self.matrices is not None:
+            self.matrices.require_pattern()
         for key in ("probability", "tolerances", "identify"):
             answered = getattr(self, key) is None
             allowed = "[decision] and [fragility] beside [records]"

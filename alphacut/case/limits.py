@@ -171,5 +171,6 @@ class FragilitySection(QuestionSection):
             np.any(x)
             for x in (getattr(structure.linear, "q0", 0), getattr(structure.linear, "v0", 0))
         )
-        allowed = "linear structures that start at rest, which scale with their record"
+        moves = moves or bool(structure.linear and structure.linear.loads)
+        allowed = "linear structures that start at rest, without forces: they scale with records"
         require(not moves, "fragility", value="of another motion", allowed=allowed)

@@ -197,9 +197,14 @@ class MatricesSection(Section):
             given = (output.row is None) != (output.file is None)
             require(given, f"matrices.outputs.{name}", value=None, allowed="one of row and file")
         require(bool(self.outputs), "matrices.outputs", value=None, allowed="one output or more")
+        if self.accelerogram is not None or self.direction:
+            self.require_pattern()
+        self.structure()
+        return self
+
+    def require_pattern(self) -> None:
+        """Refuses a structure that the ground does not move."""
         ends = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(ends[:8])}, or pattern"
         moved = bool(self._pattern().any())
-        require(moved, "matrices.direction", value=self.direction or None, allowed=allowed)
-        self.structure()
-        return self
+        require(moved, "matrices.direction", self.direction or None, allowed)

@@ -55,7 +55,7 @@ def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     if "envelope" not in content.stages or content.structure_section is None:
         return None
     if content.frame is None:
-        return content.structure_section.structure().linear
+        return content.structure_of().linear
     number = None
     if not content.frame.is_whole:
         if content.round is None or not content.round.has_series:
@@ -65,7 +65,7 @@ def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
         quick = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
         model = model_of(content.round, content.mesh, quick)
         number = Crisp(solve(*content.round_cell, model).modulus)
-    return content.frame.structure(number).frame
+    return content.structure_of(number).frame
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:

@@ -26,14 +26,14 @@ def read_csv_record(file: TextFile) -> Recording:
     Raises:
         RefusedError: A unit is wrong, a row is no pair of numbers, or the steps are not even.
     """
-    (_, head), *rows = _rows(file)
+    (_, head), *rows = rows_of(file)
     time_factor, unit, size = _units(file, head)
-    table = np.array([[_number(file, place, cells, k) for k in (0, 1)] for place, cells in rows])
-    step = _even_step(file, time_factor * table[:, 0], [place for place, _ in rows])
+    table = numbered_rows(file, rows)
+    step = even_step(file, time_factor * table[:, 0], [place for place, _ in rows])
     return Recording("CSV", unit, step, size * table[:, 1])
 
 
-def _rows(file: TextFile) -> list[tuple[int, list[str]]]:
+def rows_of(file: TextFile) -> list[tuple[int, list[str]]]:
     """Lines from 0 that are neither empty nor comments, cut at the head's separator."""
     lines = [(place, line) for place, line in enumerate(file.lines)]
     lines = [(place, line) for place, line in lines if line.strip() and not line.startswith("#")]
@@ -56,6 +56,15 @@ def _units(file: TextFile, head: list[str]) -> tuple[float, str, float]:
     raise file.refusal(0, ",".join(head)[:80], ALLOWED)
 
 
+def numbered_rows(file: TextFile, rows: Sequence[tuple[int, list[str]]]) -> Array:
+    """Numbers of the first two columns, shape (n, 2).
+
+    Raises:
+        RefusedError: A cell is no finite number.
+    """
+    return np.array([[_number(file, place, cells, k) for k in (0, 1)] for place, cells in rows])
+
+
 def _number(file: TextFile, place: int, cells: Sequence[str], column: int) -> float:
     text = cells[column].strip() if column < len(cells) else ""
     if not NUMBER.fullmatch(text) or not np.isfinite(float(text)):
@@ -64,7 +73,7 @@ def _number(file: TextFile, place: int, cells: Sequence[str], column: int) -> fl
     return float(text)
 
 
-def _even_step(file: TextFile, time: Array, places: list[int]) -> float:
+def even_step(file: TextFile, time: Array, places: list[int]) -> float:
     """The step of times that are even from 0."""
     even = np.linspace(0, time[-1], len(time))
     off = np.abs(time - even)

@@ -127,7 +127,7 @@ class Pipeline:
         allowed = "loss factors of the cell, or a number"
         known = loss is not None or not by_material
         require(known, "frame.damping_ratio", value="material", allowed=allowed)
-        return section.structure(number, loss)
+        return content.structure_of(number, loss)
 
     def motion(self, structure: Structure, studies: bool = True) -> None:
         """Envelopes of the structure, of every study or of [envelope] alone."""

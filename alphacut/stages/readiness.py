@@ -57,11 +57,10 @@ def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> Cel
 
 def _require_motion(content: Content) -> None:
     """Requires an admissible motion of each study, and what questions ask of the structure."""
-    section = content.structure_section
-    if section is None or content.envelope is None:
+    if content.structure_section is None or content.envelope is None:
         return
     number, alpha = _modulus(content), content.envelope.alpha
-    structure = section.structure(number, _loss(content, number))
+    structure = content.structure_of(number, _loss(content, number))
     if content.identify is not None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:

@@ -65,7 +65,12 @@ def growth(phase: Array) -> dict[str, Array]:
     matrices, _ = evaluate(oscillator, (), np.zeros((1, 0)), derivatives=False)
     found = {}
     for name, method in INTEGRATORS.items():
-        transfer = np.array([method.step_map(matrices, float(h)).transfer.value[0] for h in phase])
+        transfer = np.array(
+            [
+                method.step_map(matrices, float(h), matrices.pushes(ground=False)).transfer.value[0]
+                for h in phase
+            ]
+        )
         found[name] = np.abs(np.linalg.eigvals(transfer)).max(1)
     return found
 

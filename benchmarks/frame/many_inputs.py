@@ -22,7 +22,7 @@ import numpy as np
 from alphacut.frame import Envelope, StoreyFrame, envelope
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import FuzzyNumber, Triangular
 from alphacut.fuzzy.refused import FailedError
 from benchmarks.rows import write

@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from alphacut.frame import DualProof, MatrixStructure, Output, envelope
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.arrays import Array
 from benchmarks.synthetic_record import SyntheticRecord

@@ -330,6 +330,8 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
         UnprovedError: A may be singular.
     """
     d, order = matrix.inputs, max(matrix.order, right.order)
+    if not d:
+        matrix, right, order = matrix.cut(0), right.cut(0), 0
     first, parts = np.linalg.inv(matrix.value), list[Array]()
     for degree in range(order + 1):
         known = right.part(degree)

@@ -146,7 +146,7 @@ class Tree:
             tuple(np.ascontiguousarray(x, float) for x in bounds),
             (self.best, self.point, self.jets),
             self.gap,
-            model.load is None,
+            not model.loads,
         )
         return outcome
 

@@ -11,6 +11,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.certificate.branch_and_bound import enclosed
 from alphacut.frame.certificate.remainder import Remainder, largest_growth, parts, suprema
+from alphacut.frame.modal.ground_response import Direct
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import first_optima
 from alphacut.frame.modal.optima import Optima
@@ -117,21 +118,24 @@ def certify(
 def _between(model: ModalModel) -> Array:
     """Bound of how far outputs stray from straight lines in the step to each node, shape (T, m).
 
-    It is h²/8 times a bound of the second time derivative, and h/4 times a kink where the record
-    jumps.
+    It is h²/8 times a bound of the second time derivative, and h/4 times a kink where a load jumps.
     """
     reach, h = np.ones(len(model.boxes.names)), model.flow.step
     rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
     curve = np.zeros((len(model.time), len(model.outputs)))
     kink = np.zeros_like(curve)
-    ground = model.flow.system.ground
+    at_once = np.zeros_like(curve)
     for part in parts(model, growth):
         size = suprema(part.share, reach)[0].reshape(model.count, -1)
+        if isinstance(part.load, Direct):
+            at_once += 2 * part.load.history.stray(model.time)[:, None] * size.sum(0)
+            continue
         wave = part.waves[0].copy()
-        if part.forced and ground is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
+        if part.load is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone
             # within a step a wave is at most exp(|g| h) times what it is at the end
             wave *= np.exp(np.maximum(-growth, 0.0) * h)
-            most, slope, jump = ground.extremes
+            most, slope = part.load.history.extremes
+            jump = max((x for _, x in part.load.history.jumps), default=0.0)
             together = Polynomial(
                 part.share.index,
                 2 * part.share.coefficients.reshape(-1, model.count, curve.shape[1]).sum(1).real,
@@ -140,7 +144,7 @@ def _between(model: ModalModel) -> Array:
             kink += jump * suprema(together, reach)[0]
         wave[1:] = np.maximum(wave[1:], wave[:-1])
         curve += 2 * (wave * rate**2) @ size
-    stray: Array = h**2 / 8 * curve + h / 4 * kink
+    stray: Array = h**2 / 8 * curve + h / 4 * kink + at_once
     stray[0] = 0.0
     return stray
 

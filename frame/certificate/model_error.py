@@ -21,9 +21,10 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.ratio_damping import LoewnerBounds, RatioDamping
 from alphacut.frame.certificate.remainder import MotionPart, largest_growth, parts, suprema
 from alphacut.frame.modal.fitting import fit_states
+from alphacut.frame.modal.ground_response import Direct
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence
-from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.structures.linear import LinearSystem, Matrices, evaluate, histories
 
 MOST_NUMBERS = 60_000_000
 """Values of the defects on their grid, at most: 0.5 GB."""
@@ -40,9 +41,9 @@ def proved_error(model: ModalModel) -> Array:
     """
     reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
     ratio, growth = RatioDamping.of(model), largest_growth(model.eigenvalue, reach)
+    states = fit_states(model)
     samples = [
-        (part, partial(_defects, model, part, states, ratio))
-        for part, states in zip(parts(model, growth), fit_states(model), strict=False)
+        (part, partial(_defects, model, part, states, ratio)) for part in parts(model, growth)
     ]
     grid = _grid(model)
     for _, sample in samples:
@@ -52,9 +53,10 @@ def proved_error(model: ModalModel) -> Array:
     deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
     for part, sample in samples:
         defect = _expanded(grid, sample)
-        deviation += part.push * np.hypot(
-            stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])
-        )
+        if isinstance(part.load, Direct):
+            own += 2 * part.waves[0][:, :1] * np.abs(defect["outputs"][:, 0]).sum(0)
+            continue
+        deviation += part.push * _size_of_start(defect, stiffness, mass)
         for k in range(model.count):
             force = mass.sup_dual(defect["dynamic"][:, k])
             if ratio is not None:
@@ -128,25 +130,68 @@ def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
 
 
+def _start(
+    system: LinearSystem, matrices: Matrices, part: MotionPart, q: Array, v: Array
+) -> dict[str, Array]:
+    """What a part's start (S, N) misses: of displacements and velocities, or of their forces."""
+    n = matrices.mass.value.shape[-1]
+    if part.load is None:
+        q, v = q - matrices.q0.value[..., 0], v - matrices.v0.value[..., 0]
+        forces = [matrices.static, matrices.impulse]
+        if forces == [None, None]:
+            return {"start_q": q, "start_v": v}
+        static, impulse = (np.zeros(n) if x is None else x.value[..., 0] for x in forces)
+    else:
+        of_ground = system.ground is not None
+        if of_ground and part.number == 0:
+            return {"start_q": q, "start_v": v + matrices.rigid[:, 0]}
+        assert matrices.forces is not None
+        static, impulse = np.zeros(n), matrices.forces.value[..., part.number - of_ground]
+    M, K = matrices.mass.value, matrices.stiffness.value
+    spring, momentum = ((x[:, None] @ A)[:, 0] for x, A in ((q, K), (v, M)))
+    return {"start_spring": spring - static, "start_momentum": momentum - impulse}
+
+
+def _size_of_start(
+    defect: dict[str, Array], stiffness: LoewnerBounds, mass: LoewnerBounds
+) -> float:
+    """Bound of what a start misses in the norm of energy; ‖q‖ in that of K is ‖K q‖ in K⁻¹'s."""
+    if "start_q" in defect:
+        return float(np.hypot(stiffness.sup(defect["start_q"]), mass.sup(defect["start_v"])))
+    spring, momentum = defect["start_spring"], defect["start_momentum"]
+    return float(np.hypot(stiffness.sup_dual(spring), mass.sup_dual(momentum)))
+
+
+def _at_once(model: ModalModel, part: MotionPart, unit: Array) -> dict[str, Array]:
+    """What the share of a load misses that acts on outputs at once."""
+    system, points = model.flow.system, model.boxes.to_physical(unit)
+    matrices, _ = evaluate(system, model.flow.names, points, derivatives=False)
+    assert matrices.feeds is not None
+    missed = part.share(unit).reshape(len(unit), model.count, -1)
+    missed[:, 0] -= matrices.feeds.value[..., part.number - len(histories(system))] / 2
+    return {"outputs": missed}
+
+
 def _defects(
-    model: ModalModel, part: MotionPart, states: Polynomial, ratio: RatioDamping | None, unit: Array
+    model: ModalModel,
+    part: MotionPart,
+    states: list[Polynomial],
+    ratio: RatioDamping | None,
+    unit: Array,
 ) -> dict[str, Array]:
     """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
+    if isinstance(part.load, Direct):
+        return _at_once(model, part, unit)
     system, points = model.flow.system, model.boxes.to_physical(unit)
     bare = system if ratio is None else polynomial_dependence.without_ratio(system)
     matrices, rows = evaluate(bare, model.flow.names, points, derivatives=False)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
-    q, v = (
-        (0.0, -matrices.rigid[:, 0])
-        if part.forced
-        else (matrices.q0.value[..., 0], matrices.v0.value[..., 0])
-    )
     rate = model.eigenvalue(unit)[..., None]
-    z = states(unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
+    place = 0 if part.load is None else 1 + part.number
+    z = states[place](unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
     shape, speed = np.split(z, 2, axis=-1)
     defects = {
-        "start_q": 2 * shape.real.sum(1) - q,
-        "start_v": 2 * speed.real.sum(1) - v,
+        **_start(system, matrices, part, 2 * shape.real.sum(1), 2 * speed.real.sum(1)),
         "kinematic": rate * shape - speed,
         "dynamic": rate * (speed @ M) + speed @ D.swapaxes(-1, -2) + shape @ K,
         "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),

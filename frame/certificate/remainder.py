@@ -15,7 +15,7 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial, derivative
 from alphacut.frame.dynamics.record_load import Segments
-from alphacut.frame.modal.ground_response import REACH
+from alphacut.frame.modal.ground_response import REACH, Direct, LoadTables
 from alphacut.frame.modal.model import ModalModel
 
 MOST_PARAMETERS = 6
@@ -54,16 +54,16 @@ def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class MotionPart:
-    """The free or the forced part of a modal model.
+    """The free part of a modal model, or what one load adds.
 
     Args:
         share: C_k, n m polynomials.
         waves: Bounds of the derivatives of w by λ, orders 0 to 3, shape (4, T, n).
         elapsed: Bounds of ∫ |w| from 0 to t, shape (T, n).
-        push: What the part has been set off with up to t: 1, or a bound of ∫ |a| in m/s, shape
-            (T,).
+        push: What the part has been set off with up to t: 1, or a bound of ∫ |a|, as m/s, (T,).
         left_out: Share of waves[0] by which the model's w may be wrong, shape (n,).
-        forced: Whether it is the forced part.
+        load: The load; None of the free part.
+        number: Its place among the loads.
     """
 
     share: Polynomial
@@ -71,45 +71,46 @@ class MotionPart:
     elapsed: Array
     push: Array
     left_out: Array
-    forced: bool = False
+    load: LoadTables | None = None
+    number: int = 0
 
 
 def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
-    """Free part of a model, and the forced one under a load; `growth` bounds Re λ_k, (n,)."""
+    """Free part of a model, and one of each load; `growth` bounds Re λ_k, (n,)."""
     time = model.time[:, None]
     powers = time ** np.arange(4)[:, None, None]
     elapsed = np.where(
         growth == 0, time, np.expm1(growth * time) / np.where(growth == 0, 1.0, growth)
     )
-    free = [
-        MotionPart(
-            model.coefficient,
-            powers * np.exp(growth * time),
-            elapsed,
-            np.ones(len(time)),
-            np.zeros(model.count),
-        )
-    ]
-    ground = model.flow.system.ground
-    if model.load is None or ground is None:
-        return free
-    steps = len(model.time) - 1
-    parts = ceil(model.flow.step / ground.step - 1e-9)
+    free = MotionPart(
+        model.coefficient,
+        powers * np.exp(growth * time),
+        elapsed,
+        np.ones(len(time)),
+        np.zeros(model.count),
+    )
+    return [free, *(_forced(model, growth, k) for k in range(len(model.loads)))]
+
+
+def _forced(model: ModalModel, growth: Array, number: int) -> MotionPart:
+    """The part that a load adds."""
+    load, steps = model.loads[number], len(model.time) - 1
+    if isinstance(load, Direct):
+        waves = np.zeros((4, len(model.time), model.count))
+        waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
+        none = np.zeros(len(model.time))
+        return MotionPart(load.share, waves, 0 * waves[0], none, load.truncation, load, number)
+    parts = ceil(model.flow.step / load.history.step - 1e-9)
     h, count = model.flow.step / parts, parts * steps
     kernels = [_largest(growth, h, count, power) for power in range(4)]
     # ∫ exp(g s) ds to the end of each interval, at most
     swell = np.cumsum(kernels[0], axis=0) * h
-    size = Segments(ground, h, count).magnitudes(count)
+    size = Segments(load.history, h, count).magnitudes(count)
     waves, elapsed, push = (
         _convolved(kernel, size)[..., ::parts, :]
         for kernel in (np.stack(kernels), swell, np.ones((count, 1)))
     )
-    return [
-        *free,
-        MotionPart(
-            model.load.share, waves, elapsed, push[:, 0], model.load.truncation, forced=True
-        ),
-    ]
+    return MotionPart(load.share, waves, elapsed, push[:, 0], load.truncation, load, number)
 
 
 def _largest(growth: Array, step: float, count: int, power: int) -> Array:
@@ -161,7 +162,7 @@ class Remainder:
         margin = np.zeros((len(model.time), m, 1 + d))
         for part in parts(model, growth):
             share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
-            noise = _noise(model, rate[0], forced=part.forced)
+            noise = _noise(model, rate[0], part.load)
             for k in range(n):
                 own = [x[..., k, :] for x in share], [x[..., k] for x in rate]
                 sizes = []
@@ -179,7 +180,7 @@ class Remainder:
         self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
 
 
-def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:
+def _noise(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
     """Bound of rounding in a mode's motion, as a share of its size, shape (T, n).
 
     Polynomials are sums of their terms, waves turn by λ t, and outputs are sums over modes; a
@@ -189,9 +190,8 @@ def _noise(model: ModalModel, rate: Array, *, forced: bool) -> Array:
     polynomial = count + model.degree + 2
     turned = rate * model.time[:, None]
     steps = polynomial * (2 + turned) + 12 * model.count + 4 * d**3 + 50
-    if forced and model.load is not None:
-        longest = max(len(table.time) for table in model.load.tables)
-        steps = steps + (8 * longest + MOST_TERMS) * np.exp(REACH)
+    if load is not None:
+        steps = steps + (8 * load.longest + MOST_TERMS) * np.exp(REACH)
     return np.finfo(float).eps * steps
 
 

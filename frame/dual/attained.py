@@ -15,16 +15,21 @@ response itself comes from the walk over the record.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.structure import Classical
-from alphacut.frame.response.duhamel import responses_at_named_nodes, responses_at_nodes
-from alphacut.frame.structures.linear import Accelerogram, LinearSystem, evaluate
+from alphacut.frame.response.duhamel import (
+    impulses,
+    responses_at_named_nodes,
+    responses_at_nodes,
+)
+from alphacut.frame.structures.linear import LinearSystem, evaluate, histories
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 ENTRY_ROUNDINGS = 8
@@ -99,7 +104,10 @@ def modes_at(
     omega, faster = np.sqrt(squared - decay**2), b / 2 + ratio / (2 * np.sqrt(positive))
     turn = faster + np.abs(1 - 2 * decay * faster) / (2 * omega)
     share, share_error, n = {}, {}, M.shape[-1]
-    moved = {"velocity": matrices.v0.value[..., 0], "start": matrices.q0.value[..., 0]}
+    q0, v0 = np.split(matrices.start.value[..., 0], 2, axis=-1)
+    moved, pushes = {"velocity": v0, "start": q0}, matrices.pushes(ground=False).value
+    for name, number in _numbers(system).items():
+        moved[name] = pushes[..., number]
     if system.ground is not None:
         moved["load"] = np.broadcast_to(matrices.rigid[:, 0], squared.shape)
     for name, x in moved.items():
@@ -125,6 +133,11 @@ def modes_at(
         structure.order,
         structure.rows[:, :n],  # accelerations are read of structures whose unknowns all have mass
     )
+
+
+def _numbers(system: LinearSystem) -> dict[str, int]:
+    """Places of the forces' names among the forces."""
+    return {name: i for i, name in enumerate(x for x in histories(system) if x != "load")}
 
 
 def _residual(shape: Array, matrix: Array, diagonal: Array) -> Array:
@@ -190,7 +203,7 @@ def outputs_at(
     point: Rows,
     output: Rows,
     time: Array,
-    loads: tuple[Array, Array, Array] | None,
+    loads: Mapping[str, LoadAtNodes],
 ) -> tuple[Array, Array]:
     """Values of outputs and bounds of their rounding, each shape (N,).
 
@@ -199,27 +212,30 @@ def outputs_at(
         point: Point of each value, shape (N,).
         output: Output of each value, shape (N,).
         time: Node of each value, shape (N,), in s.
-        loads: ρ and ρ′ (2, N, n), the rounding of ρ (N, n), and ∫ |a| up to the node (N,); None
-            without a record.
+        loads: The loads by name.
     """
     sigma, turn, t = modal.sigma[point], modal.turn[point], time[:, None]
     free = np.exp(sigma * t)
     of_free = free, t * free, (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(free)
     most = {"velocity": np.stack([np.ones_like(time), time])}
     most["start"], rho = most["velocity"], {"velocity": of_free, "start": of_free}
-    if loads is not None:
-        rho["load"] = loads[0][0], loads[0][1], loads[1]
-        most["load"] = np.stack([loads[2], time * loads[2]])
+    for name, load in loads.items():
+        rho[name] = load.rho[0], load.rho[1], load.error
+        most[name] = np.stack([load.impulse, time * load.impulse])
     read, read_error = modal.read(point, output)
-    total, error = np.zeros(len(point)), np.zeros(len(point))
+    total, total_error = np.zeros(len(point)), np.zeros(len(point))
     for source, values in rho.items():
         wave = _wave(source, sigma, turn, modal.order[output], values, most[source])
+        if source.startswith("force"):
+            direct = np.where(modal.order[output] == 2, loads[source].value, 0.0)
+            error = wave.error + gamma(8) * np.abs(direct)[:, None]
+            wave = replace(wave, value=wave.value + direct[:, None], error=error)
         share, share_error = modal.share[source][point], modal.share_error[source][point]
         total += (read * share * wave.value).sum(-1)
-        error += _error(modal, point, (read, read_error), (share, share_error), wave)
+        total_error += _error(modal, point, (read, read_error), (share, share_error), wave)
     longest = (np.einsum("skk->sk", modal.stiffness_error[point]) * turn * t).max(-1)
     # what is of second order in G is a share of `longest` of what is of first
-    return total, error / np.maximum(1 - longest, 1e-300)
+    return total, total_error / np.maximum(1 - longest, 1e-300)
 
 
 def _error(
@@ -247,24 +263,30 @@ def _error(
     return np.asarray(own)
 
 
-def loads_at_named_nodes(
-    sigma: Array, ground: Accelerogram, time: Array, node: Rows
-) -> tuple[Array, Array, Array]:
-    """`loads` of `outputs_at` for σ (N, n) at node (N,) of `time`."""
-    rho, error = responses_at_named_nodes(sigma, ground, time, node, 1)
-    return rho, error, impulses(ground, time)[node]
+@dataclass(frozen=True, eq=False)
+class LoadAtNodes:
+    """Responses to a load.
+
+    Args:
+        rho: ρ and ρ′, shape (2, N, n).
+        error: Bounds of the rounding of ρ, shape (N, n).
+        impulse: Bounds of ∫ |f| up to the node, shape (N,).
+        value: f, shape (N,).
+    """
+
+    rho: Array
+    error: Array
+    impulse: Array
+    value: Array
 
 
-def loads_at_nodes(sigma: Array, ground: Accelerogram, time: Array) -> tuple[Array, Array, Array]:
-    """`loads` of `outputs_at` for σ (n,) at all nodes."""
-    rho, error = responses_at_nodes(sigma, ground, time, 1)
-    return rho, error, impulses(ground, time)
+def load_at_named_nodes(sigma: Array, load: History, time: Array, node: Rows) -> LoadAtNodes:
+    """Responses for σ (N, n) at node (N,) of `time`."""
+    responses = responses_at_named_nodes(sigma, load, time, node, 1)
+    return LoadAtNodes(*responses, impulses(load, time)[node], load.values(time[node]))
 
 
-def impulses(ground: Accelerogram, time: Array) -> Array:
-    """Bounds of ∫ |a| up to each node, shape (T,), in m/s."""
-    size = np.abs(ground.acceleration)
-    larger = np.append(np.maximum(size[1:], size[:-1]), 0.0)
-    whole = np.append(0.0, np.cumsum(larger * ground.step))
-    last = np.minimum((time / ground.step).astype(int) + 1, len(whole) - 1)
-    return np.asarray(whole[last])
+def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
+    """Responses for σ (n,) at all nodes."""
+    responses = responses_at_nodes(sigma, load, time, 1)
+    return LoadAtNodes(*responses, impulses(load, time), load.values(time))

@@ -12,15 +12,16 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.attained import (
     Modal,
-    loads_at_named_nodes,
-    loads_at_nodes,
+    load_at_named_nodes,
+    load_at_nodes,
     modes_at,
     outputs_at,
 )
 from alphacut.frame.dual.level import Level
 from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
-from alphacut.frame.structures.linear import LinearSystem
+from alphacut.frame.structures.linear import LinearSystem, histories
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 
 MOST_ENTRIES = 400_000
@@ -56,6 +57,11 @@ class Box:
         return np.asarray((self.low + self.high) / 2)
 
     @cached_property
+    def loads(self) -> dict[str, History]:
+        """Histories of all loads by name."""
+        return histories(self.system)
+
+    @cached_property
     def structure(self) -> Classical:
         """The structure over the whole box."""
         return over_box(self.system, self.names, self.low, self.high)
@@ -75,7 +81,7 @@ class Box:
         try:
             moved = sources(self.system, self.structure)
             time = self.time[nodes]
-            return Level.of(self.structure, self.system.ground, time, moved, allowed)
+            return Level.of(self.structure, self.loads, time, moved, allowed)
         except UnprovedError as refusal:
             if refusal.along is not None:
                 refusal.along = int(self.active[refusal.along])
@@ -102,9 +108,8 @@ class Box:
             UnprovedError: A mode does not oscillate there.
         """
         modal, (total, m) = self._modal(np.zeros((1, len(self.active)))), self._shape
-        ground, loads = self.system.ground, None
-        if ground is not None:
-            loads = loads_at_nodes(modal.sigma[0], ground, self.time)
+        sigma = modal.sigma[0]
+        loads = {name: load_at_nodes(sigma, x, self.time) for name, x in self.loads.items()}
         once = np.zeros(total, int)
         columns = [outputs_at(modal, once, once + o, self.time, loads) for o in range(m)]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
@@ -123,9 +128,11 @@ class Box:
         return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
 
     def _motions(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
-        modal, ground, loads = self._modal(unit), self.system.ground, None
-        if ground is not None:
-            loads = loads_at_named_nodes(modal.sigma, ground, self.time, node)
+        modal = self._modal(unit)
+        loads = {
+            name: load_at_named_nodes(modal.sigma, load, self.time, node)
+            for name, load in self.loads.items()
+        }
         return outputs_at(modal, np.arange(len(unit)), output, self.time[node], loads)
 
     def _stray(self, modal: Modal) -> Array:
@@ -135,7 +142,7 @@ class Box:
         read = np.abs(modal.read(np.zeros(m, int), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
-            oscillator = Oscillators(grid, self.system.ground, self.time)
+            oscillator = Oscillators(grid, self.loads, self.time)
             for source, share in modal.share.items():
                 for o in outputs:
                     wave = oscillator.waves(source, int(modal.order[o]))
@@ -154,7 +161,7 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
 
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:
-    """Names of what moves the structure: load, velocity, start."""
+    """Names of what moves the structure: loads, velocity, start."""
     moved = np.asarray(structure.start.size().any(-1))
-    present = {"load": system.ground is not None, "velocity": moved[1], "start": moved[0]}
-    return tuple(name for name, is_there in present.items() if is_there)
+    at_start = [name for name, k in (("velocity", 1), ("start", 0)) if moved[k]]
+    return (*histories(system), *at_start)

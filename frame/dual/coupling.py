@@ -49,10 +49,10 @@ class Coupling:
 
         Args:
             orders: Derivative of the motion that each output takes, shape (m,).
-            excitation: The record, the nodes and the names of the sources.
+            excitation: The loads, the nodes and the names of the sources.
         """
-        ground, time, sources = excitation
-        table = Oscillators(self._grid(float(time[-1])), ground, time)
+        loads, time, sources = excitation
+        table = Oscillators(self._grid(float(time[-1])), loads, time)
         added, stray = (np.zeros((len(time), len(orders))) for _ in range(2))
         for order in np.unique(orders):
             o = np.flatnonzero(orders == order)

@@ -1,6 +1,6 @@
 """Intervening variables of the modes (section 7) as Taylor models with proved remainders.
 
-An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (load, velocity, start):
+An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start):
 few numbers a mode, its frequency ω_k = √(λ − g²), its decay g_k = (a + b λ)/2 + ζ √λ and its
 shares c_ks = (r·x)(x·M v_s)/(x·M x), r the output's row and v_s the pattern of the ground or the
 start. They bend little over the box, however many inputs it has.
@@ -197,6 +197,7 @@ def sources_of(structure: Classical, sources: Sequence[str]) -> TaylorModel:
         "load": structure.start[0] * 0.0 + structure.pattern,
         "velocity": structure.start[1],
         "start": structure.start[0],
+        **structure.forced,
     }
     return concatenate([vectors[name][None] for name in sources], -2)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ from alphacut.frame.dual.rest import Excitation
 from alphacut.frame.dual.slabs import Effort, bounds
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.waves import Grid, Oscillators, spanned
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress, share
 
@@ -63,13 +63,10 @@ class Tables:
 
 def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -> Tables:
     """Tables of all oscillators; `orders` are those of all outputs."""
-    ground, time, sources = excitation
+    loads, time, sources = excitation
     points, different = _points(single, float(time[-1])), sorted(map(int, set(orders)))
     grids = [spanned(mode.omega_range, mode.quotient_range, points) for mode in single]
-    modes = [
-        _responses(grid, ground if "load" in sources else None, time, sources, different)
-        for grid in grids
-    ]
+    modes = [_responses(grid, loads, time, sources, different) for grid in grids]
     made = [{o: np.stack([mode[o][i] for mode in modes]) for o in different} for i in range(3)]
     count = roundings(len(single), len(sources), single[0].omega.inputs)
     of_sums = {o: 2 * gamma(count) * np.abs(made[0][o]).max(-1) for o in different}
@@ -79,13 +76,13 @@ def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -
 
 def _responses(
     grid: Grid,
-    ground: Accelerogram | None,
+    loads: Mapping[str, History],
     time: Array,
     sources: Sequence[str],
     orders: Sequence[int],
 ) -> dict[int, tuple[Array, Array, Array]]:
     """Responses over a grid (sources, T, Q W), their error and stray (sources, T), by order."""
-    oscillators = Oscillators(grid, ground, time)
+    oscillators = Oscillators(grid, loads, time)
     made = {}
     for order in orders:
         waves = [oscillators.waves(source, order) for source in sources]
@@ -134,7 +131,7 @@ class Level:
     def of(
         cls,
         structure: Classical,
-        ground: Accelerogram | None,
+        loads: Mapping[str, History],
         time: Array,
         sources: tuple[str, ...],
         allowed: Array | None = None,
@@ -144,7 +141,7 @@ class Level:
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
-        excitation = (ground, time, sources)
+        excitation = (loads, time, sources)
         models = Models.of(structure, excitation, allowed)
         return cls(structure, models, tables(models.single, excitation, structure.order), sources)
 

@@ -55,7 +55,7 @@ class Models:
 
         Args:
             structure: The structure.
-            excitation: The record, the nodes and the names of the sources.
+            excitation: The loads, the nodes and the names of the sources.
             allowed: Doubt of each output that modes may leave which are not enclosed, shape (m,);
                 none unless given.
 

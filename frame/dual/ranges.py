@@ -7,13 +7,14 @@ and what an integral of |a| allows bounds them besides.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.dual.waves import Oscillators, absolute_moments, spanned
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.dual.waves import Oscillators, at_once, spanned
+from alphacut.frame.response.duhamel import absolute_moments
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
 POWERS = (0.0, 0.5, 1.0)
@@ -44,7 +45,7 @@ class Ranges:
 def response_ranges(
     omega: tuple[float, float],
     quotient: tuple[float, float],
-    ground: Accelerogram | None,
+    loads: Mapping[str, History],
     time: Array,
     sources: Sequence[str],
     orders: Sequence[int],
@@ -56,7 +57,7 @@ def response_ranges(
         for order in orders
     }
     for ends in _pieces(omega):
-        piece = _Piece(ends, quotient, ground, time)
+        piece = _Piece(ends, quotient, loads, time)
         for order, ranges in found.items():
             for s, source in enumerate(sources):
                 for k, (low, high, stray) in enumerate(piece.bounds(source, order)):
@@ -81,26 +82,23 @@ class _Piece:
         self,
         omega: tuple[float, float],
         quotient: tuple[float, float],
-        ground: Accelerogram | None,
+        loads: Mapping[str, History],
         time: Array,
     ) -> None:
-        self.omega, self.quotient, self.time = omega, quotient, time
+        self.omega, self.quotient, self.loads, self.time = omega, quotient, loads, time
         decay = quotient[0] * omega[0]
         self.fade = np.exp(-decay * time)
         self.step = np.diff(time, prepend=time[0])
-        self.load: Array = np.zeros(len(time))
-        self.largest = 0.0
+        self.pushed = {name: absolute_moments(decay, x, time)[0] for name, x in loads.items()}
         self.table: Oscillators | None = None
-        if ground is not None:
-            self.load = absolute_moments(decay, ground, time)[0]
-            self.largest = ground.extremes[0]
+        if loads:
             reach = STEP * (decay + 2 / max(float(time[-1]), 1e-300))
             points = int(np.ceil((omega[1] - omega[0]) / reach)) + 1
             across = int(np.ceil((quotient[1] - quotient[0]) * omega[1] / reach)) + 1
             if points <= MAX_POINTS[0]:
                 points, across = max(points, 2), int(np.clip(across, 2, MAX_POINTS[1]))
                 grid = spanned(omega, quotient, (points, across))
-                self.table = Oscillators(grid, ground, time)
+                self.table = Oscillators(grid, loads, time)
 
     def bounds(self, source: str, order: int) -> Iterator[tuple[Array, Array, Array]]:
         """Lower and upper bounds of λ^κ e, and of how far it strays, (T,) each, for all κ."""
@@ -109,7 +107,7 @@ class _Piece:
         for power in POWERS:
             factor = fast ** (2 * power)
             low, high, stray = -factor * size, factor * size, 2 * factor * between
-            if source == "load" and self.table is not None:
+            if source in self.loads and self.table is not None:
                 wave = self.table.waves(source, order)
                 least, most = _of_cells(wave.value, wave.error, self._squared() ** power)
                 low, high = np.maximum(low, least), np.minimum(high, most)
@@ -125,9 +123,13 @@ class _Piece:
         """Bounds of |e| at nodes and in the step to each node, shape (T,) each."""
         q, (slow, fast) = self.quotient[1], self.omega
         largest = (fast * np.sqrt(1 + q**2)) ** order
-        if source == "load":
-            before = np.append(self.load[:1], self.load[:-1]) + self.step * self.largest
-            return self.load * largest / slow, np.maximum(before, self.load) * largest / slow
+        if source in self.loads:
+            pushed, size = self.pushed[source], self.loads[source].extremes[0]
+            before = np.append(pushed[:1], pushed[:-1]) + self.step * size
+            direct = np.abs(at_once(source, self.loads, order, self.time))
+            more = size * bool(direct.any())
+            most = np.maximum(before, pushed) * largest / slow + more
+            return pushed * largest / slow + direct, most
         factor = largest * (1 + q) if source == "start" else largest / slow
         return factor * self.fade, factor * np.append(self.fade[:1], self.fade[:-1])
 

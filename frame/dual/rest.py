@@ -14,7 +14,7 @@ a Taylor model: at inputs where A is large B is often small.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +25,11 @@ from alphacut.frame.dual.clusters import Subspaces
 from alphacut.frame.dual.intervening import BlockShares, Ends, damped_range, dots
 from alphacut.frame.dual.ranges import Ranges, response_ranges
 from alphacut.frame.dual.structure import Classical
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
-Excitation = tuple[Accelerogram | None, Array, Sequence[str]]
-"""The record, the nodes, and the names of what moves the structure."""
+Excitation = tuple[Mapping[str, History], Array, Sequence[str]]
+"""The loads by name, the nodes, and the names of what moves the structure."""
 UNKNOWN = 1e60
 """Stands for a sum that is not known."""
 
@@ -95,7 +95,7 @@ def rest_of_modes(
         found: Its enclosed modes.
         shares: What they take and give.
         coordinates: Outputs, V = (m, n), and sources, (sources, n), in the coordinates of `found`.
-        excitation: The record, the nodes and the names of the sources.
+        excitation: The loads, the nodes and the names of the sources.
     """
     others = found.others
     if not len(others):

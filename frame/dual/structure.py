@@ -1,7 +1,7 @@
 """Structures with classical modes as expansions over the unit box: M(u), K(u), outputs, damping.
 
-Covered is M q̈ + D q̇ + K q = −M ι a(t) with D = a M + b K + 2 M Φ diag(ζ_k ω_k) Φᵀ M, whose
-undamped modes uncouple the motion; what else a structure has is refused with the word why.
+Covered is M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t) with D = a M + b K + 2 M Φ diag(ζ_k ω_k) Φᵀ M,
+whose undamped modes uncouple the motion; what else a structure has is refused with the word why.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from functools import singledispatch
 
 import numpy as np
 
-from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate, solve
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.structures.matrix import Factor, MatrixStructure, Terms, value_of
+from alphacut.frame.structures.linear import LinearSystem, histories
+from alphacut.frame.structures.loads import Factor
+from alphacut.frame.structures.matrix import MatrixStructure, Terms, value_of
 from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.fuzzy.arrays import Array, Rows
 
@@ -35,6 +36,7 @@ class Classical:
             ground's acceleration added.
         start: Initial displacements and velocities, V = (2, n).
         pattern: ι, how the unknowns move with the ground, shape (n,).
+        forced: M⁻¹ b of each history of forces by its name, V = (n,).
         rayleigh: a and b, V = (2,).
         ratio: ζ_k of the modes by rising frequency, V = (modes,); unknowns without mass have none.
     """
@@ -48,6 +50,7 @@ class Classical:
     pattern: Array
     rayleigh: TaylorModel
     ratio: TaylorModel
+    forced: dict[str, TaylorModel]
 
 
 @singledispatch
@@ -80,9 +83,15 @@ def _(system: StoreyFrame, p: Inputs) -> Classical:
     rayleigh = stacked([p["rayleigh_mass"], p["rayleigh_stiffness"]])
     start = stacked([_of_floors(system, p, f"{x}{{}}_0") for x in "qv"])
     ratios = [p[name] for name in system.ratios]
+    mass = _of_floors(system, p, "m{}").contract(np.eye(n)[:, :, None] * np.eye(n)[:, None])
+    stiffness = elastic.contract(below[:, :, None] * below[:, None])
+    columns = [
+        p[x] * np.eye(n)[y.at - 1] for x, y in zip(system.force_names, system.loads, strict=True)
+    ]
+    start, forced = _pushed(system, start, columns, mass, stiffness)
     return Classical(
-        _of_floors(system, p, "m{}").contract(np.eye(n)[:, :, None] * np.eye(n)[:, None]),
-        elastic.contract(below[:, :, None] * below[:, None]),
+        mass,
+        stiffness,
         np.array(rows),
         stacked(factor),
         np.array(order),
@@ -90,6 +99,7 @@ def _(system: StoreyFrame, p: Inputs) -> Classical:
         np.ones(n),
         rayleigh,
         _of_modes(ratios, n, rayleigh),
+        forced,
     )
 
 
@@ -108,17 +118,66 @@ def _(system: MatrixStructure, p: Inputs) -> Classical:
     start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (system.q0, system.v0)]
     ratios = [nothing + p[x] if isinstance(x, str) else nothing + x for x in system.ratios]
     factors = stacked([nothing, nothing])
+    mass, stiffness = _total(system.mass, p, n), _total(system.stiffness, p, n)
+    columns = [spread(nothing + _value(x.amplitude, p), np.asarray(x.at)) for x in system.loads]
+    moved, forced = _pushed(
+        system, spread(nothing + 1.0, np.array(start)), columns, mass, stiffness
+    )
     return Classical(
-        _total(system.mass, p, n),
-        _total(system.stiffness, p, n),
+        mass,
+        stiffness,
         np.array([row[:n] + row[n:] for row in rows]),
         stacked([nothing + _value(system.row_factors.get(x, 1.0), p) for x in system.observed]),
         of_speed.astype(int),
-        spread(nothing + 1.0, np.array(start)),
+        moved,
         np.ones(n) if system.pattern is None else np.asarray(system.pattern, float),
         factors,
         _of_modes(ratios, len(system.massive), factors),
+        forced,
     )
+
+
+def _pushed(
+    system: StoreyFrame | MatrixStructure,
+    start: TaylorModel,
+    columns: Sequence[TaylorModel],
+    mass: TaylorModel,
+    stiffness: TaylorModel,
+) -> tuple[TaylorModel, dict[str, TaylorModel]]:
+    """The start with static forces and impulses, and M⁻¹ b of each history of forces by its name.
+
+    Args:
+        system: The structure.
+        start: Initial displacements and velocities without forces, V = (2, n).
+        columns: Each force at the amplitude 1 of its history, V = (n,).
+        mass: M, V = (n, n).
+        stiffness: K, V = (n, n).
+    """
+    if not columns:
+        return start, {}
+    heavy = getattr(system, "massive", np.arange(len(mass.value)))
+    placed = np.eye(len(mass.value))[:, heavy]
+    inner = mass[heavy[:, None], heavy]
+    names = {x.identity: name for name, x in histories(system).items() if name != "load"}
+    forced, static, impulse = dict[str, TaylorModel](), start[0] * 0.0, start[1] * 0.0
+    for force, column in zip(system.loads, columns, strict=True):
+        push = (placed @ _solved(inner, column[heavy]))[:, 0]
+        if force.history is None:
+            impulse = impulse + push
+            continue
+        name = names[force.history.identity]
+        forced[name] = forced[name] + push if name in forced else push
+        if force.history.is_static:
+            static = static + column * float(force.history.values(np.zeros(1))[0])
+    if static.size().any():
+        static = _solved(stiffness, static)[:, 0]
+    return start + stacked([static, impulse]), forced
+
+
+def _solved(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
+    """A⁻¹ b, V = (n, 1), of A₀⁻¹ A and A₀⁻¹ b: what varies in all of A alike is diagonal there."""
+    first = np.linalg.inv(matrix.value)
+    return solve(first @ matrix, first @ right[:, None])
 
 
 def _of_floors(system: StoreyFrame, p: Inputs, pattern: str) -> TaylorModel:

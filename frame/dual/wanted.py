@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel
@@ -9,8 +11,9 @@ from alphacut.frame.dual.blocks import Centre
 from alphacut.frame.dual.ranges import POWERS
 from alphacut.frame.dual.rest import Excitation
 from alphacut.frame.dual.structure import Classical
+from alphacut.frame.dual.waves import at_once
 from alphacut.frame.response.duhamel import responses_at_nodes
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
 
 MAX_NODES = 500
@@ -36,10 +39,10 @@ def modes_wanted(
         structure: The structure.
         centre: Its modes in the middle of the box.
         excited: Sources in the coordinates of `centre`, V = (sources, n).
-        excitation: The record, the nodes and the names of the sources.
+        excitation: The loads, the nodes and the names of the sources.
         allowed: Doubt of each output, shape (m,).
     """
-    ground, time, sources = excitation
+    loads, time, sources = excitation
     time = time[:: -(-len(time) // MAX_NODES)]
     squared, n = centre.squared, centre.modes
     read = (structure.rows @ centre.basis)[:, :n] * structure.factor.value[:, None]
@@ -50,10 +53,11 @@ def modes_wanted(
     omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
     doubt, moved = np.zeros((n, len(allowed))), np.zeros((n, len(allowed)))
     sigma = -decay + 1j * omega
-    motions = {source: _motion(source, sigma, ground, time) for source in sources}
+    motions = {source: _motion(source, sigma, loads, time) for source in sources}
     for o, order in enumerate(structure.order):
         for s, source in enumerate(sources):
             waves = _waves(source, sigma, motions[source][0], int(order))
+            waves = waves + at_once(source, loads, int(order), time)
             steep = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
             moved[:, o] += np.abs(read[o] * given[s]) * steep  # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
             each = []
@@ -72,10 +76,10 @@ def modes_wanted(
     return wanted, np.min(allowed / np.maximum(moved, 1e-300), axis=1)
 
 
-def _motion(source: str, sigma: Array, ground: Accelerogram | None, time: Array) -> Array:
+def _motion(source: str, sigma: Array, loads: Mapping[str, History], time: Array) -> Array:
     """ρ(σ; t) of a load, or exp(σ t), and its derivative by σ at nodes, shape (2, modes, T)."""
-    if source == "load" and ground is not None:
-        return np.asarray(responses_at_nodes(sigma, ground, time, 1)[0].swapaxes(1, 2))
+    if source in loads:
+        return np.asarray(responses_at_nodes(sigma, loads[source], time, 1)[0].swapaxes(1, 2))
     free = np.exp(sigma[:, None] * time)
     return np.stack([free, time * free])
 

@@ -3,10 +3,11 @@
 An oscillator with decay g and frequency ω (σ = −g + iω) answers a unit of its share by
 
     load       e = −Im(σ^ν ρ) / ω,   ρ(σ; t) = ∫₀ᵗ exp(σ τ) a(t − τ) dτ,
+    force      e = Im(σ^ν ρ) / ω, and f(t) besides where ν = 2, of the relative acceleration,
     velocity   e = Im(σ^ν exp(σ t)) / ω,
     start      e = Re(σ^ν exp(σ t)) + (g/ω) Im(σ^ν exp(σ t)),
 
-ν the derivative of the motion that an output takes (ν = 2 under a load: the absolute
+ν the derivative of the motion that an output takes (ν = 2 under a load of the ground: the absolute
 acceleration). All are read off one function G(σ) = σ^ν ρ that is analytic, so one complex
 derivative bounds all real ones. Tables stand on ω × q, q = g/ω; within a cell a function strays
 from the bilinear one through the corners by at most h_ω²/8 sup|∂²e/∂ω²| + h_q²/8 sup|∂²e/∂q²|,
@@ -17,17 +18,17 @@ exp(−g τ) |a|.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import comb, perm
 
 import numpy as np
-from numba import njit
 
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
-from alphacut.frame.response.duhamel import responses_at_nodes
+from alphacut.frame.response.duhamel import absolute_moments, responses_at_nodes
 from alphacut.frame.response.step_integrals import require_in_range
-from alphacut.frame.structures.linear import Accelerogram
-from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.frame.structures.loads import History
+from alphacut.fuzzy.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +79,8 @@ def spanned(
 class Oscillators:
     """Analytic functions ρ and exp(σ t) on a grid, from which all responses are read."""
 
-    def __init__(self, grid: Grid, ground: Accelerogram | None, time: Array) -> None:
-        self.grid, self.ground, self.time = grid, ground, time
+    def __init__(self, grid: Grid, loads: Mapping[str, History], time: Array) -> None:
+        self.grid, self.loads, self.time = grid, loads, time
         sigma = grid.sigma.ravel()
         duration = float(time[-1])
         require_in_range(sigma, duration, duration)
@@ -88,16 +89,17 @@ class Oscillators:
         decay = float((grid.quotient[:, None] * grid.omega).min())
         fade = np.exp(-decay * time)
         self.free_bounds = np.stack([time**n * fade for n in range(5)])
-        if ground is not None:
-            self.load, self.load_error = responses_at_nodes(sigma, ground, time, 2)
-            self.load_bounds = absolute_moments(decay, ground, time)
+        self.forced = {
+            name: (*responses_at_nodes(sigma, load, time, 2), absolute_moments(decay, load, time))
+            for name, load in loads.items()
+        }
 
     def waves(self, source: str, order: int) -> Waves:
-        """The response to a unit share of `source`: load, velocity or start."""
+        """The response to a unit share of `source`: a load, velocity or start."""
         g = self.grid
         sigma = g.sigma.ravel()
-        if source == "load":
-            rho, bounds, rounding = self.load, self.load_bounds, self.load_error
+        if source in self.forced:
+            rho, rounding, bounds = self.forced[source]
         else:
             t = self.time[:, None]
             rho, bounds = np.stack([self.free, t * self.free, t * t * self.free]), self.free_bounds
@@ -112,7 +114,8 @@ class Oscillators:
             rounding *= 1 + quotient
         else:
             value = G[0].imag / omega * (-1.0 if source == "load" else 1.0)
-            rounding /= omega
+            direct = at_once(source, self.loads, order, self.time)[:, None]
+            value, rounding = value + direct, rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
         shape = (len(self.time), len(g.quotient), len(g.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
         error, stray = error + rounding.max(-1), self._stray(largest[0], source, order)
@@ -156,15 +159,29 @@ class Oscillators:
         before = np.append(size[:1], size[:-1])
         if source == "start":
             return np.asarray(h**2 / 8 * fast**2 * before * (1 + g.quotient[-1]))
-        if self.ground is None or source != "load":
+        if source not in self.loads:
             return np.asarray(h**2 / 8 * fast**2 * before / low)
-        largest, slope, jump = self.ground.extremes
+        load = self.loads[source]
+        largest, slope = load.extremes
         power = fast**order
         bend = fast**2 * (before + h * power * largest) + power * (fast * largest + slope)
-        end = (len(self.ground.acceleration) - 1) * self.ground.step
-        kinked = (self.time - h <= end * (1 + 1e-9)) & (self.time >= end * (1 - 1e-9))
-        kink = np.where(kinked & (order > 0), h / 4 * power * jump, 0.0)
-        return np.asarray((h**2 / 8 * bend + kink) / low)
+        kink = np.zeros(len(self.time))
+        for at, jump in load.jumps if order else ():
+            kinked = (self.time - h <= at * (1 + 1e-9)) & (self.time >= at * (1 - 1e-9))
+            kink += np.where(kinked, h / 4 * power * jump, 0.0)
+        stray = (h**2 / 8 * bend + kink) / low
+        return np.asarray(stray + (load.stray(self.time) if _acts_at_once(source, order) else 0.0))
+
+
+def at_once(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
+    """What a force adds to the acceleration of its own mode at once, shape of `time`."""
+    if not _acts_at_once(source, order):
+        return np.zeros_like(time)
+    return loads[source].values(time)
+
+
+def _acts_at_once(source: str, order: int) -> bool:
+    return order == 2 and source.startswith("force")
 
 
 def _with_power(sigma: Array, rho: Array, order: int) -> Array:
@@ -179,40 +196,3 @@ def _with_power(sigma: Array, rho: Array, order: int) -> Array:
             second * rho[0] + 2 * first * rho[1] + power * rho[2],
         ]
     )
-
-
-def absolute_moments(decay: float, ground: Accelerogram, time: Array) -> Array:
-    """Bounds of ∫ τⁿ exp(−g τ) |a(t − τ)| dτ at nodes for n = 0 … 4, shape (5, T)."""
-    a, h = np.abs(np.asarray(ground.acceleration)), ground.step
-    largest = np.append(np.maximum(a[1:], a[:-1]), 0.0)
-    last = np.minimum((time / h * (1 + 1e-12)).astype(int), 10**9)
-    out: Array = np.empty((5, len(time)))
-    _walk_moments(largest, last, np.maximum(time - last * h, 0.0), decay, h, out)
-    return out
-
-
-@njit(cache=True, nogil=True)
-def _walk_moments(
-    largest: Array, last: Rows, phase: Array, decay: float, h: float, out: Array
-) -> None:
-    """Moments at nodes `phase` after samples `last`, which rise."""
-    state, moved, node = np.zeros(5), np.empty(5), 0
-    for i in range(last[-1] + 1):
-        size = largest[i] if i < len(largest) else 0.0
-        while node < len(last) and last[node] == i:
-            _move_moments(state, decay, phase[node], size, out[:, node])
-            node += 1
-        _move_moments(state, decay, h, size, moved)
-        state[:] = moved
-
-
-@njit(cache=True, nogil=True)
-def _move_moments(state: Array, decay: float, h: float, size: float, out: Array) -> None:
-    """Moments a time h later, under an acceleration of at most `size`."""
-    fade = np.exp(-decay * h)
-    for n in range(5):
-        total, choices = 0.0, 1.0
-        for j in range(n, -1, -1):  # Σ C(n, j) h^(n − j) state_j
-            total += choices * h ** (n - j) * state[j]
-            choices *= j / (n - j + 1)
-        out[n] = fade * total + size * h ** (n + 1) / (n + 1)

@@ -14,7 +14,13 @@ from alphacut.frame.dynamics.integrators import Exact, Integrator, Midpoint
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.dynamics.transfer_powers import exact_response, trajectory
 from alphacut.frame.structures.lagrangian import LagrangianSystem
-from alphacut.frame.structures.linear import LinearSystem, evaluate, frequencies
+from alphacut.frame.structures.linear import (
+    LinearSystem,
+    courses_of_forces,
+    evaluate,
+    frequencies,
+    histories,
+)
 from alphacut.fuzzy.refused import FailedError, RefusedError, chosen, real, require
 
 MOST_NODES = 10_000_000
@@ -190,16 +196,21 @@ class LinearFlow(Flow):
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
-        ground = self.system.ground
-        h, steps = self.step, len(self.time) - 1
-        if ground is None:
-            step_map, load = self.integrator.step_map(matrices, h), None
-        elif self.exact:
-            step_map, load = exact_response(matrices, ground, step=h, steps=steps)
+        loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
+        h, steps, load = self.step, len(self.time) - 1, None
+        pushes = matrices.pushes(ground=has_ground)
+        if self.exact and loads:
+            step_map, load = exact_response(matrices, pushes, loads, step=h, steps=steps)
         else:
-            step_map = self.integrator.step_map(matrices, h)
-            load = linear_load(ground, h, steps)
-        return trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)
+            step_map = self.integrator.step_map(matrices, h, pushes)
+            if loads:
+                both = np.stack([linear_load(x, h, steps) for x in loads], -1)
+                load = both.reshape(steps, -1)
+        motion = trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)
+        if matrices.feeds is None:
+            return motion
+        at_nodes = np.stack([x.values(self.time) for x in courses_of_forces(self.system)])
+        return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
 
 
 def exact_flow(flow: object) -> LinearFlow:

@@ -25,8 +25,8 @@ class StepMap:
 
     Args:
         transfer: T, shape (S, 2n, 2n).
-        load: G, shape (S, 2n, L); with L = 2 for the accelerations of the ground at the beginning
-            and the end of a step, linear between.
+        load: G, shape (S, 2n, L); of one-step methods L is twice the number of loads, for their
+            values at the beginning of a step and then at its end, linear between.
     """
 
     transfer: Jet
@@ -52,14 +52,14 @@ class Midpoint:
     order: ClassVar[float] = 2
     stability_limit: ClassVar[float] = inf
 
-    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+    def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
         """The map of one step; its velocity is M⁻¹ times the discrete momentum."""
         m, h = matrices, step
         inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
         left = inverse(inertia + spring)
         forward = left @ (inertia - spring)
         kick = left @ m.mass
-        push = kick @ (m.rigid * np.full(2, -h / 4))  # half a step of the mean ground acceleration
+        push = kick @ (concatenate([pushes, pushes], -1) * (h / 4))  # half a step of the mean load
         eye = np.eye(m.mass.value.shape[-1])
         upper = concatenate([forward, kick], -1)
         lower = concatenate([(forward - eye) * (2 / h), kick * (2 / h) - eye], -1)
@@ -82,12 +82,13 @@ class RungeKutta4:
     order: ClassVar[float] = 4
     stability_limit: ClassVar[float] = 2 * 2**0.5
 
-    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+    def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
         """The map of one step: the exponential series up to h⁴."""
-        z = loaded_flow(matrices, step) * step
+        z = loaded_flow(matrices, step, pushes) * step
         z2 = z @ z
         return split(
-            np.eye(z.value.shape[-1]) + z + z2 * 0.5 + z2 @ z * (1 / 6) + z2 @ z2 * (1 / 24)
+            np.eye(z.value.shape[-1]) + z + z2 * 0.5 + z2 @ z * (1 / 6) + z2 @ z2 * (1 / 24),
+            pushes.value.shape[-1],
         )
 
 
@@ -107,9 +108,10 @@ class Exact:
     order: ClassVar[float] = inf
     stability_limit: ClassVar[float] = inf
 
-    def step_map(self, matrices: Matrices, step: float) -> StepMap:
+    def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
         """The map of one step."""
-        return split(exponential(loaded_flow(matrices, step) * step))
+        flow = exponential(loaded_flow(matrices, step, pushes) * step)
+        return split(flow, pushes.value.shape[-1])
 
 
 def exponential(z: Jet) -> Jet:
@@ -127,27 +129,35 @@ def exponential(z: Jet) -> Jet:
     return series
 
 
-def loaded_flow(m: Matrices, step: float) -> Jet:
-    """State matrix extended by the load and its increment, shape (S, 2n + 2, 2n + 2)."""
+def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
+    """State matrix extended by L loads and their increments, shape (S, 2n + 2L, 2n + 2L).
+
+    Args:
+        m: The structure.
+        step: Length of a step, in s.
+        pushes: Accelerations by a unit of each load, V = (S, n, L).
+    """
     flow = state_matrix(m)
-    n = m.mass.value.shape[-1]
-    size = 2 * n + 2
-    out = Jet.constant(np.zeros((len(flow.value), size, size)), flow.directions)
-    for whole, part in (
-        (out.value, flow.value),
-        (out.first, flow.first),
-        (out.second, flow.second),
+    n, count = pushes.value.shape[-2:]
+    size = 2 * (n + count)
+    out = flow.like(np.zeros((len(flow.value), size, size)))
+    for target, part, push in zip(
+        (out.value, out.first, out.second),
+        (flow.value, flow.first, flow.second),
+        (pushes.value, pushes.first, pushes.second),
+        strict=True,
     ):
-        whole[..., : 2 * n, : 2 * n] = part
-    out.value[:, n : 2 * n, 2 * n] = -m.rigid[:, 0]
-    out.value[:, 2 * n, 2 * n + 1] = 1 / step
+        target[..., : 2 * n, : 2 * n] = part
+        target[..., n : 2 * n, 2 * n : 2 * n + count] = push
+    out.value[:, 2 * n : 2 * n + count, 2 * n + count :] = np.eye(count) / step
     return out
 
 
-def split(extended: Jet) -> StepMap:
-    """Separates state and load again; the load's columns become a(t_k) and a(t_{k+1})."""
-    old, rise = extended[..., :-2, -2:-1], extended[..., :-2, -1:]
-    return StepMap(extended[..., :-2, :-2], concatenate([old - rise, rise], -1))
+def split(extended: Jet, count: int) -> StepMap:
+    """Separates state and L loads; their columns become f(t_k) and then f(t_{k+1})."""
+    n = extended.value.shape[-1] - 2 * count
+    old, rise = extended[..., :n, n : n + count], extended[..., :n, n + count :]
+    return StepMap(extended[..., :n, :n], concatenate([old - rise, rise], -1))
 
 
 Integrator = Midpoint | RungeKutta4 | Exact

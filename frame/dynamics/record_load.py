@@ -1,6 +1,6 @@
-"""Acceleration of the ground at its own times, and rules that integrate smooth kernels against it.
+"""Loads at their own times, and rules that integrate smooth kernels against them.
 
-A record is linear between its samples and zero outside them, so that it may jump where it ends.
+A load is linear between its samples, or that times a sine, and may jump where it begins or ends.
 Neither samples nor jumps need lie on nodes.
 """
 
@@ -13,7 +13,7 @@ from math import ceil, log2
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import History
 
 SAME = 1e-12
 """Distance of a sample from a node, as a share of the step, that is rounding."""
@@ -26,18 +26,18 @@ MOST = 4096
 
 
 class Segments:
-    """A record over `count` steps, cut at all nodes and samples: linear in each of L segments.
+    """A load over `count` steps, cut at all nodes and samples: linear in each of L segments.
 
     Attributes:
         step: Step of the nodes in which each segment lies, rising from 0, shape (L,).
         start: Time from the beginning of its step, shape (L,), in s.
         length: Shape (L,), in s.
-        first: Acceleration just after its beginning, shape (L,), in m/s².
-        last: Acceleration just before its end, shape (L,), in m/s².
+        first: Load just after its beginning, without a sine, shape (L,), as m/s².
+        last: Load just before its end, shape (L,).
     """
 
-    def __init__(self, ground: Accelerogram, step: float, count: int) -> None:
-        samples = np.arange(len(ground.acceleration)) * ground.step
+    def __init__(self, history: History, step: float, count: int) -> None:
+        samples = history.start + np.arange(len(history.samples)) * history.step
         nearest = np.round(samples / step)
         inner = (np.abs(samples - nearest * step) > SAME * step) & (samples < count * step)
         home = np.concatenate([np.arange(count), np.floor(samples[inner] / step).astype(int)])
@@ -46,25 +46,31 @@ class Segments:
         home, start = home[order], start[order]
         end = np.append(start[1:], 0.0)
         end[np.append(np.diff(home) > 0, True)] = step
-        self.first, self.last = _linear(ground, home * step + start, home * step + end)
+        self.first, self.last = _linear(history, home * step + start, home * step + end)
         self.step, self.start, self.length = home, start, end - start
+        self.history = history
 
     def magnitudes(self, count: int) -> Array:
-        """∫ |a| over every step, shape (count,), in m/s."""
+        """∫ |f| over every step, at most, shape (count,), as m/s."""
         a, b = np.abs(self.first), np.abs(self.last)
         crossed = self.first * self.last < 0
         mean = np.where(crossed, (a**2 + b**2) / np.where(crossed, a + b, 1.0), a + b) / 2
         return np.bincount(self.step, self.length * mean, count)
 
     def moments(self, step: float, count: int, order: int) -> Array:
-        """∫ T_i(x) a over every step, shape (count, order), with T_i Chebyshev's polynomials.
+        """∫ T_i(x) f over every step, shape (count, order), with T_i Chebyshev's polynomials.
 
-        x runs from 1 at a step's beginning to −1 at its end; Gauss quadrature is exact.
+        x runs from 1 at a step's beginning to −1 at its end; Gauss quadrature is exact, with a sine
+        to round-off where it turns by `TURN` in a step at most.
         """
-        points, weights = np.polynomial.legendre.leggauss(order // 2 + 1)
+        more = POINTS if self.history.frequency else 0
+        points, weights = np.polynomial.legendre.leggauss(order // 2 + 1 + more)
         share = (points + 1) / 2
-        x = 1 - 2 * (self.start[:, None] + self.length[:, None] * share) / step
+        since = self.start[:, None] + self.length[:, None] * share
+        x = 1 - 2 * since / step
         load = self.first[:, None] * (1 - share) + self.last[:, None] * share
+        if self.history.frequency:
+            load = load * self.history.wave(self.step[:, None] * step + since)
         load = load * (self.length[:, None] / 2 * weights)
         begun = np.searchsorted(self.step, np.arange(count))
         out = np.empty((count, order))
@@ -75,16 +81,18 @@ class Segments:
         return out
 
 
-def _linear(ground: Accelerogram, begin: Array, end: Array) -> tuple[Array, Array]:
-    """One-sided values at the ends of intervals that hold no sample inside."""
-    a = ground.acceleration
-    piece = np.floor((begin + end) / 2 / ground.step).astype(int)
-    within = (piece >= 0) & (piece < len(a) - 1)
+def _linear(history: History, begin: Array, end: Array) -> tuple[Array, Array]:
+    """One-sided values at the ends of intervals that hold no sample inside, without a sine."""
+    a, h = history.samples, history.step
+    piece = np.floor(((begin + end) / 2 - history.start) / h).astype(int)
+    within, beyond = (piece >= 0) & (piece < len(a) - 1), piece >= len(a) - 1
     k = np.where(within, piece, 0)
-    slope = (a[k + 1] - a[k]) / ground.step
+    slope = (a[k + 1] - a[k]) / h
+    outside = np.where(beyond & np.array(history.is_held), a[-1], 0.0)
 
     def at(time: Array) -> Array:
-        return np.where(within, a[k] + slope * (time - k * ground.step), 0.0)
+        value = a[k] + slope * (time - history.start - k * h)
+        return np.where(within, value, outside)
 
     return at(begin), at(end)
 
@@ -106,13 +114,13 @@ class LoadRule:
 
 
 @lru_cache(maxsize=8)
-def load_rule(ground: Accelerogram, step: float, count: int, parts: int) -> LoadRule:
+def load_rule(history: History, step: float, count: int, parts: int) -> LoadRule:
     """The rule for `count` steps, each in equal `parts` with `POINTS` points."""
     h = step / parts
     angle = (np.arange(POINTS) + 0.5) * np.pi / POINTS
     basis = np.cos(np.arange(POINTS)[:, None] * angle) * (2 / POINTS)
     basis[0] /= 2
-    moments = Segments(ground, h, count * parts).moments(h, count * parts, POINTS)
+    moments = Segments(history, h, count * parts).moments(h, count * parts, POINTS)
     weight = (moments @ basis).reshape(count, parts, POINTS)[:, ::-1]
     tau = (np.arange(parts)[:, None] + (1 + np.cos(angle)) / 2) * h
     return LoadRule(tau.ravel(), weight.reshape(count, -1))
@@ -135,11 +143,11 @@ def parts_of(fastest: float, step: float) -> int:
     return parts
 
 
-def linear_load(ground: Accelerogram, step: float, count: int) -> Array:
-    """Accelerations at both ends of every step, shape (count, 2), in m/s².
+def linear_load(history: History, step: float, count: int) -> Array:
+    """Loads at both ends of every step, shape (count, 2), as m/s².
 
     They are those of the straight line with the record's impulse and first moment in the step,
     which is the record where that is linear.
     """
-    level, tilt = Segments(ground, step, count).moments(step, count, 2).T / step
+    level, tilt = Segments(history, step, count).moments(step, count, 2).T / step
     return np.stack([level + 3 * tilt, level - 3 * tilt], -1)

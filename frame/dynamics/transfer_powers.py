@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isqrt
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.integrators import StepMap, exponential
 from alphacut.frame.dynamics.record_load import load_rule, parts_of
-from alphacut.frame.structures.linear import Accelerogram, Matrices
+from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import state_matrix
 
 TERMS = 28
@@ -17,25 +19,32 @@ TERMS = 28
 
 
 def exact_response(
-    matrices: Matrices, ground: Accelerogram, *, step: float, steps: int
+    matrices: Matrices, pushes: Jet, loads: Sequence[History], *, step: float, steps: int
 ) -> tuple[StepMap, Array]:
-    """The exact step under a record, and what its load acts on, shape (steps, Q)."""
+    """The exact step under loads that push as `pushes`, V = (S, n, L), and their rule's weights.
+
+    Returns:
+        The step, and what its load acts on, shape (steps, L Q).
+    """
     flow = state_matrix(matrices)
-    parts = parts_of(float(np.abs(np.linalg.eigvals(flow.value)).max()), step)
-    rule = load_rule(ground, step, steps, parts)
-    kick = matrices.kick
-    term = Jet.constant(np.broadcast_to(kick, (len(flow.value), *kick.shape)), flow.directions)
-    series, short = [term], step / parts
+    fastest = float(np.abs(np.linalg.eigvals(flow.value)).max())
+    parts = parts_of(max(fastest, *(load.frequency for load in loads)), step)
+    rules = [load_rule(load, step, steps, parts) for load in loads]
+    tau, short = rules[0].tau[: len(rules[0].tau) // parts], step / parts
+    term = concatenate([pushes * 0.0, pushes], -2)
+    series = [term]
     for k in range(1, TERMS):
         term = flow @ term * (short / k)
         series.append(term)
-    share = rule.tau[: len(rule.tau) // parts] / short
-    columns = concatenate(series, -1) @ share ** np.arange(TERMS)[:, None]  # exp(A τ) B
-    transfer = exponential(flow * short)
+    powers = (tau / short) ** np.arange(TERMS)[:, None]
+    count = len(loads)
+    columns = [concatenate([x[..., i : i + 1] for x in series], -1) @ powers for i in range(count)]
+    transfer = exponential(flow * short)  # columns are exp(A τ) B of each load
     for _ in range(parts.bit_length() - 1):
-        columns = concatenate([columns, transfer @ columns], -1)
+        columns = [concatenate([x, transfer @ x], -1) for x in columns]
         transfer = transfer @ transfer
-    return StepMap(transfer, columns), rule.weight
+    weights = np.concatenate([rule.weight for rule in rules], -1)
+    return StepMap(transfer, concatenate(columns, -1)), weights
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:

@@ -6,7 +6,7 @@ No polynomial stands between the inputs and these values; polynomials only give 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -30,14 +30,14 @@ class ExactResponse:
     Args:
         model: Polynomials of the same structure, in the units wanted.
         scale: What the outputs are divided by, shape (m,).
-        load: Tables of all modes' answer to the ground, or None.
+        loads: Tables of all modes' answers to the loads, and what these add at once.
         bent: Whether the polynomials are good enough for second derivatives; else these are zero,
             and Newton's method learns them from gradients.
     """
 
     model: ModalModel
     scale: Array
-    load: LoadTables | None
+    loads: tuple[LoadTables, ...]
     bent: bool = True
     secant: ClassVar[bool] = True
 
@@ -46,16 +46,15 @@ class ExactResponse:
         """Of the structure whose polynomials are `model`, in units of `scale` (m,).
 
         Raises:
-            ModalError: Under a record, a mode does not oscillate.
+            ModalError: Under a load, a mode does not oscillate.
         """
-        flow, cuts, load = model.flow, model.boxes, model.load
-        size = len(frequencies(flow.system))
-        if flow.system.ground is not None and len(model.chosen) < size:
+        flow, cuts, loads = model.flow, model.boxes, model.loads
+        if loads and len(model.chosen) < len(frequencies(flow.system)):
             points = fit_points(len(cuts.names), 2)
             rate = fit(points, analyse(flow, cuts, points).eigenvalue, 2)
             nothing = Polynomial(rate.index, np.zeros_like(rate.coefficients))
-            load = LoadTables(flow.system.ground, flow.time, rate, nothing)
-        return cls(model.in_units(scale), scale, load, bent)
+            loads = tuple(replace(load, rate=rate, share=nothing) for load in loads)
+        return cls(model.in_units(scale), scale, loads, bent)
 
     @property
     def time(self) -> Array:
@@ -88,13 +87,13 @@ class ExactResponse:
         return f, g
 
     def _of(self, modes: Modes, own: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
-        """Outputs of modes `own` (N,) with slopes, 2 Re Σ C_k w(λ_k) over start and ground."""
+        """Outputs of modes `own` (N,) with slopes, 2 Re Σ C_k w(λ_k) over start and loads."""
         rate, slope = modes.eigenvalue.value[own], modes.eigenvalue.first[:, own]
         t, scale = self.time[node][:, None], self.scale[output]
         wave = np.exp(rate * t)
         parts = [(modes.coefficient, wave, t * wave)]
-        if self.load is not None:
-            parts.append((modes.load, *self.load.response(rate, node)[:2]))
+        for share, load in zip(modes.loads, self.loads, strict=True):
+            parts.append((share, *load.response(rate, node)[:2]))
         f, g = np.zeros(len(own)), np.zeros((len(slope), len(own)))
         for share, w, dw in parts:
             value, first = share.value[own, :, output], share.first[:, own, :, output]

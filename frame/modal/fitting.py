@@ -12,14 +12,20 @@ from math import ceil, log
 import numpy as np
 
 from alphacut.frame.boxes import Boxes
-from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.calculus.polynomial import Polynomial, fit, terms
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.modal.ground_response import LoadTables
+from alphacut.frame.modal.ground_response import Direct, LoadTables
 from alphacut.frame.modal.model import ModalModel
-from alphacut.frame.structures.linear import Matrices, evaluate
+from alphacut.frame.response.duhamel import impulses
+from alphacut.frame.structures.linear import (
+    Matrices,
+    courses_of_forces,
+    evaluate,
+    histories,
+)
 from alphacut.frame.structures.modes import (
     ModalError,
     Modes,
@@ -125,12 +131,11 @@ def fit_points(d: int, degree: int) -> Array:
     return np.vstack([np.zeros((1, d)), chebyshev_points(d, count)])
 
 
-def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
+def fit_states(model: ModalModel) -> list[Polynomial]:
     """Polynomials of the states [φ_k; λ_k φ_k] of the model's modes.
 
     Returns:
-        What the initial state puts into them, and what a unit impulse of the ground's acceleration
-        does.
+        What the initial state puts into them, and what a unit impulse of each load does.
     """
     unit = fit_points(len(model.boxes.names), model.degree)
     own = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
@@ -140,21 +145,22 @@ def fit_states(model: ModalModel) -> tuple[Polynomial, Polynomial]:
 def _fitted(
     flow: LinearFlow, boxes: Boxes, points: Array, own: Modes, degree: int, chosen: Array
 ) -> ModalModel:
-    rate, ground, load = fit(points, own.eigenvalue, degree), flow.system.ground, None
-    free, forced = _shares(points, own, degree)
-    if ground is not None:
-        load = LoadTables(ground, flow.time, rate, forced)
-    nothing = np.zeros((len(flow.time), len(flow.outputs)))
-    return ModalModel(flow, boxes, rate, free, load, chosen, nothing, 0)
+    rate, time = fit(points, own.eigenvalue, degree), flow.time
+    free, *forced = _shares(points, own, degree)
+    kinds = [(LoadTables, course) for course in histories(flow.system).values()]
+    kinds += [(Direct, course) for course in courses_of_forces(flow.system)]
+    pairs = zip(kinds, forced, strict=False)  # without what acts at once, where nothing does
+    loads = tuple(kind(course, time, rate, share) for (kind, course), share in pairs)
+    nothing = np.zeros((len(time), len(flow.outputs)))
+    return ModalModel(flow, boxes, rate, free, loads, chosen, nothing, 0)
 
 
-def _shares(points: Array, own: Modes, degree: int) -> tuple[Polynomial, Polynomial]:
-    """Polynomials of what the initial state puts into n modes' m rows, and what the ground does."""
+def _shares(points: Array, own: Modes, degree: int) -> list[Polynomial]:
+    """Polynomials of what the initial state puts into n modes' m rows, and what each load does."""
     flat = (
-        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, own.load)
+        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, *own.loads)
     )
-    free, forced = (fit(points, jet, degree) for jet in flat)
-    return free, forced
+    return [fit(points, jet, degree) for jet in flat]
 
 
 def _held_out(d: int) -> Array:
@@ -198,11 +204,19 @@ def analyse(
     if states:
         size = rows.value.shape[-1]
         rows = rows.like(np.broadcast_to(np.eye(size), (len(unit), size, size)))
-    own = modes(matrices, rows, chosen)
-    if not order:
-        return own
-    rate, start, kick = map(boxes.in_unit, (own.eigenvalue, own.coefficient, own.load))
-    return Modes(rate, start, kick)
+    has_ground = flow.system.ground is not None
+    own = modes(matrices, rows, matrices.pushes(ground=has_ground), chosen)
+    if not states and matrices.feeds is not None:
+        direct = _as_modes(matrices.feeds, own.eigenvalue.value.shape[-1])
+        own = replace(own, loads=(*own.loads, *direct))
+    return own.map(boxes.in_unit) if order else own
+
+
+def _as_modes(feeds: Jet, count: int) -> list[Jet]:
+    """What each load adds at once, as twice the real part of a share of the first of n modes."""
+    first = np.eye(count)[0][:, None] / 2
+    columns = [feeds[..., i][..., None, :] for i in range(feeds.value.shape[-1])]
+    return [column * first for column in columns]
 
 
 def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:
@@ -218,12 +232,12 @@ def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool
     matrices, rows = evaluate(flow.system, flow.names, boxes.centre[None], derivatives=False)
     rate, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
     state = np.abs(Y @ matrices.start.value[0])
-    ground = flow.system.ground
-    if ground is not None:
-        record = np.abs(ground.acceleration)
+    pushes = matrices.pushes(ground=flow.system.ground is not None).value[0]
+    for course, push in zip(histories(flow.system).values(), pushes.T, strict=True):
         # bound of |R(t; λ)|
-        push = np.minimum(record.sum() * ground.step, record.max() / np.maximum(-rate.real, 1e-300))
-        state += np.abs(Y @ matrices.kick) * push[:, None]
+        size = course.extremes[0] / np.maximum(-rate.real, 1e-300)
+        most = np.minimum(float(impulses(course, flow.time)[-1]), size)
+        state += np.abs(Y @ np.append(0.0 * push, push))[:, None] * most[:, None]
     upper = np.flatnonzero(rate.imag >= 0)
     size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]
     if energy:

@@ -1,4 +1,4 @@
-"""Response of modes to the ground, as Taylor series in λ over windows of time."""
+"""Response of modes to a load, as Taylor series in λ over windows of time."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
-from alphacut.frame.response.duhamel import responses_in_windows
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.response.duhamel import responses_at_nodes, responses_in_windows
+from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Rows
 
@@ -33,7 +33,7 @@ class LoadTable:
     earlier windows leave behind goes on as exp(λ (t_j − their end)). Far nodes have more between.
 
     Args:
-        ground: The record.
+        history: a, the load.
         time: Nodes, shape (T,), in s.
         middle: λ in the middle of the box.
         spread: What it strays by over the box at most, in 1/s.
@@ -46,7 +46,7 @@ class LoadTable:
         ModalError: Phases change by thousands over the box within one step.
     """
 
-    def __init__(self, ground: Accelerogram, time: Array, middle: complex, spread: float) -> None:
+    def __init__(self, history: History, time: Array, middle: complex, spread: float) -> None:
         every = max(1, ceil(spread * (time[1] - time[0]) / REACH))
         if every > max(4, MOST_STEPS // len(time)):
             raise ModalError(
@@ -59,7 +59,7 @@ class LoadTable:
         phase = max(spread * length * h, LEAST_PHASE)
         order = ceil(2.72 * phase + 18)
         self.middle, self.scale, self.time, self.every = middle, 1 / (length * h), time, every
-        self.moment = _moments(ground, middle, time, length, phase, order)
+        self.moment = _moments(history, middle, time, length, phase, order)
         self.ends, self.truncation = np.arange(length, steps, length), 2 * left_out(phase, order)
 
     def response(self, rate: Array, node: Array) -> Array:
@@ -74,13 +74,13 @@ class LoadTables:
     """Tables of all modes, made when they are first read.
 
     Args:
-        ground: The record.
+        history: a, the load.
         time: Nodes, shape (T,), in s.
         rate: λ_k over the unit box, n polynomials.
         share: What one unit of R_k puts into the outputs, n m polynomials.
     """
 
-    ground: Accelerogram
+    history: History
     time: Array
     rate: Polynomial
     share: Polynomial
@@ -90,7 +90,7 @@ class LoadTables:
         """One of each mode."""
         middle, rest = self.rate.coefficients[0], self.rate.coefficients[1:]
         pairs = zip(middle.tolist(), np.abs(rest).sum(0).tolist(), strict=True)
-        return [LoadTable(self.ground, self.time, *pair) for pair in pairs]
+        return [LoadTable(self.history, self.time, *pair) for pair in pairs]
 
     def in_units(self, scale: Array) -> LoadTables:
         """The same for outputs divided by their scale (m,)."""
@@ -103,11 +103,47 @@ class LoadTables:
         """Bound of the series' rest, as a share of ∫ |a(s)| exp(Re λ (t − s)) ds, (n,)."""
         return np.array([table.truncation for table in self.tables])
 
+    @property
+    def longest(self) -> int:
+        """Nodes of the longest table."""
+        return max(len(table.time) for table in self.tables)
+
+    def at_nodes(self, rate: Array) -> Array:
+        """R at all nodes, shape (S, T, n), for eigenvalues (S, n)."""
+        (driven,), _ = responses_at_nodes(rate.ravel(), self.history, self.time, 0)
+        return np.moveaxis(driven.reshape(len(self.time), *rate.shape), 0, 1)
+
     def response(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
         pairs = zip(self.tables, rate.T, strict=True)
         R, slope, curve = np.stack([table.response(own, node) for table, own in pairs], -1)
         return R, slope, curve
+
+
+class Direct(LoadTables):
+    """What a load adds to outputs at once: share · a(t), as if R of the first mode were a(t)."""
+
+    longest = 1
+
+    @property
+    def truncation(self) -> Array:
+        """Nothing is left out, shape (n,)."""
+        return 0.0 * self.factor
+
+    @property
+    def factor(self) -> Array:
+        """1 for the first mode, else 0, shape (n,)."""
+        return np.eye(self.rate.coefficients.shape[1])[0]
+
+    def at_nodes(self, rate: Array) -> Array:
+        """A at all nodes, shape (S, T, n)."""
+        course = self.history.values(self.time)[:, None] * self.factor
+        return np.broadcast_to(course, (len(rate), *course.shape))
+
+    def response(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
+        """A and its derivatives by λ, which are zero, each shape (N, n)."""
+        course = self.history.values(self.time[node])[:, None] * self.factor
+        return course + 0j * rate, 0.0 * rate, 0.0 * rate
 
 
 def left_out(phase: float, order: int) -> float:
@@ -116,7 +152,7 @@ def left_out(phase: float, order: int) -> float:
 
 
 def _moments(
-    ground: Accelerogram, middle: complex, time: Array, length: int, phase: float, order: int
+    history: History, middle: complex, time: Array, length: int, phase: float, order: int
 ) -> Array:
     """Taylor coefficients of the window's own part of R, shape (T, order).
 
@@ -124,7 +160,7 @@ def _moments(
     as coefficients; what that mixes into them are coefficients beyond, which are left out anyway.
 
     Args:
-        ground: The record.
+        history: a, the load.
         middle: λ.
         time: Nodes, shape (T,), in s.
         length: Steps of a window.
@@ -133,7 +169,7 @@ def _moments(
     """
     turns = np.exp(2j * np.pi / order * np.arange(order))
     rate = middle + phase * turns / (length * (time[1] - time[0]))
-    values = responses_in_windows(rate, ground, time, length)
+    values = responses_in_windows(rate, history, time, length)
     return np.asarray(np.fft.fft(values, axis=1) / order / phase ** np.arange(order))
 
 

@@ -20,7 +20,6 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.polynomial import Polynomial
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.modal.ground_response import LoadTables
-from alphacut.frame.response.duhamel import responses_at_nodes
 
 PIECE = 20_000
 """Points whose values are computed together."""
@@ -36,7 +35,7 @@ class ModalModel:
         boxes: The parameters' boxes.
         eigenvalue: λ_k, n polynomials, in 1/s.
         coefficient: C_k, n m polynomials.
-        load: Response to the ground's motion, or None.
+        loads: Responses to the loads, and what these add to outputs at once.
         chosen: Which modes it has, by rising |λ|, shape (n,).
         error: Largest deviation of held-out trajectories, shape (T, m).
         analyses: Eigen-analyses made.
@@ -46,7 +45,7 @@ class ModalModel:
     boxes: Boxes
     eigenvalue: Polynomial
     coefficient: Polynomial
-    load: LoadTables | None
+    loads: tuple[LoadTables, ...]
     chosen: Array
     error: Array
     analyses: int
@@ -75,24 +74,24 @@ class ModalModel:
     def in_units(self, scale: Array) -> ModalModel:
         """The same with every output divided by its scale (m,)."""
         share = self.coefficient.divided(np.tile(scale, self.count))
-        load = None if self.load is None else self.load.in_units(scale)
-        return replace(self, coefficient=share, load=load, error=self.error / scale)
+        loads = tuple(load.in_units(scale) for load in self.loads)
+        return replace(self, coefficient=share, loads=loads, error=self.error / scale)
 
     @cached_property
     def started(self) -> bool:
         """True where there is a free motion."""
-        return self.load is None or bool(self.coefficient.coefficients.any())
+        return not self.loads or bool(self.coefficient.coefficients.any())
 
     @cached_property
     def together(self) -> Polynomial:
-        """λ_k and behind them the shares of each part, free and forced: n + n m or n + 2 n m."""
+        """λ_k and behind them the shares of each part, free and forced: n + n m of each part."""
         parts = [self.eigenvalue, *[self.coefficient] * self.started]
-        parts += [self.load.share] if self.load else []
+        parts += [load.share for load in self.loads]
         return Polynomial(parts[0].index, np.hstack([part.coefficients for part in parts]))
 
     @cached_property
     def of_output(self) -> list[Polynomial]:
-        """For each output λ_k and its shares of each part: 2 n or 3 n polynomials."""
+        """For each output λ_k and its shares of each part: n, and n of each part, polynomials."""
         n, m = self.count, len(self.outputs)
         rate, shares = np.split(self.together.coefficients, [n], axis=1)
         index = self.together.index
@@ -104,9 +103,7 @@ class ModalModel:
         parts = self.together(unit)
         rate = parts[:, :n]
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
-        if self.load is not None and self.flow.system.ground is not None:
-            (driven,), _ = responses_at_nodes(rate.ravel(), self.flow.system.ground, time, 0)
-            waves.append(np.moveaxis(driven.reshape(len(time), *rate.shape), 0, 1))
+        waves += [load.at_nodes(rate) for load in self.loads]
         shares = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
         wave = np.concatenate(waves, -1)
         return np.asarray(2 * (wave.real @ shares.real - wave.imag @ shares.imag))
@@ -145,7 +142,7 @@ class ModalModel:
             t = self.time[node][:, None]
             wave = np.exp(rate * t)
             parts.append((wave, t * wave, t * t * wave))
-        return parts if self.load is None else [*parts, self.load.response(rate, node)]
+        return parts + [load.response(rate, node) for load in self.loads]
 
 
 def composed(rate: Array, share: Array, waves: Waves, d: int) -> Array:

@@ -9,10 +9,16 @@ and so are its derivatives by σ. Nodes lie anywhere, samples need not be nodes.
 record are walked by the one kernel here: at all nodes for each σ, from rest at the first node or at
 each window's beginning, or at a named node for each row of σ. Rounding is bounded beside the values
 (running error analysis: Higham 2002, section 3.3).
+
+A load g(t) sin θ(t), θ = Ω (t − start) + phase, is walked as g at two exponents:
+
+    ρ(σ; t) = (exp(iθ(t)) ρ_g(σ − iΩ; t) − exp(−iθ(t)) ρ_g(σ + iΩ; t)) / 2i.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import ceil
 from threading import Lock
 from typing import NamedTuple
 
@@ -25,7 +31,7 @@ from alphacut.frame.response.step_integrals import (
     require_in_range,
     step_integrals,
 )
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
 
 PARALLEL_LOOP = Lock()
@@ -44,8 +50,9 @@ class Walk(NamedTuple):
     """A record up to the last of some nodes, and where these lie.
 
     Args:
-        first: Acceleration at the beginning of each interval between samples, shape (I,), in m/s².
-        last: Acceleration at its end; both are zero beyond the record.
+        first: Load at the beginning of each interval between samples, shape (I,), such as an
+            acceleration in m/s².
+        last: Load at its end.
         step: Length of an interval, in s.
         interval: Interval in which each node lies, rising, shape (T,).
         phases: Different times from an interval's beginning to a node in it, shape (P,), in s.
@@ -62,16 +69,19 @@ class Walk(NamedTuple):
     doubt: Array
 
 
-def walk(ground: Accelerogram, time: Array) -> Walk:
-    """The record and nodes `time` (T,) in s, rising."""
-    samples, step = ground.acceleration, ground.step
+def walk(history: History, time: Array) -> Walk:
+    """The load without its sine, and nodes `time` (T,) in s, rising."""
+    samples, step = history.samples, history.step
+    before = ceil(history.start / step)  # intervals in which there is no load
+    time = time + (before * step - history.start)
     same = SAME_TIME * float(time[-1])
     interval = ((time + same) / step).astype(np.int64)
     count = int(interval[-1]) + 1
-    first: Array = np.zeros(count)
-    last: Array = np.zeros(count)
-    within = min(count, len(samples) - 1)
-    first[:within], last[:within] = samples[:within], samples[1 : within + 1]
+    tail = samples[-1] if history.is_held else 0.0
+    first, last = np.full((2, before + max(count, len(samples))), tail)
+    first[:before] = last[:before] = 0.0
+    first[before : before + len(samples) - 1] = samples[:-1]
+    last[before : before + len(samples) - 1] = samples[1:]
     since: Array = np.maximum(time - interval * step, 0.0)
     order = np.argsort(since, kind="stable")
     is_new = np.diff(since[order], prepend=-np.inf) > same
@@ -80,11 +90,54 @@ def walk(ground: Accelerogram, time: Array) -> Walk:
     phases = since[order][is_new]
     phases[phases <= same] = 0.0
     doubt = np.abs(since - phases[phase]) + UNIT_ROUNDOFF * time
-    return Walk(first, last, step, interval, phases, phase, doubt)
+    return Walk(first[:count], last[:count], step, interval, phases, phase, doubt)
+
+
+def impulses(history: History, time: Array) -> Array:
+    """Bounds of ∫ |f| up to each node, shape (T,)."""
+    path = walk(history, time)
+    sizes = np.cumsum(np.maximum(np.abs(path.first), np.abs(path.last)) * path.step)
+    return np.asarray(sizes[path.interval])
+
+
+def absolute_moments(decay: float, history: History, time: Array) -> Array:
+    """Bounds of ∫ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes for n = 0 … 4, shape (5, T)."""
+    path = walk(history, time)
+    sizes = np.maximum(np.abs(path.first), np.abs(path.last))
+    since = path.phases[path.phase] + path.doubt
+    out: Array = np.empty((5, len(time)))
+    _walk_moments(sizes, path.interval, since, decay, path.step, out)
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _walk_moments(
+    sizes: Array, interval: Rows, since: Array, decay: float, h: float, out: Array
+) -> None:
+    """Moments at nodes so long `since` the intervals, which rise, began."""
+    state, moved, node = np.zeros(5), np.empty(5), 0
+    for i in range(interval[-1] + 1):
+        while node < len(interval) and interval[node] == i:
+            _move_moments(state, decay, since[node], sizes[i], out[:, node])
+            node += 1
+        _move_moments(state, decay, h, sizes[i], moved)
+        state[:] = moved
+
+
+@njit(cache=True, nogil=True)
+def _move_moments(state: Array, decay: float, h: float, size: float, out: Array) -> None:
+    """Moments a time h later, under a load of at most `size`."""
+    fade = np.exp(-decay * h)
+    for n in range(5):
+        total, choices = 0.0, 1.0
+        for j in range(n, -1, -1):  # Σ C(n, j) h^(n − j) state_j
+            total += choices * h ** (n - j) * state[j]
+            choices *= j / (n - j + 1)
+        out[n] = fade * total + size * h ** (n + 1) / (n + 1)
 
 
 def responses_at_nodes(
-    sigma: Array, ground: Accelerogram, time: Array, derivatives: int
+    sigma: Array, history: History, time: Array, derivatives: int
 ) -> tuple[Array, Array]:
     """ρ with derivatives by σ at all nodes, shape (1 + derivatives, T, S), for σ (S,).
 
@@ -94,16 +147,20 @@ def responses_at_nodes(
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
-    require_in_range(sigma, ground.step, max(ground.step, float(time[-1])))
-    out = np.empty((1 + derivatives, len(time), len(sigma)), complex)
-    error = np.empty(out.shape[1:])
-    with PARALLEL_LOOP:
-        _walk_to_all(sigma, walk(ground, time), (0,) * derivatives, out, error)
-    return out, error
+
+    def walked(shifted: Array) -> tuple[Array, Array]:
+        require_in_range(shifted, history.step, max(history.step, float(time[-1])))
+        out = np.empty((1 + derivatives, len(time), len(sigma)), complex)
+        error = np.empty(out.shape[1:])
+        with PARALLEL_LOOP:
+            _walk_to_all(shifted, walk(history, time), (0,) * derivatives, out, error)
+        return out, error
+
+    return _with_sine(walked, sigma, history, time[:, None])
 
 
 def responses_at_named_nodes(
-    sigma: Array, ground: Accelerogram, time: Array, node: Rows, derivatives: int
+    sigma: Array, history: History, time: Array, node: Rows, derivatives: int
 ) -> tuple[Array, Array]:
     """ρ with derivatives by σ, shape (1 + derivatives, S, n), for σ (S, n) at node (S,) of `time`.
 
@@ -113,15 +170,19 @@ def responses_at_named_nodes(
     Raises:
         UnprovedError: A σ is out of the kernel's range.
     """
-    require_in_range(sigma, ground.step, max(ground.step, float(time[-1])))
-    out = np.empty((1 + derivatives, *sigma.shape), complex)
-    error = np.empty(sigma.shape)
-    with PARALLEL_LOOP:
-        _walk_to_named(sigma, walk(ground, time), (0,) * derivatives, node, out, error)
-    return out, error
+
+    def walked(shifted: Array) -> tuple[Array, Array]:
+        require_in_range(shifted, history.step, max(history.step, float(time[-1])))
+        out = np.empty((1 + derivatives, *sigma.shape), complex)
+        error = np.empty(sigma.shape)
+        with PARALLEL_LOOP:
+            _walk_to_named(shifted, walk(history, time), (0,) * derivatives, node, out, error)
+        return out, error
+
+    return _with_sine(walked, sigma, history, time[node][:, None])
 
 
-def responses_in_windows(sigma: Array, ground: Accelerogram, time: Array, length: int) -> Array:
+def responses_in_windows(sigma: Array, history: History, time: Array, length: int) -> Array:
     """The part of ρ at each node that arises in its window, shape (T, S), for σ (S,).
 
     Windows begin at every `length`-th node, which itself ends the one before. Exponents may grow.
@@ -130,11 +191,36 @@ def responses_in_windows(sigma: Array, ground: Accelerogram, time: Array, length
         UnprovedError: A σ is out of the kernel's range within a window.
     """
     window = float(time[min(length, len(time) - 1)] - time[0])
-    require_in_range(sigma, ground.step, max(ground.step, window))
-    out = np.zeros((1, len(time), len(sigma)), complex)
-    with PARALLEL_LOOP:
-        _walk_in_windows(sigma, walk(ground, time), length, out)
-    return np.asarray(out[0])
+
+    def walked(shifted: Array) -> tuple[Array, Array]:
+        require_in_range(shifted, history.step, max(history.step, window))
+        out = np.zeros((1, len(time), len(sigma)), complex)
+        with PARALLEL_LOOP:
+            _walk_in_windows(shifted, walk(history, time), length, out)
+        return out, np.zeros(out.shape[1:])
+
+    return np.asarray(_with_sine(walked, sigma, history, time[:, None])[0][0])
+
+
+def _with_sine(
+    walked: Callable[[Array], tuple[Array, Array]], sigma: Array, history: History, time: Array
+) -> tuple[Array, Array]:
+    """Responses and their rounding from those to the load without its sine.
+
+    |ρ′| is at most t ∫ |g| exp(Re σ τ), by which rounding of an exponent is bounded.
+    """
+    rate = history.frequency
+    if not rate:
+        return walked(sigma)
+    angle = rate * (time - history.start) + history.phase
+    (later, one), (sooner, other) = walked(sigma - 1j * rate), walked(sigma + 1j * rate)
+    turn = np.exp(1j * angle)
+    response = (turn * later - turn.conj() * sooner) / 2j
+    size = np.abs(later[0]) + np.abs(sooner[0])
+    grown = np.exp(np.maximum(sigma.real * time, 0.0)) * history.extremes[0] * time**2
+    of_exponent = (np.abs(sigma) + rate) * grown
+    rounding = UNIT_ROUNDOFF * ((8 + np.abs(angle)) * size + of_exponent)
+    return response, (one + other) / 2 + rounding
 
 
 @njit(cache=True, parallel=True)

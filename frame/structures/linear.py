@@ -1,16 +1,17 @@
-"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) with parameters p (section 6.1)."""
+"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) + Σ b_i(p) f_i(t) (section 6.1)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array, Jet, concatenate, variables
+from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse, variables
+from alphacut.frame.structures.loads import Accelerogram, Force, History, different
 from alphacut.frame.structures.quantities import Parameter
-from alphacut.fuzzy.refused import RefusedError, require
+from alphacut.fuzzy.refused import require
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,11 @@ class Matrices:
         q0: Initial displacement, shape (S, n, 1), in m.
         v0: Initial velocity, shape (S, n, 1), in m/s.
         rigid: ι, how the unknowns move rigidly with the ground, shape (n, 1).
+        forces: b of each history of forces, shape (S, n, H), in N; None for none.
+        static: Force under which the structure rests at the start besides q0, shape (S, n, 1).
+        impulse: Impulse at t = 0, shape (S, n, 1), in N s; v0 comes before it.
+        accelerated: Accelerations that outputs read besides their rows, which a force on the same
+            unknown adds to at once, shape (m, n).
     """
 
     mass: Jet
@@ -32,59 +38,54 @@ class Matrices:
     q0: Jet
     v0: Jet
     rigid: Array
+    forces: Jet | None = None
+    static: Jet | None = None
+    impulse: Jet | None = None
+    accelerated: Array | None = None
 
     @property
     def start(self) -> Jet:
         """Initial state [q; v], shape (S, 2n, 1)."""
-        return concatenate([self.q0, self.v0], -2)
+        q0, v0 = self.q0, self.v0
+        if self.static is not None:
+            q0 = q0 + inverse(self.stiffness) @ self.static
+        if self.impulse is not None:
+            v0 = v0 + inverse(self.mass) @ self.impulse
+        return concatenate([q0, v0], -2)
+
+    def pushes(self, *, ground: bool) -> Jet:
+        """Accelerations by a unit of each load, V = (S, n, L): of the ground first, if it moves."""
+        shape = (*self.mass.value.shape[:-1], int(ground))
+        parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
+        if self.forces is not None:
+            parts.append(inverse(self.mass) @ self.forces)
+        return concatenate(parts, -1)
 
     @property
-    def kick(self) -> Array:
-        """Jump of the state at a unit impulse of the ground's acceleration, shape (2n, 1)."""
-        return np.concatenate([np.zeros_like(self.rigid), -self.rigid])
+    def feeds(self) -> Jet | None:
+        """What a unit of each force adds to the outputs at once, V = (S, m, H); None if nothing."""
+        if self.forces is None or self.accelerated is None or not self.accelerated.any():
+            return None
+        return self.accelerated @ self.pushes(ground=False)
 
 
-@dataclass(frozen=True, eq=False)
-class Accelerogram:
-    """Acceleration of the ground, linear between its samples and zero outside them.
-
-    It jumps where it begins or ends on another value than zero.
+def grouped(columns: Jet, forces: Sequence[Force]) -> dict[str, Jet | None]:
+    """Fields `forces`, `static` and `impulse` of `Matrices`.
 
     Args:
-        step: Time between samples, in s; it need not go into the step of the nodes.
-        acceleration: Samples from t = 0 on, at least two, shape (n,), in m/s².
-
-    Raises:
-        RefusedError: The step is not positive, or there are not two samples, or one is not finite.
-
-    Example:
-        >>> import numpy as np
-        >>> ground = Accelerogram(0.01, np.array([0.0, 1.5, 0.0]))
-        >>> float(ground.acceleration.max())
-        1.5
+        columns: Each force at the amplitude 1 of its history, V = (S, n, number of forces).
+        forces: The forces.
     """
-
-    step: float
-    acceleration: Array = field(repr=False)
-
-    def __post_init__(self) -> None:
-        allowed = "two or more finite samples, a positive step"
-        try:
-            samples, step = np.asarray(self.acceleration, float), float(self.step)
-        except (TypeError, ValueError):
-            what = f"{self.acceleration!r} every {self.step!r} s"
-            raise RefusedError("accelerogram", what, allowed) from None
-        several = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
-        what = f"{samples.size} samples every {step:g} s"
-        require(several and 0 < step < np.inf, "accelerogram", value=what, allowed=allowed)
-        object.__setattr__(self, "step", step)
-        object.__setattr__(self, "acceleration", samples)
-
-    @property
-    def extremes(self) -> tuple[float, float, float]:
-        """Largest magnitude (m/s²), slope between samples (m/s³) and jump at the end (m/s²)."""
-        size, slope = np.abs(self.acceleration), np.abs(np.diff(self.acceleration))
-        return float(size.max()), float(slope.max()) / self.step, float(size[-1])
+    courses = different(tuple(forces))
+    keys = [None if force.history is None else force.history.identity for force in forces]
+    member = np.array([[key == course.identity for course in courses] for key in keys], float)
+    first = [float(course.is_static) * float(course.values(np.zeros(1))[0]) for course in courses]
+    still, struck = member @ np.array(first), np.array([key is None for key in keys], float)
+    return {
+        "forces": columns @ member if courses else None,
+        "static": columns @ still[:, None] if still.any() else None,
+        "impulse": columns @ struck[:, None] if struck.any() else None,
+    }
 
 
 def require_ground(ground: object) -> None:
@@ -112,6 +113,10 @@ class LinearSystem(Protocol):
     def ground(self) -> Accelerogram | None:
         """Base excitation, if any; the displacements are then relative to the ground."""
 
+    @property
+    def loads(self) -> Sequence[Force]:
+        """Forces on it."""
+
     def parameter(self, name: str) -> Parameter:
         """A parameter with the unit and the range that are known of it."""
 
@@ -120,6 +125,18 @@ class LinearSystem(Protocol):
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
+
+
+def histories(system: LinearSystem) -> dict[str, History]:
+    """Histories of all loads by name, in the order of `Matrices.pushes`: load, force1, …."""
+    of_ground = {} if system.ground is None else {"load": system.ground}
+    of_forces = enumerate(different(tuple(system.loads)), start=1)
+    return {**of_ground, **{f"force{number}": history for number, history in of_forces}}
+
+
+def courses_of_forces(system: LinearSystem) -> list[History]:
+    """Histories of the forces alone, in the order of `Matrices.feeds`."""
+    return [history for name, history in histories(system).items() if name != "load"]
 
 
 def evaluate(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
-from alphacut.frame.structures.linear import Accelerogram, Matrices, require_ground
+from alphacut.frame.structures.linear import Matrices, grouped, require_ground
+from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import chosen, real, require, require_numbers
 
 KINDS = ("mass", "damping", "stiffness")
-Factor = Callable[[Mapping[str, Any]], Any]
 Terms = Sequence[tuple[Factor | str | float, Array]]
 
 
@@ -46,12 +46,13 @@ class MatrixStructure:
             the modes. Empty for none.
         row_factors: Factor of an output's row by the output's name, as that of a member force; 1
             where none is given.
+        loads: Forces on unknowns that have mass.
 
     Raises:
         RefusedError: A shape does not fit, a number is not finite, a factor names no parameter, an
             array is not symmetric, the modal mass of the unknowns that have mass is not positive
-            definite, one without mass has a damper or no stiffness, or the modal ratio is outside
-            [0, 1).
+            definite, one without mass has a damper, a force or no stiffness, or the modal ratio is
+            outside [0, 1).
 
     Example:
         >>> import numpy as np
@@ -74,6 +75,7 @@ class MatrixStructure:
     pattern: Array | None = None
     ratios: Sequence[str | float] = ()
     row_factors: Mapping[str, Factor | str | float] = field(default_factory=dict)
+    loads: Sequence[Force] = ()
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
@@ -81,6 +83,8 @@ class MatrixStructure:
         for kind in ("mass", "stiffness", "observed"):
             require(bool(getattr(self, kind)), kind, value=None, allowed="one entry at least")
         require_ground(self.ground)
+        object.__setattr__(self, "loads", tuple(self.loads))
+        require_forces(self.loads)
         for kind in KINDS:
             terms = [self._term(kind, term) for term in getattr(self, kind)]
             object.__setattr__(self, kind, tuple(terms))
@@ -89,6 +93,11 @@ class MatrixStructure:
             chosen("row_factors", name, self.observed)
             self._require_factor(f"observed: {name}", factor)
         self._require_definite()
+        for force in self.loads:
+            self._require_factor("a force", force.amplitude)
+            missing = np.flatnonzero(force.at[self.massless])
+            what, allowed = f"on unknowns {self.massless[missing]}", "on unknowns that have mass"
+            require(not len(missing), "force", value=what, allowed=allowed)
         own = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
         fits = len(own) in (0, 1, len(self.massive)) and all(
             Parameter("", range=RATIO).admits(x, x) for x in own
@@ -199,6 +208,7 @@ class MatrixStructure:
         vectors: list[tuple[str, Any, tuple[int, ...]]]
         vectors = [(name, getattr(self, name), (n,)) for name in ("q0", "v0", "pattern")]
         vectors += [(f"observed: {k}", row, (n, 2 * n)) for k, row in self.observed.items()]
+        vectors += [("force", force.at, (n,)) for force in self.loads]
         for name, value, lengths in vectors:
             if value is not None:
                 require_numbers(name, value)
@@ -223,7 +233,13 @@ class MatrixStructure:
             q0, v0, rigid = q0[:, a], v0[:, a], rigid[a]
         if self.ratios:
             damping = damping + modal_damping(mass, stiffness, [lifted(x, p) for x in self.ratios])
-        return Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
+        start = mass, damping, stiffness, q0, v0, rigid[:, None]
+        if not self.loads:
+            return Matrices(*start)
+        amplitudes = [lifted(force.amplitude, p)[:, None] for force in self.loads]
+        placed = np.transpose([force.at[self.massive] for force in self.loads])
+        columns = concatenate(amplitudes, -1)[:, None, :] * placed
+        return Matrices(*start, **grouped(columns, self.loads))
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""

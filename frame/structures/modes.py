@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +36,17 @@ class Modes:
     Args:
         eigenvalue: λ_k with Im λ_k > 0, by rising |λ_k|, complex jet, V = (S, n), in 1/s.
         coefficient: C_k, what the initial state puts into the outputs, V = (S, n, m).
-        load: The same for a unit impulse of the ground's acceleration, V = (S, n, m).
+        loads: The same for a unit impulse of each load, V = (S, n, m) each.
     """
 
     eigenvalue: Jet
     coefficient: Jet
-    load: Jet
+    loads: tuple[Jet, ...]
+
+    def map(self, change: Callable[[Jet], Jet]) -> Modes:
+        """All of them changed alike."""
+        loads = tuple(change(load) for load in self.loads)
+        return Modes(change(self.eigenvalue), change(self.coefficient), loads)
 
 
 def joined(parts: Sequence[Modes]) -> Modes:
@@ -49,16 +54,17 @@ def joined(parts: Sequence[Modes]) -> Modes:
     return Modes(
         concatenate([part.eigenvalue for part in parts], -2),
         concatenate([part.coefficient for part in parts], -3),
-        concatenate([part.load for part in parts], -3),
+        tuple(concatenate(columns, -3) for columns in zip(*(x.loads for x in parts), strict=True)),
     )
 
 
-def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
+def modes(matrices: Matrices, rows: Jet, pushes: Jet, chosen: Array | None = None) -> Modes:
     """Eigen-analyses at S parameter sets.
 
     Args:
         matrices: The structure.
         rows: Observation rows, V = (S, m, 2n).
+        pushes: Accelerations by a unit of each load, V = (S, n, L).
         chosen: Indices of the modes, among those that oscillate, by rising |λ|; all modes
             when None.
 
@@ -75,11 +81,14 @@ def modes(matrices: Matrices, rows: Jet, chosen: Array | None = None) -> Modes:
         )
     seen = rows @ X[..., some]  # V = (S, m, n)
 
-    def through(excitation: Jet | Array) -> Jet:
+    def through(excitation: Jet) -> Jet:
         share = (Y @ excitation)[..., some, 0][..., None, :]
         return (seen * share).map(lambda x: x.swapaxes(-1, -2))
 
-    return Modes(values, through(matrices.start), through(matrices.kick))
+    states = concatenate([pushes * 0.0, pushes], -2)
+    columns = range(pushes.value.shape[-1])
+    loads = tuple(through(states[..., i : i + 1]) for i in columns)
+    return Modes(values, through(matrices.start), loads)
 
 
 def require_single(matrices: Matrices, chosen: Array) -> None:

@@ -51,6 +51,8 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
         )
     if any(map(callable, system.row_factors.values())):
         raise UnprovedError("an output has a factor that is a function of the parameters")
+    if any(callable(force.amplitude) for force in system.loads):
+        raise UnprovedError("a force has an amplitude that is a function of the parameters")
     for kind in ("mass", "damping", "stiffness"):
         for factor, array in getattr(system, kind):
             if callable(factor):

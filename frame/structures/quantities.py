@@ -100,13 +100,15 @@ OF_STOREY_FRAME = {
     "zeta": ("", RATIO),
     "q": ("m", ""),
     "v": ("m/s", ""),
+    "F": ("N", ""),
+    "J": ("N*s", ""),
 }
 """Units and ranges of a storey frame's parameters, by their names without the floor."""
 
 
 def of_storey_frame(name: str) -> Parameter:
     """A parameter of a storey frame by its name; without unit and range where it is no such."""
-    return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_0)?$", "", name), ()))
+    return Parameter(name, *OF_STOREY_FRAME.get(re.sub(r"\d+(_\d+)?$", "", name), ()))
 
 
 def units_of(outputs: tuple[str, ...]) -> tuple[str, ...]:

@@ -15,7 +15,8 @@ from typing import Literal
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
-from alphacut.frame.structures.linear import Accelerogram, Matrices, require_ground
+from alphacut.frame.structures.linear import Matrices, grouped, require_ground
+from alphacut.frame.structures.loads import Accelerogram, Force, require_forces
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
@@ -38,7 +39,8 @@ class StoreyFrame:
     Parameters that can be uncertain: "E", "I" or "I1" …, "m1" … "mn", "l1" …, "c1" … (columns of a
     storey), or "k1" … where stiffnesses are given (and "l1" … with gravity alone); "d1" …, "q1_0" …
     (initial displacements), "v1_0" … (initial velocities), "rayleigh_mass", "rayleigh_stiffness",
-    and "zeta", or "zeta1" … of single modes, where there are damping ratios.
+    and "zeta", or "zeta1" … of single modes, where there are damping ratios; "F3" of a force on
+    floor 3, "F3_2" of a second one there, "J3" of an impulse.
     Outputs: "q1" … (displacement, m), "v1" … (velocity, m/s), "a1" … (absolute acceleration,
     m/s²), "drift1" … (q_z − q_(z−1), m), "shear1" … (k_z drift_z, N); "base_shear" is "shear1".
 
@@ -66,11 +68,13 @@ class StoreyFrame:
         gravity: Acceleration of gravity, in m/s², of the weights that reduce the stiffness of each
             storey to k_z − P_z / l_z, P_z that of all floors above it (P-Delta); 0 leaves them out.
             Rayleigh's damping and shears keep k_z.
+        loads: Forces on floors.
 
     Raises:
         RefusedError: A length of the lists differs, a mass, length, modulus, moment, stiffness or
             number of columns is not positive, a damper or gravity is negative, a ratio is outside
-            [0, 1), the weight buckles a storey, or a stiffness stands beside what makes one.
+            [0, 1), the weight buckles a storey, a stiffness stands beside what makes one, or a
+            force acts on no floor.
 
     Example:
         >>> frame = StoreyFrame(masses=[1e3, 1e3], stiffness=[4e4, 4e4], q0=[0.1, 0.2])
@@ -93,11 +97,14 @@ class StoreyFrame:
     columns: Sequence[float] = ()
     stiffness: Sequence[float] = ()
     gravity: float = 0.0
+    loads: Sequence[Force] = ()
 
     def __post_init__(self) -> None:
         self._require_values()
         self._require_springs()
         require_ground(self.ground)
+        object.__setattr__(self, "loads", tuple(self.loads))
+        self._require_loads()
         n = len(self.masses)
         filled: dict[str, Sequence[float]] = {
             name: tuple(getattr(self, name)) or (0.0,) * n for name in ("dampers", "q0", "v0")
@@ -154,6 +161,14 @@ class StoreyFrame:
         for name, value in made.items():
             require(value is not None, name, value=None, allowed=MADE)
 
+    def _require_loads(self) -> None:
+        """Refuse forces on no floor, or without an amplitude."""
+        require_forces(self.loads)
+        for force in self.loads:
+            is_floor = force.at in range(1, self.floors + 1)
+            require(is_floor, "floor", value=force.at, allowed=f"1 to {self.floors}")
+            real("amplitude", force.amplitude)
+
     @property
     def floors(self) -> int:
         """Number of floors n."""
@@ -182,7 +197,23 @@ class StoreyFrame:
             if name != "lengths" or not self.stiffness or self.gravity:
                 named |= _named(SYMBOLS[name], getattr(self, name), single=False)
         damping = {"rayleigh_mass": self.rayleigh[0], "rayleigh_stiffness": self.rayleigh[1]}
-        return {**named, **damping, **self.ratios}
+        forces = zip(self.force_names, self.loads, strict=True)
+        return {
+            **named,
+            **damping,
+            **self.ratios,
+            **{x: real(x, force.amplitude) for x, force in forces},
+        }
+
+    @property
+    def force_names(self) -> tuple[str, ...]:
+        """Parameters of the amplitudes of all loads, in their order."""
+        names = list[str]()
+        for force in self.loads:
+            name = f"{'J' if force.history is None else 'F'}{force.at}"
+            before = sum(x.partition("_")[0] == name for x in names)
+            names.append(f"{name}_{before + 1}" if before else name)
+        return tuple(names)
 
     def parameter(self, name: str) -> Parameter:
         """A parameter with its unit and range."""
@@ -196,6 +227,8 @@ class StoreyFrame:
         """
         patterns = {"m": "m{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
         patterns |= {x: x + "{}" for x in "klcI" if f"{x}1" in self.parameters}
+        if name == "F" and self.loads:
+            return self.force_names
         if name in patterns:
             return tuple(patterns[name].format(z + 1) for z in range(self.floors))
         require(
@@ -236,7 +269,14 @@ class StoreyFrame:
             ratios = [p[name] for name in self.ratios]
             damping = damping + modal_damping(mass, stiffness, ratios)
         q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
-        return Matrices(mass, damping, stiffness, q0, v0, np.ones((self.floors, 1)))
+        start = mass, damping, stiffness, q0, v0, np.ones((self.floors, 1))
+        if not self.loads:
+            return Matrices(*start)
+        amplitudes = concatenate([p[name][:, None] for name in self.force_names], -1)
+        placed = amplitudes[:, None, :] * np.eye(self.floors)[:, [x.at - 1 for x in self.loads]]
+        kinds = [self.quantity(name) for name in self.outputs]
+        read = np.array([np.eye(self.floors)[z] * (kind == "a") for kind, z in kinds])
+        return Matrices(*start, **grouped(placed, self.loads), accelerated=read)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""

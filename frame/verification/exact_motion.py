@@ -6,13 +6,15 @@ fault in one of them does not hide itself.
 
 Method: the exponential of the state matrix from one substep to the next (Van Loan, 1978, for the
 load), and its Taylor series within a substep. Neither samples of the record nor substeps need to
-coincide with the times asked for.
+coincide with the times asked for. A force adds its own motion from rest; a sine its steady state,
+(iΩ − A) X = b, and a free motion that begins against it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import ceil, isqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +33,43 @@ AT_ONCE = 4096
 """Times whose outputs are evaluated together, which limits the memory."""
 
 
+class Course(NamedTuple):
+    """A force over time: g(t) sin(Ω (t − start) + phase), or g(t) where Ω is 0.
+
+    Args:
+        samples: Samples of g, linear between and zero outside, shape (R,).
+        step: Time between samples, in s.
+        start: Time of the first one, in s.
+        is_held: Whether the last one stays on; that of a sine, which is 1, does.
+        frequency: Ω, in rad/s.
+        phase: In rad.
+    """
+
+    samples: Array
+    step: float
+    start: float
+    is_held: bool
+    frequency: float
+    phase: float
+
+    def values(self, times: Array) -> Array:
+        """The force at times, after jumps, shape (T,)."""
+        since = times - self.start
+        place = since / self.step
+        place = np.where(np.abs(place - np.rint(place)) < 1e-9, np.rint(place), place)
+        value = np.interp(place, np.arange(len(self.samples)), self.samples)
+        value[(place < 0) | ((place >= len(self.samples) - 1) & (not self.is_held))] = 0.0
+        return value * (np.sin(self.frequency * since + self.phase) if self.frequency else 1.0)
+
+    def until(self, time: float) -> Array:
+        """Samples that reach up to a time after the start, in s, where the last one is held."""
+        more = max(0, ceil(time / self.step) + 1 - len(self.samples)) * self.is_held
+        return np.append(self.samples, np.full(more, self.samples[-1]))
+
+
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """M q̈ + D q̇ + K q = −M ι a(t) with a(t) linear between samples and zero outside the record.
+    """M q̈ + D q̇ + K q = −M ι a(t) + Σ b f(t), a(t) linear between samples and zero outside.
 
     Args:
         mass: M, symmetric and positive definite, shape (n, n), in kg.
@@ -44,6 +80,9 @@ class LinearMotion:
         pattern: ι, shape (n,).
         record: Samples of a from t = 0 on, shape (R,), in m/s²; empty for none.
         record_step: Time between samples, in s.
+        forces: b of each force, shape (n, H), in N.
+        feeds: What a unit of each force adds to the outputs at once, shape (m, H).
+        courses: f of each force.
     """
 
     mass: Array
@@ -54,6 +93,9 @@ class LinearMotion:
     pattern: Array
     record: Array
     record_step: float
+    forces: Array
+    feeds: Array
+    courses: tuple[Course, ...] = ()
 
     def outputs(self, times: Array) -> tuple[Array, Array]:
         """Outputs at times from 0 on, and their round-off, both of shape (T, m).
@@ -62,22 +104,18 @@ class LinearMotion:
         ω², as the inputs themselves are rounded, so that the slowest mode ω_1 turns by up to
         n ε ω² min(t², t/ω_1) / 2 rad more or less.
         """
-        state, last = _EnergyState.of(self), max(float(times.max()), 1e-300)
-        interval = self.record_step if len(self.record) else last
-        parts = max(1, ceil(state.norm * interval / MAX_NORM))
-        substep = interval / parts
-        count = max(1, ceil(last / substep))
-        load = state.load_size * _substep_loads(self.record, parts, count)
-        flow = state.loaded_flow(substep)
-        step = expm(flow)[: len(state.start)]
-        states = _recursion(step[:, :-2], state.start, load @ step[:, -2:].T)
-        degree = _degree(state.norm * substep)
-        loaded = np.hstack([states, load])
-        values = _taylor(flow, degree, state.rows, loaded, np.asarray(times / substep, float))
-        turn = state.highest**2 * np.minimum(times**2, times / state.lowest) / 2
-        size = np.abs(state.rows) @ np.abs(states).max(0)
-        rounding = len(self.mass) * EPSILON * (FEW + turn)
-        return values, np.asarray(rounding[:, None] * size)
+        state = _EnergyState.of(self)
+        values, rounding = state.moved(
+            state.start, state.ground, self.record, self.record_step, times
+        )
+        for k, course in enumerate(self.courses):
+            acts = times >= course.start - 1e-12 * times[-1]
+            since = np.maximum(times[acts] - course.start, 0.0)
+            driven, more = state.driven(self.forces[:, k], course, since)
+            values[acts] += driven
+            rounding[acts] += more
+            values += self.feeds[:, k] * course.values(times)[:, None]
+        return values, rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +127,8 @@ class _EnergyState:
 
     Args:
         matrix: A of ẋ = A x + b a, shape (2n, 2n), in 1/s.
-        load: b over its norm, shape (2n,).
-        load_size: That norm.
+        lower: L, shape (n, n).
+        ground: b of the ground's acceleration, shape (2n,).
         rows: Outputs of x, shape (m, 2n).
         start: x at t = 0.
         lowest: Least frequency, at least 1e-300 rad/s.
@@ -99,8 +137,8 @@ class _EnergyState:
     """
 
     matrix: Array
-    load: Array
-    load_size: float
+    lower: Array
+    ground: Array
     rows: Array
     start: Array
     lowest: float
@@ -121,13 +159,12 @@ class _EnergyState:
         omega = float(np.sqrt(squared.max())) or 1.0
         matrix = np.block([[np.zeros((n, n)), omega * np.eye(n)], [-spring / omega, -damper]])
         push = -(lower.T @ motion.pattern) / omega
-        size = float(np.linalg.norm(push)) or 1.0
         back = solve_triangular(lower, np.eye(n), lower=True)  # L⁻¹: q = L⁻ᵀ x
         q, v = motion.start[:n], motion.start[n:]
         return cls(
             matrix,
-            np.concatenate([np.zeros(n), push / size]),
-            size,
+            lower,
+            np.concatenate([np.zeros(n), push]),
             np.hstack([motion.rows[:, :n] @ back.T, omega * motion.rows[:, n:] @ back.T]),
             np.concatenate([lower.T @ q, lower.T @ v / omega]),
             max(float(np.sqrt(squared.min())), 1e-300),
@@ -135,12 +172,51 @@ class _EnergyState:
             omega + float(np.linalg.norm(damper)),
         )
 
-    def loaded_flow(self, substep: float) -> Array:
+    def moved(
+        self, start: Array, push: Array, record: Array, step: float, times: Array
+    ) -> tuple[Array, Array]:
+        """Outputs at times and their round-off, (T, m), from a start and under b a(t)."""
+        last = max(float(times.max(initial=0.0)), 1e-300)
+        interval = step if len(record) else last
+        parts = max(1, ceil(self.norm * interval / MAX_NORM))
+        substep = interval / parts
+        size = float(np.linalg.norm(push)) or 1.0
+        load = size * _substep_loads(record, parts, max(1, ceil(last / substep)))
+        flow = self._loaded_flow(substep, push / size)
+        exact = expm(flow)[: len(start)]
+        states = _recursion(exact[:, :-2], start, load @ exact[:, -2:].T)
+        degree, scaled = _degree(self.norm * substep), np.asarray(times / substep, float)
+        values = _taylor(flow, degree, self.rows, np.hstack([states, load]), scaled)
+        return values, self._rounding(np.abs(states).max(0), times)
+
+    def driven(self, force: Array, course: Course, times: Array) -> tuple[Array, Array]:
+        """Outputs at times since a force's start, from rest, and their round-off, (T, m) each."""
+        n, nothing = len(force), np.zeros(len(self.matrix))
+        pushed = solve_triangular(self.lower, force, lower=True) / self.highest
+        push, none = np.append(np.zeros(n), pushed), np.zeros(0)
+        if not course.frequency:
+            record = course.until(float(times.max(initial=0.0)))
+            return self.moved(nothing, push, record, course.step, times)
+        resolvent = 1j * course.frequency * np.eye(2 * n) - self.matrix
+        steady = np.linalg.solve(resolvent, push) * np.exp(1j * course.phase)
+        free, rounding = self.moved(-steady.imag, nothing, none, 0.0, times)
+        waves = steady * np.exp(1j * course.frequency * times)[:, None]
+        condition = float(np.linalg.cond(resolvent))
+        more = self._rounding(np.abs(steady), times)
+        return free + waves.imag @ self.rows.T, rounding + more * (1 + condition)
+
+    def _rounding(self, state: Array, times: Array) -> Array:
+        """Round-off of outputs of states as large as `state` (2n,), shape (T, m)."""
+        turn = self.highest**2 * np.minimum(times**2, times / self.lowest) / 2
+        rounding = len(self.lower) * EPSILON * (FEW + turn)
+        return np.asarray(rounding[:, None] * (np.abs(self.rows) @ state))
+
+    def _loaded_flow(self, substep: float, push: Array) -> Array:
         """Generator of (x, a, increment of a) over a substep, shape (2n + 2, 2n + 2)."""
         size = len(self.matrix)
         flow = np.zeros((size + 2, size + 2))
         flow[:size, :size] = self.matrix * substep
-        flow[:size, size] = self.load * substep
+        flow[:size, size] = push * substep
         flow[size, size + 1] = 1.0
         return flow
 

@@ -17,9 +17,10 @@ from itertools import islice, product
 import numpy as np
 
 from alphacut.frame.envelope import Envelope
-from alphacut.frame.structures.linear import LinearSystem, evaluate
+from alphacut.frame.structures.linear import LinearSystem, courses_of_forces, evaluate
+from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.quantities import Output
-from alphacut.frame.verification.exact_motion import LinearMotion
+from alphacut.frame.verification.exact_motion import Course, LinearMotion
 from alphacut.frame.verification.stored import variables
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
@@ -78,21 +79,50 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
 def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
     """A structure at inputs (S, n) of an envelope, ready to move."""
     matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
-    ground = system.ground
-    record, step = (np.zeros(0), 0.0) if ground is None else (ground.acceleration, ground.step)
-    return [
-        LinearMotion(
-            mass=matrices.mass.value[s],
-            damping=matrices.damping.value[s],
-            stiffness=matrices.stiffness.value[s],
-            rows=rows.value[s],
-            start=matrices.start.value[s, :, 0],
-            pattern=matrices.rigid[:, 0],
-            record=record,
-            record_step=step,
+    ground, n = system.ground, matrices.mass.value.shape[-1]
+    record, step = (np.zeros(0), 0.0) if ground is None else (ground.samples, ground.step)
+    read = (
+        np.zeros((rows.value.shape[1], n)) if matrices.accelerated is None else matrices.accelerated
+    )
+    courses = tuple(_course(history) for history in courses_of_forces(system))
+    motions = []
+    for s in range(len(points)):
+        M, K, b, static, impulse = (
+            None if jet is None else jet.value[s]
+            for jet in (
+                matrices.mass,
+                matrices.stiffness,
+                matrices.forces,
+                matrices.static,
+                matrices.impulse,
+            )
         )
-        for s in range(len(points))
-    ]
+        q0, v0 = matrices.q0.value[s, :, 0], matrices.v0.value[s, :, 0]
+        forces = np.zeros((n, 0)) if b is None else b
+        q0 = q0 if static is None else q0 + np.linalg.solve(K, static[:, 0])
+        v0 = v0 if impulse is None else v0 + np.linalg.solve(M, impulse[:, 0])
+        motions.append(
+            LinearMotion(
+                mass=M,
+                damping=matrices.damping.value[s],
+                stiffness=K,
+                rows=rows.value[s],
+                start=np.append(q0, v0),
+                pattern=matrices.rigid[:, 0],
+                record=record,
+                record_step=step,
+                forces=forces,
+                feeds=read @ np.linalg.solve(M, forces),
+                courses=courses,
+            )
+        )
+    return motions
+
+
+def _course(history: History) -> Course:
+    """A history as the exact motion takes it."""
+    flags = history.start, history.is_held, history.frequency, history.phase
+    return Course(history.samples, history.step, *flags)
 
 
 def cuts_of(envelope: Envelope) -> Array:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.frame.verification.exact_motion import LinearMotion
+from alphacut.frame.verification.exact_motion import Course, LinearMotion
 from alphacut.fuzzy.arrays import Array
 
 if TYPE_CHECKING:
@@ -27,18 +27,22 @@ AXES = {
     "pattern": ("motion", "row"),
 }
 """Axes of each array of a `LinearMotion`; the record is that of all."""
+FORCES = {"forces": ("motion", "row", "load"), "feeds": ("motion", "output", "load")}
+"""Axes of what is there where forces act, whose courses are those of all."""
 
 
 def variables(points: Array, motions: Sequence[LinearMotion]) -> Variables:
     """Arrays of the structures at points (S, n), ready for a dataset."""
     count = max(1, min(len(motions), MOST // (3 * motions[0].mass.size)))
     some = motions[:count]
-    arrays = {name: np.stack([getattr(x, name) for x in some]) for name in AXES}
+    axes = AXES | (FORCES if some[0].courses else {})
+    arrays = {name: np.stack([getattr(x, name) for x in some]) for name in axes}
     return {
         "motion_inputs": (("motion", "parameter"), points[:count]),
-        **{f"motion_{name}": (AXES[name], array) for name, array in arrays.items()},
+        **{f"motion_{name}": (axes[name], array) for name, array in arrays.items()},
         "record": (("sample",), some[0].record),
         "record_step": ((), np.array(some[0].record_step)),
+        **_stored_courses(some[0].courses),
     }
 
 
@@ -46,5 +50,36 @@ def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
     """Inputs (S, n) and structures that a dataset holds."""
     points = data["motion_inputs"].values
     record, step = data["record"].values, float(data["record_step"])
-    arrays = [{name: data[f"motion_{name}"].values[s] for name in AXES} for s in range(len(points))]
-    return points, [LinearMotion(**each, record=record, record_step=step) for each in arrays]
+    courses = _courses(data)
+    m, n = data["motion_rows"].shape[1], data["motion_mass"].shape[1]
+    none = {"forces": np.zeros((n, 0)), "feeds": np.zeros((m, 0))}
+    axes = AXES | (FORCES if courses else {})
+    arrays = [
+        none | {name: data[f"motion_{name}"].values[s] for name in axes} for s in range(len(points))
+    ]
+    fixed = {"record": record, "record_step": step, "courses": courses}
+    return points, [LinearMotion(**each, **fixed) for each in arrays]
+
+
+def _stored_courses(courses: Sequence[Course]) -> dict[str, tuple[tuple[str, ...], Array]]:
+    """Courses of forces: samples behind one another, and all that is one number."""
+    if not courses:
+        return {}
+    numbers = [[len(x.samples), *x[1:]] for x in courses]
+    samples = np.concatenate([x.samples for x in courses])
+    return {
+        "course_samples": (("course_sample",), samples),
+        "course_numbers": (("load", "number"), np.array(numbers, float)),
+    }
+
+
+def _courses(data: xarray.Dataset) -> tuple[Course, ...]:
+    if "course_numbers" not in data:
+        return ()
+    numbers = data["course_numbers"].values
+    ends = np.cumsum(numbers[:, 0]).astype(int)[:-1]
+    samples = np.split(data["course_samples"].values, ends)
+    return tuple(
+        Course(x, step, start, bool(held), frequency, phase)
+        for x, (_, step, start, held, frequency, phase) in zip(samples, numbers, strict=True)
+    )

@@ -57,7 +57,7 @@ def test_bounds_of_waves_are_reached_by_a_pulse_on_a_soft_spring(order: int) -> 
     time = model.time
     if order < 3:
         nodes = np.arange(len(time))
-        truth = model.load.response(np.repeat(rate, len(nodes), 0), nodes)[order][:, 0]
+        truth = model.loads[0].response(np.repeat(rate, len(nodes), 0), nodes)[order][:, 0]
         ratio = forced.waves[order][5:, 0] / np.abs(truth)[5:]
         assert (ratio >= 1).all()
         assert (ratio <= 1.8).all()

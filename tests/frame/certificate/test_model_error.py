@@ -155,8 +155,8 @@ def test_a_model_that_is_wrong_is_proved_to_be_no_better(wrong) -> None:
     system = SHAKEN if wrong == "load" else FRAME
     good = model(system, {"E": Interval(24e9, 26e9), "m2": Interval(14e3, 16e3)}, 1e-7)
     if wrong == "load":
-        assert good.load is not None
-        bad = replace(good, load=replace(good.load, share=stretched(good.load.share)))
+        (load,) = good.loads
+        bad = replace(good, loads=(replace(load, share=stretched(load.share)),))
     else:
         bad = replace(good, **{wrong: stretched(getattr(good, wrong))})
     unit = np.array([[-1.0, 0.3], [1.0, -0.2], [0.9, 1.0]])
@@ -233,7 +233,7 @@ def test_waves_and_their_derivatives_stay_below_their_bounds() -> None:
     unit = np.random.default_rng(6).uniform(-1, 1, (40, 2))
     rate = found.eigenvalue(unit)
     nodes = np.arange(len(found.time))
-    waves = found.load.response(np.repeat(rate, len(nodes), 0), np.tile(nodes, len(rate)))
+    waves = found.loads[0].response(np.repeat(rate, len(nodes), 0), np.tile(nodes, len(rate)))
     for order, wave in enumerate(waves):
         size = np.abs(wave).reshape(len(rate), len(nodes), -1).max(0)
         assert (size <= forced.waves[order] * (1 + 1e-9) + 1e-15).all()
@@ -259,18 +259,15 @@ def test_remainder_of_the_exponential_series_is_bounded(phase, order) -> None:
 
 def test_series_leave_out_of_the_load_response_no_more_than_they_say() -> None:
     found = model(SHAKEN, {"E": Interval(20e9, 30e9)})
-    assert found.load is not None
+    (load,) = found.loads
     unit = np.linspace(-1, 1, 21)[:, None]
     rate = found.eigenvalue(unit)
     (truth,), _ = responses_at_nodes(rate.ravel(), SHAKEN.ground, found.time, 0)
     truth = truth.reshape(len(found.time), *rate.shape)
-    assert found.load.truncation.max() > 0
-    bound = (
-        found.load.truncation
-        * parts(found, largest_growth(found.eigenvalue, np.ones(1)))[1].waves[0]
-    )
+    assert load.truncation.max() > 0
+    bound = load.truncation * parts(found, largest_growth(found.eigenvalue, np.ones(1)))[1].waves[0]
     for node in (20, 60, 100):
-        got = found.load.response(rate, np.full(len(unit), node))[0]
+        got = load.response(rate, np.full(len(unit), node))[0]
         assert (np.abs(got - truth[node]) <= bound[node] + 1e-13).all()
 
 

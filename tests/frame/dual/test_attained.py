@@ -7,7 +7,7 @@ import pytest
 from alphacut.frame import StoreyFrame, envelope
 from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.proof import DualProof
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 from alphacut.fuzzy import Crisp, Interval
 from tests.frame.response.test_duhamel import exact_response

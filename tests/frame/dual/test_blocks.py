@@ -12,7 +12,7 @@ from alphacut.frame.dual.clusters import centred, subspaces
 from alphacut.frame.dual.models import Models
 from alphacut.frame.dual.ranges import response_ranges
 from alphacut.frame.dual.waves import Oscillators, spanned
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 
 TIGHT = 0.5
 """Share of a bound that something reaches: half the bound would be passed."""
@@ -145,7 +145,7 @@ def crossing_pair(width):
 
 def test_what_couples_a_block_holds_and_half_would_not_do():
     time, (own, (structure, centre, radius)) = np.linspace(0, 4, 81), crossing_pair(0.2)
-    models = Models.of(structure, (None, time, sources(own, structure)))
+    models = Models.of(structure, ({}, time, sources(own, structure)))
     assert len(models.single) == 2
     reached = np.zeros(len(time))
     for u in draws(3, 30):
@@ -182,7 +182,7 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
 
     monkeypatch.setattr(rest, "_least", chosen)
     monkeypatch.setattr("alphacut.frame.dual.models.modes_wanted", lambda *_: (1, np.zeros(9)))
-    models = Models.of(structure, (RECORD, time, ("load",)), np.ones(1))
+    models = Models.of(structure, ({"load": RECORD}, time, ("load",)), np.ones(1))
     (others,) = models.rests
     assert len(models.single) == 1
     ratios = np.zeros(len(time))
@@ -191,7 +191,7 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         squared, shape = np.linalg.eigh(K)
         omega = np.sqrt(squared[1] * (1 - 0.03**2))
         point = spanned((omega, omega), (0.03 / np.sqrt(1 - 0.03**2),) * 2, (2, 2))
-        wave = Oscillators(point, RECORD, time).waves("load", 0).value[:, 0, 0]
+        wave = Oscillators(point, {"load": RECORD}, time).waves("load", 0).value[:, 0, 0]
         motion = shape[0, 1] * shape[:, 1].sum() * wave
         share, doubt = (x.at(u[None])[0, 0, 0] for x in (others.share, others.doubt))
         width = (doubt + others.doubt.rest[0, 0]) * others.half[0, 0]
@@ -205,11 +205,13 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
 @pytest.mark.parametrize("order", [0, 1, 2])
 def test_ranges_hold_all_responses_times_powers_of_frequency(order):
     time, ends, quotient = np.linspace(0, 3, 31), (8.0, 90.0), (0.02, 0.05)
-    found = response_ranges(ends, quotient, RECORD, time, ("load", "velocity"), [order])[order]
+    found = response_ranges(ends, quotient, {"load": RECORD}, time, ("load", "velocity"), [order])[
+        order
+    ]
     fine = spanned(ends, quotient, (400, 4))
     squared = np.abs(fine.sigma) ** 2
     for s, source in enumerate(("load", "velocity")):
-        value = Oscillators(fine, RECORD, time).waves(source, order).value
+        value = Oscillators(fine, {"load": RECORD}, time).waves(source, order).value
         for k, power in enumerate((0.0, 0.5, 1.0)):
             scaled = (value * squared**power).reshape(len(time), -1)
             assert (scaled.max(1) <= found.high[k, s] + 1e-9).all()

@@ -16,7 +16,7 @@ from alphacut.frame.dual.dual_function import deflected, require_in_range
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Crisp, Triangular
 from tests.frame.dual.test_dual_proof import CASES, level_of
 

@@ -8,7 +8,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Interval
 
 DURATION, STEP = 5.0, 0.05

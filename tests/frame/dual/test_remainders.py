@@ -16,7 +16,7 @@ from alphacut.frame.dual.clusters import centred, subspaces
 from alphacut.frame.dual.level import Level, Problem
 from alphacut.frame.dual.structure import classical
 from alphacut.frame.dual.waves import Grid, Oscillators
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.structures.matrix import MatrixStructure
 
 TIGHT = 0.5
@@ -228,7 +228,7 @@ def test_modes_that_cross_are_one_block_and_go_on_through_the_crossing():
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
     both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
-    level = Level.of(replace(springs, start=both), None, time, ("velocity",))
+    level = Level.of(replace(springs, start=both), {}, time, ("velocity",))
     outer, _ = level.bounds(np.full(1, 1e-6), 40, 100, 1)
     omega = np.sqrt(np.array([1.0, 1, 3])[:, None] * np.linspace(0.969, 1.031, 201))
     fine = np.arange(len(time) * parts - parts + 1) * 0.25 / parts
@@ -247,9 +247,7 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
 def test_half_of_the_cubic_part_would_not_do():
     own, names, centre, radius, _ = frame(1, 0.1)
     structure = along(own, names, centre, radius, 1)
-    data = Problem.of(
-        Level.of(structure, None, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0
-    ).data
+    data = Problem.of(Level.of(structure, {}, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0).data
     whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
     bound = dual_function.dual(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
     bound += dual_function.cancelled(mu, data)
@@ -268,8 +266,8 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
     fine = Grid(np.linspace(9, 11, 81), np.linspace(0.02, 0.05, 81))
     for omega, quotient in ((16, 80), (80, 8), (16, 8)):
         coarse = Grid(fine.omega[:: 80 // omega], fine.quotient[:: 80 // quotient])
-        table = Oscillators(coarse, RECORD, time).waves(source, order)
-        exact = Oscillators(fine, RECORD, time).waves(source, order).value
+        table = Oscillators(coarse, {"load": RECORD}, time).waves(source, order)
+        exact = Oscillators(fine, {"load": RECORD}, time).waves(source, order).value
         at = table.value
         for axis, (own, grid) in enumerate(
             ((fine.quotient, coarse.quotient), (fine.omega, coarse.omega)), 1
@@ -285,7 +283,7 @@ def test_tables_miss_what_they_state_and_no_less_than_half(source, order):
 def test_what_second_derivatives_do_within_a_cell_is_in_the_error():
     """G″ = (σ − σ₁)(σ − σ₂) is zero at both ends of a cell, and G strays by 5 h⁴/384 within."""
     grid, h = Grid(np.array([10.0, 11.0]), np.zeros(1)), 1.0
-    oscillators = Oscillators(grid, None, np.zeros(1))
+    oscillators = Oscillators(grid, {}, np.zeros(1))
     zero, fourth = np.zeros((3, 1)), np.array([[0.0], [0.0], [0.0], [0.0], [2.0]])
     error, _ = oscillators._error(zero, fourth, 0, start=True)
     exact = 5 * h**4 / 384
@@ -301,8 +299,8 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
         coarse = step * (np.arange(120) + 0.5)
         time = coarse[0] + step / parts * np.arange(119 * parts + 1)
         for order in (0, 1, 2):
-            wide = Oscillators(grid, ground, coarse).waves(source, order)
-            fine = Oscillators(grid, ground, time).waves(source, order).value
+            wide = Oscillators(grid, {"load": ground}, coarse).waves(source, order)
+            fine = Oscillators(grid, {"load": ground}, time).waves(source, order).value
             assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
             line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)

@@ -49,7 +49,11 @@ def test_stability_limit_is_sharp(method: Integrator) -> None:
 
     def radius(step: float) -> float:
         return float(
-            np.abs(np.linalg.eigvals(method.step_map(matrices, step).transfer.value[0])).max()
+            np.abs(
+                np.linalg.eigvals(
+                    method.step_map(matrices, step, matrices.pushes(ground=False)).transfer.value[0]
+                )
+            ).max()
         )
 
     if np.isinf(method.stability_limit):
@@ -67,7 +71,10 @@ def test_exact_propagator_equals_the_matrix_exponential() -> None:
             [[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]]
         )
         assert (
-            np.abs(Exact().step_map(matrices, step).transfer.value[0] - expm(flow * step)).max()
+            np.abs(
+                Exact().step_map(matrices, step, matrices.pushes(ground=False)).transfer.value[0]
+                - expm(flow * step)
+            ).max()
             < 1e-12
         )
 

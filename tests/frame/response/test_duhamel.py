@@ -20,7 +20,7 @@ from alphacut.frame.response.step_integrals import (
     error_of_integrals,
     step_integrals,
 )
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 
 IDLE = 0.01
 """Share of a bound of rounding that the largest of some errors reaches at least."""

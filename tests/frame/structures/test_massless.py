@@ -7,7 +7,7 @@ from alphacut.frame import DualProof, MatrixStructure, Proof, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.refused import RefusedError
 

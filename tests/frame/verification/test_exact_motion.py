@@ -11,6 +11,8 @@ from scipy.linalg import expm
 from alphacut.frame.verification import exact_motion
 from alphacut.frame.verification.exact_motion import LinearMotion
 
+UNFORCED = np.zeros((0, 0)), np.zeros((0, 0))
+
 
 def chain(rng, n, *, stiff=1.0):
     """A chain of masses with damping of no special form, and a generator of its state."""
@@ -50,7 +52,7 @@ def test_equals_exponentials_from_each_sample_and_node_to_the_next(n, step, node
     arrays, A = chain(rng, n, stiff=stiff)
     times = np.arange(30) * node
     record = rng.normal(size=max(3, int(0.7 * times[-1] / step)))  # ends with a jump
-    values, rounding = LinearMotion(*arrays, record, step).outputs(times)
+    values, rounding = LinearMotion(*arrays, record, step, *UNFORCED).outputs(times)
     reference = by_intervals(A, arrays[3], arrays[4], record, step, times)
     assert (np.abs(values - reference) <= 2 * rounding).all()  # each has its own
     assert (rounding <= 1e-8 * np.abs(reference).max(0)).all()
@@ -60,7 +62,7 @@ def test_round_off_that_is_stated_holds_against_mpmath():
     rng = np.random.default_rng(4)
     arrays, A = chain(rng, 2, stiff=1e4)
     times, record = np.arange(6) * 0.5, rng.normal(size=4)
-    values, rounding = LinearMotion(*arrays, record, 0.37).outputs(times)
+    values, rounding = LinearMotion(*arrays, record, 0.37, *UNFORCED).outputs(times)
     mpmath.mp.dps = 40
 
     def exponential(matrix):
@@ -76,7 +78,7 @@ def test_round_off_that_is_stated_holds_against_mpmath():
 def test_free_motion_without_a_record_and_without_stiffness():
     still = LinearMotion(
         *(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.eye(2), np.array([1.0, 2.0])),
-        *(np.ones(1), np.zeros(0), 0.0),
+        *(np.ones(1), np.zeros(0), 0.0, *UNFORCED),
     )
     values, _ = still.outputs(np.array([0.0, 0.3, 2.0]))
     assert values == pytest.approx(np.array([[1, 2], [1.6, 2], [5, 2]]))
@@ -89,5 +91,5 @@ def test_shares_no_code_with_what_it_judges():
         x.name for node in ast.walk(tree) if isinstance(node, ast.Import) for x in node.names
     }
     assert {str(module).partition(".")[0] for module in modules} <= {
-        *("__future__", "dataclasses", "math", "numpy", "scipy")
+        *("__future__", "dataclasses", "math", "numpy", "scipy", "typing")
     }

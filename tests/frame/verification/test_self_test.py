@@ -14,7 +14,7 @@ from alphacut.frame.dual import level
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.envelope import Ends
 from alphacut.frame.methods.proof import Proof
-from alphacut.frame.structures.linear import Accelerogram
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.frame.verification.self_test import ContradictionError, Trial, cuts_of
 from alphacut.fuzzy import Crisp, Triangular
 from alphacut.fuzzy.refused import FailedError

@@ -1,0 +1,202 @@
+"""Courses of loads over time: a record of the ground's acceleration, and forces on a structure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.refused import RefusedError, real, require
+
+Factor = Callable[[Mapping[str, Any]], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """f(t) = g(t) sin(Ω (t − start) + phase), or g(t) alone where Ω is 0.
+
+    g is linear between its samples and zero outside them, so that it may jump where it begins or
+    ends. At a jump f is the value after it.
+
+    Args:
+        step: Time between samples, in s; it need not go into the step of the nodes.
+        samples: Samples of g from `start` on, at least two, shape (n,).
+        start: Time of the first sample, in s.
+        is_held: Whether the last sample stays on for ever.
+        is_static: Whether f(0) has acted for ever: the structure starts at rest under it.
+        frequency: Ω, in rad/s.
+        phase: In rad.
+
+    Raises:
+        RefusedError: The step is not positive, or there are not two samples, or one is not finite,
+            or the start lies before t = 0.
+
+    Example:
+        >>> wind = History(0.5, [1.0, 1.2, 0.7], is_held=True)
+        >>> wind.values([0.25, 3.0]).tolist()
+        [1.1, 0.7]
+    """
+
+    step: float
+    samples: Array = field(repr=False)
+    start: float = 0.0
+    is_held: bool = False
+    is_static: bool = False
+    frequency: float = 0.0
+    phase: float = 0.0
+    key: ClassVar[str] = "history"
+
+    def __post_init__(self) -> None:
+        allowed = "two or more finite samples, a positive step"
+        try:
+            samples, step = np.asarray(self.samples, float), float(self.step)
+        except (TypeError, ValueError):
+            what = f"{self.samples!r} every {self.step!r} s"
+            raise RefusedError(self.key, what, allowed) from None
+        is_series = samples.ndim == 1 and samples.size > 1 and bool(np.isfinite(samples).all())
+        what = f"{samples.size} samples every {step:g} s"
+        require(is_series and 0 < step < np.inf, self.key, value=what, allowed=allowed)
+        for name in ("start", "frequency"):
+            real(name, getattr(self, name), least=0)
+        real("phase", self.phase)
+        object.__setattr__(self, "step", step)
+        object.__setattr__(self, "samples", samples)
+
+    @classmethod
+    def constant(cls, start: float = 0.0, *, is_static: bool = False) -> Self:
+        """1 from a time on."""
+        return cls(1.0, np.ones(2), start, is_held=True, is_static=is_static)
+
+    @classmethod
+    def harmonic(cls, hertz: float, phase: float = 0.0, start: float = 0.0) -> Self:
+        """A sine of unit amplitude from a time on; frequency in Hz, phase in rad.
+
+        Raises:
+            RefusedError: The frequency is not positive.
+        """
+        real("frequency", hertz, positive=True)
+        frequency = 2 * np.pi * float(hertz)
+        return cls(1.0, np.ones(2), start, is_held=True, frequency=frequency, phase=phase)
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What tells it from other histories."""
+        flags = self.is_held, self.is_static
+        return (self.step, self.samples.tobytes(), self.start, self.frequency, self.phase, *flags)
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample, in s; infinite where it is held."""
+        return np.inf if self.is_held else self.start + (len(self.samples) - 1) * self.step
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Bounds of |f| and of |f′| between jumps."""
+        size = float(np.abs(self.samples).max())
+        slope = float(np.abs(np.diff(self.samples)).max()) / self.step
+        return size, slope + self.frequency * size
+
+    @property
+    def jumps(self) -> list[tuple[float, float]]:
+        """Times after 0 at which it may jump, in s, and bounds of the jumps."""
+        begin = [(self.start, abs(float(self.samples[0])))] if self.start > 0 else []
+        return begin + [(self.end, abs(float(self.samples[-1])))] * (not self.is_held)
+
+    def values(self, time: Array) -> Array:
+        """F at times, the same shape."""
+        return self.envelope(np.asarray(time, float)) * self.wave(np.asarray(time, float))
+
+    def wave(self, time: Array) -> Array:
+        """The sine that g is multiplied by; ones where there is none."""
+        if not self.frequency:
+            return np.ones_like(time)
+        return np.asarray(np.sin(self.frequency * (time - self.start) + self.phase))
+
+    def envelope(self, time: Array, side: float = 1.0) -> Array:
+        """G at times, after jumps (`side` 1) or before them (−1)."""
+        n, place = len(self.samples), (time - self.start) / self.step
+        place = np.where(np.abs(place - np.round(place)) < 1e-9, np.round(place), place)
+        inside: Array = np.interp(place, np.arange(n), self.samples)
+        begun, ended = (place >= 0, place >= n - 1) if side > 0 else (place > 0, place > n - 1)
+        return np.asarray(np.where(begun & ~(ended & ~np.array(self.is_held)), inside, 0.0))
+
+    def stray(self, time: Array) -> Array:
+        """Bound of how far f strays from straight lines in the step to each node (T,)."""
+        h, values = np.diff(time, prepend=time[0]), self.values(time)
+        if self.frequency:
+            bound = np.minimum((self.frequency * h) ** 2 / 8, 2.0) * self.extremes[0]
+            for at, size in self.jumps:
+                bound[(time - h < at) & (at <= time)] += 2 * size
+            return np.asarray(bound)
+        breaks = self.start + np.arange(len(self.samples)) * self.step
+        breaks = breaks[(breaks > time[0]) & (breaks <= time[-1] * (1 + 1e-12))]
+        node = np.minimum(np.searchsorted(time * (1 + 1e-12), breaks), len(time) - 1)
+        line = np.interp(breaks, time, values)
+        bound = np.zeros(len(time))
+        for side in (-1.0, 1.0):
+            off = np.abs(self.envelope(breaks, side) - line)
+            on_node = np.abs(breaks - time[node]) < 1e-9 * self.step
+            np.maximum.at(bound, node, np.where(on_node & (side > 0), 0.0, off))
+        return np.where(bound > 1e-12 * self.extremes[0], bound, 0.0)
+
+
+class Accelerogram(History):
+    """Acceleration of the ground in m/s², linear between its samples and zero outside them.
+
+    Example:
+        >>> import numpy as np
+        >>> ground = Accelerogram(0.01, np.array([0.0, 1.5, 0.0]))
+        >>> float(ground.acceleration.max())
+        1.5
+    """
+
+    key: ClassVar[str] = "accelerogram"
+
+    @property
+    def acceleration(self) -> Array:
+        """Samples from t = 0 on, shape (n,), in m/s²."""
+        return self.samples
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """A force amplitude · f(t) on a structure.
+
+    Args:
+        at: Floor of a storey frame, from 1; or of a structure from matrices a row over its
+            unknowns, shape (n,).
+        amplitude: In N, of a storey frame the modal value of its parameter "F" and the floor; of a
+            structure from matrices a number, the name of a parameter or a function of them.
+        history: f; None for an impulse at t = 0, whose amplitude is in N s ("J" and the floor).
+
+    Example:
+        >>> from alphacut.frame import StoreyFrame
+        >>> fan = Force(3, 800.0, History.harmonic(1.5))
+        >>> StoreyFrame([1e3] * 3, stiffness=[1e6] * 3, loads=[fan]).force_names
+        ('F3',)
+    """
+
+    at: int | Array
+    amplitude: Factor | str | float
+    history: History | None
+
+
+def different(forces: tuple[Force, ...]) -> tuple[History, ...]:
+    """Histories of forces, each once."""
+    found = {force.history.identity: force.history for force in forces if force.history}
+    return tuple(found.values())
+
+
+def require_forces(forces: object) -> None:
+    """Refuses loads that are no forces.
+
+    Raises:
+        RefusedError: One is none.
+    """
+    are_forces = isinstance(forces, tuple) and all(isinstance(x, Force) for x in forces)
+    fits = are_forces and all(isinstance(x.history, History | None) for x in forces)  # type: ignore[attr-defined]
+    allowed = "a sequence of Force, each with a History or None"
+    require(fits, "loads", value=type(forces).__name__, allowed=allowed)

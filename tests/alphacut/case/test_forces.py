@@ -1,0 +1,87 @@
+"""Forces of a case: amplitudes by name, courses of files, and one line on what is wrong."""
+
+import numpy as np
+import pytest
+
+from alphacut.case.load import load
+from alphacut.io.problem import BadInput
+from tests.alphacut.small import written
+
+WIND = "time [s],force [kN]\n0,2\n0.5,-4\n1,3\n"
+FRAME = """
+title = "Two floors in the wind"
+stages = ["envelope"]
+[frame]
+masses = ["10 t", "8 t"]
+stiffness = "9 MN/m"
+damping_ratio = "2 %"
+[[force]]
+history = "wind.csv, static"
+amplitude = { 1 = "1", 2 = "1 ± 10 %" }
+[[force]]
+history = "harmonic, 2 Hz, 90 deg, from 0.3 s"
+amplitude = { 2 = "[1, 2, 3] kN" }
+[[force]]
+history = "impulse"
+amplitude = { 1 = "0.4 kN s" }
+[envelope]
+fuzzy = ["F", "F2_2"]
+alpha = [0, 1]
+duration = "1 s"
+step = "0.02 s"
+"""
+
+
+def content(folder, **changes):
+    (folder / "wind.csv").write_text(WIND, encoding="utf-8")
+    return load(written(folder, FRAME, **changes)).content
+
+
+def test_amplitudes_are_parameters_and_courses_have_their_files_samples(tmp_path):
+    structure = content(tmp_path).structure
+    assert structure.inputs(("F",)).keys() == {"F2", "F2_2"}
+    numbers = {name: structure.numbers[name].support for name in structure.model.force_names}
+    assert numbers == {"F1": (4e3, 4e3), "F2": (3.6e3, 4.4e3), "F2_2": (1e3, 3e3), "J1": (4e2, 4e2)}
+    wind, _, machine, hammer = structure.model.loads
+    np.testing.assert_allclose(wind.history.values([0.0, 0.25, 1.0, 9.0]), [0.5, -0.25, 0.0, 0.0])
+    assert wind.history.is_static
+    assert machine.history.values([0.29, 0.3]) == pytest.approx([0.0, 1.0])
+    assert hammer.history is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('{ 2 = "[1, 2, 3] kN" }', '{ 3 = "1 kN" }', "force.amplitude is 3"),
+        ('"impulse"', '"drum"', "a file, from the folder"),
+        ('"impulse"', '"impulse, from 1 s"', "force[2].history is impulse, from 1 s"),
+        ('"0.4 kN s"', '"0.4 kN"', "force.amplitude.1 is N"),
+        (", 2 Hz, 90 deg", "", "force[1].history is harmonic"),
+        ("2 Hz", "2 m", "2 m"),
+        ("from 0.3 s", "static", "force[1].history"),
+        ("from 0.3 s", "from -1 s", "force[1]"),
+        ('"wind.csv, static"', '"case.toml"', "case.toml, line"),
+        ('"1 ± 10 %"', '"3 lb"', "3 lb; allowed: a force"),
+        ('{ 1 = "0.4 kN s" }', "{}", "one floor or more"),
+    ],
+)
+def test_what_is_wrong_with_a_force_is_said_in_one_line(tmp_path, old, new, words):
+    with pytest.raises(BadInput) as caught:
+        content(tmp_path, **{old: new})
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value).strip()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time [s],force [bar]\n0,1\n1,2\n", "line 1"),
+        ("time [s],force\n0,1\n1,x\n", "line 3"),
+        ("time [s],force\n0,0\n1,0\n", "zeros throughout"),
+        ("time [s],force\n0,1\n1,2\n1.5,2\n", "even steps"),
+    ],
+)
+def test_files_that_hold_no_force_are_refused_by_their_line(tmp_path, text, words):
+    (tmp_path / "wind.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput, match=words):
+        load(written(tmp_path, FRAME))

@@ -1,0 +1,283 @@
+"""Forces on floors: exact motions against SciPy's solver, and bounds that no motion leaves."""
+
+import itertools
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from alphacut.frame import (
+    Accelerogram,
+    DualProof,
+    Exact,
+    Force,
+    History,
+    LinearFlow,
+    MatrixStructure,
+    Midpoint,
+    Proof,
+    StoreyFrame,
+    envelope,
+)
+from alphacut.frame.boxes import boxes
+from alphacut.frame.calculus.unproved import UnprovedError
+from alphacut.frame.certificate.model_error import proved_error
+from alphacut.frame.modal.fitting import fit_modes
+from alphacut.frame.modal.ground_response import Direct
+from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.verification.self_test import structures_at
+from alphacut.frame.verification.stored import stored_motions, variables
+from alphacut.fuzzy import Interval, Triangular
+from alphacut.fuzzy.refused import FailedError, RefusedError
+
+GUST = History(0.3, np.array([1.0, 1.6, 0.4, 1.1, 0.9, 1.5, 0.7]), is_static=True)
+ALL = (
+    Force(3, 5e3, GUST),
+    Force(2, 3e3, GUST),
+    Force(1, 2e3, History.harmonic(1.3, 0.4, start=0.35)),
+    Force(2, 3e2, None),
+    Force(3, 1e3, History.constant(1.07)),
+)
+OUTPUTS = ("q3", "drift2", "v1", "a3", "a1", "shear1")
+RECORD = Accelerogram(0.13, np.array([0.5, -1.0, 0.7, 0.2, -0.4]))
+FRAME = StoreyFrame(
+    [2e3, 1.5e3, 1e3],
+    [3, 3, 3],
+    30e9,
+    2e-6,
+    damping_ratio=0.03,
+    outputs=OUTPUTS,
+    ground=RECORD,
+    loads=ALL,
+)
+
+
+def course(force, t):
+    """f(t) at the modal amplitude, written from the definition."""
+    h = force.history
+    if h is None or t < h.start:
+        return 0.0
+    if h.frequency:
+        return force.amplitude * np.sin(h.frequency * (t - h.start) + h.phase)
+    place = (t - h.start) / h.step
+    if place >= len(h.samples) - 1:
+        return force.amplitude * h.samples[-1] * h.is_held
+    return force.amplitude * np.interp(place, np.arange(len(h.samples)), h.samples)
+
+
+def by_solver(frame, times):
+    """Outputs of a frame by an adaptive Runge–Kutta method, piece by piece between jumps."""
+    m, rows = evaluate(frame, (), np.zeros((1, 0)), derivatives=False)
+    M, D, K, C, n = *(x.value[0] for x in (m.mass, m.damping, m.stiffness)), rows.value[0], 3
+    q0, v0 = m.q0.value[0, :, 0], m.v0.value[0, :, 0]
+    for force in frame.loads:
+        unit = np.eye(n)[force.at - 1]
+        if force.history is None:
+            v0 = v0 + np.linalg.solve(M, force.amplitude * unit)
+        elif force.history.is_static:
+            q0 = q0 + np.linalg.solve(K, course(force, 0.0) * unit)
+
+    def push(t):
+        total = np.zeros(n)
+        for force in frame.loads:
+            total[force.at - 1] += course(force, t)
+        return total
+
+    def rate(t, state, before):
+        t = min(t, before)
+        ground = np.interp(t, np.arange(5) * 0.13, frame.ground.samples, right=0.0)
+        force = push(t) - K @ state[:n] - D @ state[n:]
+        return np.append(state[n:], np.linalg.solve(M, force) - ground)
+
+    ends = {0.13 * 4, 0.35, 1.07, *(np.arange(7) * 0.3)}
+    cuts = sorted({0.0, float(times[-1]), *(float(x) for x in ends if 0 < x < times[-1] - 1e-9)})
+    out, state = np.zeros((len(times), len(C))), np.append(q0, v0)
+    for low, high in itertools.pairwise(cuts):
+        inside = (times >= low - 1e-12) & (times < high - 1e-12) | (times == high) * (
+            high == cuts[-1]
+        )
+        seen = np.clip(times[inside], low, high)
+        found = solve_ivp(
+            *(rate, (low, high), state, "DOP853"),
+            args=(high - 1e-13,),
+            dense_output=True,
+            rtol=1e-12,
+            atol=1e-13,
+            max_step=0.01,
+        )
+        out[inside] = found.sol(seen).T @ C.T
+        for o, name in enumerate(frame.outputs):
+            if name[0] == "a":
+                z = int(name[1:]) - 1
+                out[inside, o] += [push(t)[z] / M[z, z] for t in times[inside]]
+        state = found.y[:, -1]
+    return out
+
+
+TIMES = np.arange(151) * 0.02
+
+
+@pytest.fixture(scope="module")
+def reference():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return by_solver(FRAME, TIMES)
+
+
+def test_exact_steps_and_exact_motions_equal_a_solver(reference):
+    flow = LinearFlow(FRAME, ("m1",), 3.0, 0.02, Exact())
+    values = flow.values(np.array([[2e3]]))[0]
+    size = np.abs(reference).max(0)
+    assert (np.abs(values - reference) <= 1e-8 * size).all()
+    envelope_like = type("Named", (), {"inputs": {"m1": Interval(1.9e3, 2.1e3)}})
+    (motion,) = structures_at(FRAME, envelope_like, np.array([[2e3]]))
+    judged, rounding = motion.outputs(TIMES)
+    assert (np.abs(judged - reference) <= 1e-8 * size).all()
+    assert (rounding <= 1e-9 * size).all()
+
+
+def test_midpoint_converges_with_order_two(reference):
+    errors = []
+    for parts in (4, 8):
+        flow = LinearFlow(FRAME, ("m1",), 3.0, 0.02 / parts, Midpoint())
+        errors.append(np.abs(flow.values(np.array([[2e3]]))[0, ::parts] - reference).max(0))
+    assert (errors[1][:4] < 0.3 * errors[0][:4]).all()
+
+
+def random_frame(rng):
+    """A frame of up to four floors with fuzzy masses, forces of all kinds, some with a record."""
+    n = int(rng.integers(1, 5))
+    kinds = [
+        History(rng.uniform(0.1, 0.5), rng.normal(1, 0.5, 9), is_static=bool(rng.integers(2))),
+        History.harmonic(rng.uniform(0.3, 4), rng.uniform(0, 6), rng.choice([0.0, 0.31])),
+        History.constant(rng.uniform(0, 1)),
+        None,
+    ]
+    loads = [
+        Force(
+            int(rng.integers(1, n + 1)), rng.uniform(1e3, 5e3) * (0.1 if kind is None else 1), kind
+        )
+        for kind in kinds
+        if rng.random() < 0.6
+    ]
+    loads = loads or [Force(n, 2e3, kinds[1])]
+    frame = StoreyFrame(
+        rng.uniform(1e3, 4e3, n),
+        np.full(n, 3.0),
+        30e9,
+        10 ** rng.uniform(-6, -4.5),
+        damping_ratio=rng.uniform(0.01, 0.08),
+        outputs=(f"q{n}", "drift1", f"a{n}"),
+        ground=Accelerogram(0.05, rng.normal(size=30)) if rng.random() < 0.4 else None,
+        loads=loads,
+    )
+    inputs = {f"m{z}": Triangular(0.95 * m, m, 1.05 * m) for z, m in enumerate(frame.masses, 1)}
+    name = frame.force_names[0]
+    amplitude = frame.parameters[name]
+    return frame, inputs | {name: Triangular(0.9 * amplitude, amplitude, 1.1 * amplitude)}
+
+
+SEED = int(np.random.default_rng().integers(2**31))
+
+
+@pytest.mark.parametrize("number", range(10))
+def test_no_motion_of_a_random_frame_leaves_a_bound(number):
+    """The envelope judges itself by exact motions, and raises where one contradicts it."""
+    print(f"seed {SEED} {number}")
+    frame, inputs = random_frame(np.random.default_rng([SEED, number]))
+    for method in (DualProof(slabs=4, peaks=0.05), Proof(tolerance=2e-2)):
+        try:
+            found = envelope(frame, inputs, method=method, duration=2.0, step=0.02, alpha=[0, 1])
+        except UnprovedError as refusal:
+            print(refusal)
+            continue
+        assert found.facts["motions_tested"] > 0
+
+
+@pytest.mark.parametrize("wrong", ["feed", "static"])
+def test_a_faulty_force_raises(wrong, monkeypatch):
+    if wrong == "feed":
+        monkeypatch.setattr(History, "values", lambda self, time: 0.99 * np.ones_like(time))
+    else:
+        monkeypatch.setattr("alphacut.frame.dual.structure.solve", lambda a, b: b * 0.0)
+    frame = replace(FRAME, ground=None, loads=ALL[:3])
+    inputs = {"m1": Triangular(1.9e3, 2e3, 2.1e3), "F3": Triangular(4.7e3, 5e3, 5.3e3)}
+    with pytest.raises(FailedError, match="the proof is wrong"):
+        envelope(frame, inputs, method=DualProof(), duration=2.0, step=0.02, alpha=[0, 1])
+
+
+def test_a_wrong_share_at_once_is_proved_to_be_no_better():
+    inputs = {"m1": Interval(1.9e3, 2.1e3), "F1": Interval(1.9e3, 2.1e3)}
+    frame = replace(FRAME, damping_ratio=None, rayleigh=(0.3, 1e-4))
+    flow, cuts = LinearFlow(frame, tuple(inputs), 2.0, 0.02, Exact()), boxes(inputs, (0,))
+    good = fit_modes(flow, cuts, tolerance=1e-6)
+    assert proved_error(good)[:, 3:5].max() < 1e-4
+    loads = [
+        replace(x, share=replace(x.share, coefficients=1.01 * x.share.coefficients))
+        if isinstance(x, Direct)
+        else x
+        for x in good.loads
+    ]
+    bad, unit = replace(good, loads=tuple(loads)), np.array([[1.0, -1.0], [0.3, 0.9]])
+    missed = np.abs(bad.values(unit) - flow.values(cuts.to_physical(unit))).max(0)
+    assert missed.max() > 1e-3
+    assert (missed <= proved_error(bad) + 1e-12).all()
+
+
+def test_a_chain_from_matrices_moves_as_the_frame_does():
+    plain = replace(FRAME, ground=None, outputs=("q3", "drift2", "v1"), loads=ALL)
+    m, rows = evaluate(plain, (), np.zeros((1, 0)), derivatives=False)
+    loads = [
+        Force(np.eye(3)[x.at - 1], "F" if k == 0 else x.amplitude, x.history)
+        for k, x in enumerate(ALL)
+    ]
+    same = MatrixStructure(
+        {"F": 5e3},
+        [(1.0, m.mass.value[0])],
+        [(1.0, m.stiffness.value[0])],
+        dict(zip(plain.outputs, rows.value[0], strict=True)),
+        ratios=[0.03],
+        loads=loads,
+    )
+    settings = {"method": DualProof(), "duration": 1.5, "step": 0.02, "alpha": [0, 1]}
+    one = envelope(plain, {"F3": Interval(4.7e3, 5.3e3)}, **settings)
+    other = envelope(same, {"F": Interval(4.7e3, 5.3e3)}, **settings)
+    np.testing.assert_allclose(
+        one.upper, other.upper, rtol=1e-6, atol=1e-6 * np.abs(one.upper).max()
+    )
+
+
+def test_stored_motions_come_back():
+    envelope_like = type("Named", (), {"inputs": {"m1": Interval(1.9e3, 2.1e3)}})
+    points = np.array([[1.95e3], [2.05e3]])
+    motions = structures_at(FRAME, envelope_like, points)
+    xarray = pytest.importorskip("xarray")
+    back = stored_motions(xarray.Dataset(variables(points, motions)))[1]
+    for one, other in zip(motions, back, strict=True):
+        np.testing.assert_array_equal(one.outputs(TIMES)[0], other.outputs(TIMES)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"loads": [Force(4, 1.0, None)]}, "floor is 4"),
+        ({"loads": [Force(1, np.nan, None)]}, "amplitude"),
+        ({"loads": [GUST]}, "loads is tuple"),
+    ],
+)
+def test_forces_that_are_none_are_refused(change, words):
+    with pytest.raises(RefusedError, match=words):
+        replace(FRAME, **change)
+
+
+def test_histories_that_are_none_are_refused():
+    for wrong in (
+        lambda: History(0.0, np.ones(3)),
+        lambda: History(0.1, np.ones(1)),
+        lambda: History.harmonic(-1.0),
+        lambda: History.constant(-1.0),
+    ):
+        with pytest.raises(RefusedError):
+            wrong()
