@@ -6,13 +6,54 @@ half-way between levels, the planar vertices (a serendipity wedge has no midpoin
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.mesh.triangulation import Ring, Triangulation
 from alphacut.stochastic import RadiusMap, ThetaLaw
+
+
+@dataclass(frozen=True)
+class FixedCell:
+    """The law of θ where no radius follows from it."""
+
+    distribution: ThetaLaw
+
+    def __call__(self, theta: ArrayLike) -> Array:
+        """No radius."""
+        return np.full(np.shape(np.asarray(theta)), np.nan)
+
+
+LevelFunction = Callable[[Array, Array, Array], Array]
+"""Takes x1, x2 and θ of one shape, gives z of it; z < 0 in the particles."""
+
+
+@dataclass(frozen=True)
+class LevelSet(FixedCell):
+    """Particles of any shape on a mesh that ignores them, with the law of θ.
+
+    Args:
+        z: Negative in the particles.
+    """
+
+    z: LevelFunction
+
+    def is_inside(self, points: Array) -> Mask:
+        """Whether points (…, 3) lie in a particle, shape (…).
+
+        Raises:
+            RefusedError: The function does not give a number at each point.
+        """
+        values = np.asarray(self.z(*np.moveaxis(points, -1, 0)), float)
+        if values.shape != points.shape[:-1] or np.isnan(values).any():
+            value = "NaN" if values.shape == points.shape[:-1] else f"of shape {values.shape}"
+            raise RefusedError("level set", value, f"numbers of shape {points.shape[:-1]}")
+        return np.asarray(values < 0)
 
 
 def moved(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
@@ -128,6 +169,8 @@ class PrismGrid:
 
     def sign(self, points: Array, radius: RadiusMap) -> Array:
         """1 where z < 0 in eq. 14, at points (…, 3), else 0; shape (…)."""
+        if isinstance(radius, LevelSet):
+            return radius.is_inside(points).astype(float)
         x, y, theta = np.moveaxis(points, -1, 0)
         outline = radius(theta) * self.plane.outline(np.arctan2(y, x))
         return np.asarray(np.hypot(x, y) < outline, float)

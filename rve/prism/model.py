@@ -33,13 +33,19 @@ from alphacut.rve.certificate import ROUND_OFF, mean, require, stress_checks
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.grading import REFINEMENTS
+from alphacut.rve.mesh.prism_grid import LevelFunction
 from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
 from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.prism.error_estimate import judged
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
-from alphacut.rve.prism.own_mesh import NamedPhases, own_mesh_problem, require_own_mesh
+from alphacut.rve.prism.own_mesh import (
+    NamedPhases,
+    own_mesh_problem,
+    require_level_set,
+    require_own_mesh,
+)
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.settings import (
@@ -66,7 +72,7 @@ class PrismModel:
         mesh_size: Edge length of the triangles, in halves of the cell's side, in (0, 1].
         layers: Layers in θ, at least 1 (paper: 12).
         interface: "conforming", or "sign" for a mesh that ignores the interface (first order in h,
-            too stiff: for comparison).
+            too stiff: for comparison, or with `level_set`).
         petsc: PETSc options without their prefix `rve_`; they override the default solver's.
         parallel: Whether all MPI ranks work on one cell together; if not each works on its own.
         stiffness: Whether to solve a third load, for the whole planar stiffness.
@@ -76,6 +82,8 @@ class PrismModel:
             are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
         mesh: File of Gmsh with a mesh of one's own, which is solved as it is; see `solve`.
+        level_set: Function z(x1, x2, θ) that is negative in the particles, any number of them, for
+            interface "sign"; see `solve`.
 
     Raises:
         RefusedError: An option out of range or unknown.
@@ -99,6 +107,7 @@ class PrismModel:
     moduli: tuple[float, float] | None = None
     outline: Outline = circle
     mesh: Path | str = ""
+    level_set: LevelFunction | None = None
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
@@ -107,6 +116,9 @@ class PrismModel:
             raise RefusedError("the number of layers", self.layers, "1 or more")
         if self.interface not in INTERFACES:
             raise RefusedError("the interface", repr(self.interface), ", ".join(INTERFACES))
+        if self.level_set is not None and (self.mesh or self.interface != "sign"):
+            value = "beside a mesh" if self.mesh else f"beside interface {self.interface!r}"
+            raise RefusedError("level set", value, "interface 'sign' without a mesh")
 
     def solve(
         self,
@@ -118,8 +130,8 @@ class PrismModel:
         """One result for each of `inclusions`, in their order, on one mesh.
 
         On a mesh of one's own, `solve(law, {name: phase})` gives one result, of the law of θ and
-        the materials of its physical groups, in whose order its energies are. It declares no error:
-        a coarser mesh of one's own tells it.
+        the materials of its physical groups, in whose order its energies are. With a level set the
+        names are "matrix" and "inclusion". Neither declares an error: a coarser mesh tells it.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
@@ -129,7 +141,7 @@ class PrismModel:
             RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit, or law and
                 phases are not those of the mesh.
         """
-        if self.mesh:
+        if self.mesh or self.level_set is not None:
             return [self._solve_own_mesh(radius_map, matrix)]
         matrix = cast("Phase", matrix)
         radius_map = cast("RadiusMap", radius_map)
@@ -171,10 +183,7 @@ class PrismModel:
         whole = stress @ np.linalg.inv(loads).T
         curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
         checks = _checks(strains, stiffness, loads, named.phases) | {"residual": solved.residual}
-        energies = energies_of(strains, named.phases, loads)
-        order = [
-            problem.form.grid.names.index(name) for name in cast("Mapping[str, object]", phases)
-        ]
+        energies, order = energies_of(strains, named.phases, loads), [*named.order]
         return HomogenisedStiffness(
             curve,
             self.name,
@@ -193,8 +202,13 @@ class PrismModel:
             MeshError: The file holds no cell of prisms.
             RefusedError: Law or phases are not those of the mesh.
         """
-        problem = own_mesh_problem(self.mesh, self.parallel)
-        named = require_own_mesh(problem.form.grid, law, phases)
+        if self.level_set is None:
+            problem = own_mesh_problem(self.mesh, self.parallel)
+            named = require_own_mesh(problem.form.grid, law, phases)
+        else:
+            named = require_level_set(self.level_set, law, phases)
+            mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers, self.parallel)
+            problem = _problem(*mesh, 0.0)
         problem.move(named.law)
         return problem, named
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
 from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh.file import read_grid
-from alphacut.rve.mesh.prism_grid import PrismGrid
+from alphacut.rve.mesh.gmsh_prisms import NAMES
+from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.settings import require_compressible
 from alphacut.stochastic import ThetaLaw
@@ -26,27 +25,18 @@ SAME_LEVEL = 1e-6
 
 
 @dataclass(frozen=True)
-class FixedCell:
-    """The law of θ where no radius follows from it."""
-
-    distribution: ThetaLaw
-
-    def __call__(self, theta: ArrayLike) -> Array:
-        """No radius."""
-        return np.full(np.shape(np.asarray(theta)), np.nan)
-
-
-@dataclass(frozen=True)
 class NamedPhases:
     """Law and materials of a mesh.
 
     Args:
         law: Law of θ.
         phases: Materials in the order of the mesh.
+        order: Number in the mesh of each material in the order of the user.
     """
 
     law: FixedCell
     phases: tuple[AnyPhase, ...]
+    order: tuple[int, ...]
 
 
 def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
@@ -55,18 +45,44 @@ def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhase
     Raises:
         RefusedError: One does not fit.
     """
-    names = ", ".join(grid.names)
+    named = require_phases(grid.names, phases)
+    order = tuple(grid.names.index(name) for name in named)
+    return NamedPhases(require_law(grid, law), tuple(named[name] for name in grid.names), order)
+
+
+def require_level_set(z: LevelFunction, law: object, phases: object) -> NamedPhases:
+    """Refuse what is no law, and materials that are not those of matrix and particles.
+
+    Raises:
+        RefusedError: One does not fit.
+    """
+    names = NAMES[:2]
+    if not hasattr(law, "pdf"):
+        raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
+    named = require_phases(names, phases)
+    order = tuple(names.index(name) for name in named)
+    of_mesh = tuple(named[name] for name in names)
+    return NamedPhases(LevelSet(cast("ThetaLaw", law), z), of_mesh, order)
+
+
+def require_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhase]:
+    """Refuse materials that are not those of the phases of a mesh.
+
+    Raises:
+        RefusedError: One is missing or has another name.
+    """
+    listed = ", ".join(names)
     if not isinstance(phases, Mapping):
         value = type(phases).__name__
-        raise RefusedError("phases of the mesh", value, f"{{name: phase}} for the groups {names}")
-    for name in (*phases, *grid.names):
-        if name not in phases or name not in grid.names:
+        raise RefusedError("phases of the mesh", value, f"{{name: phase}} for the groups {listed}")
+    for name in (*phases, *names):
+        if name not in phases or name not in names:
             value = repr(name) if name in phases else f"without {name!r}"
-            raise RefusedError("phase", value, f"one for each physical group: {names}")
+            raise RefusedError("phase", value, f"one for each physical group: {listed}")
         if not isinstance(phases[name], Phase | VoigtPhase):
             raise RefusedError(f"phase {name!r}", repr(phases[name]), "a Phase or a VoigtPhase")
     require_compressible(*phases.values())
-    return NamedPhases(require_law(grid, law), tuple(phases[name] for name in grid.names))
+    return phases
 
 
 def require_law(grid: PrismGrid, law: object) -> FixedCell:

@@ -1,0 +1,58 @@
+"""Particles by the sign of a function of the user's own, on a mesh that ignores them."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("dolfinx")
+
+from alphacut.fuzzy.refused import RefusedError
+from alphacut.rve import Phase, PrismModel
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+CONE, LAW = HermiteMap(0.2, 0.1, 0.7, 0.1), TruncatedNormal(-3, 3)
+PHASES = {"inclusion": Phase(80e9), "matrix": Phase(20e9)}
+TWO = 25.739483e9  # of meshes/two-particles.msh, by plane elements of order 5
+
+
+def cone(x, y, theta):
+    return np.hypot(x, y) - CONE(theta)
+
+
+def two_particles(x, y, theta):
+    return np.minimum(np.hypot(x + 0.4, y + 0.45) - 0.35, np.hypot(x - 0.45, y - 0.4) - 0.40)
+
+
+def solve(level_set, size, layers=1, law=LAW, phases=PHASES):
+    model = PrismModel(size, layers, interface="sign", level_set=level_set)
+    return model.solve(law, phases)[0]
+
+
+def test_the_cone_of_a_map_is_one_level_set():
+    model = PrismModel(0.5, 3, interface="sign", stiffness=True, estimate=False)
+    right = model.solve(CONE, PHASES["matrix"], [PHASES["inclusion"]])[0]
+    result = solve(cone, 0.5, 3)
+    assert result.stiffness == pytest.approx(right.stiffness, rel=1e-12, abs=1e-3)
+    assert result.energies.values == pytest.approx(right.energies.values[::-1], rel=1e-9, abs=1.0)
+    assert not result.errors
+
+
+def test_two_particles_are_too_stiff_by_first_order():
+    errors = [solve(two_particles, size).modulus / TWO - 1 for size in (0.15, 0.08)]
+    assert 0.003 < errors[1] < errors[0] < 0.015  # 1.2 and 0.6 %
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: PrismModel(level_set=cone), "beside interface 'conforming'"),
+        (lambda: PrismModel(mesh="a.msh", level_set=cone, interface="sign"), "beside a mesh"),
+        (lambda: solve(lambda x, y, t: np.sqrt(x), 0.5), "level set is NaN"),
+        (lambda: solve(lambda x, y, t: 1.0, 0.5), r"level set is of shape \(\)"),
+        (lambda: solve(cone, 0.5, law=CONE), "law of θ is HermiteMap"),
+        (lambda: solve(cone, 0.5, phases={"matrix": Phase(1e9)}), "without 'inclusion'"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value")
+def test_what_is_no_level_set_is_refused(make, message):
+    with pytest.raises(RefusedError, match=message):
+        make()
