@@ -66,18 +66,18 @@ def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str
     inner = top.add_subparsers(
         dest="command", metavar="COMMAND", required=True, parser_class=Parser
     )
-    made: dict[str, Parser] = {}
+    by_name: dict[str, Parser] = {}
     for name, file in commands.items():
         command = command_of(name, file)
         about = f"{command.about[:1].upper()}{command.about[1:]}."
-        made[name] = inner.add_parser(
+        by_name[name] = inner.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
         )
-        command.arguments(made[name])
-        made[name].add_argument(
+        command.arguments(by_name[name])
+        by_name[name].add_argument(
             DEBUG, action="store_true", help="log what is done; a traceback with every error"
         )
-    return top, made
+    return top, by_name
 
 
 def command_of(name: str, file: str) -> Command:
@@ -111,7 +111,7 @@ def main(
                 say(str(problem))
             return 2
         except RefusedError as error:
-            say(str(InputProblem.of(error)))
+            say(str(InputProblem.from_error(error)))
             return 2
         except KeyboardInterrupt:
             number = (*signals, signal.SIGINT)[0]
@@ -157,18 +157,20 @@ def _shown(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> 
 
 def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
     ours, petsc = split_petsc(arguments)
-    own = {name: names[name] for name in ours[:1] if name in names}
+    named = {name: names[name] for name in ours[:1] if name in names}
     with uninterrupted():  # a signal amid imports is not lost to what they run
-        top, made = parsers(program, own or names)
+        top, by_name = parsers(program, named or names)
     options, left = top.parse_known_args(ours)
     if left:
-        made[options.command].refuse(next((one for one in left if one.startswith("-")), left[0]))
+        by_name[options.command].refuse(
+            next((word for word in left if word.startswith("-")), left[0])
+        )
     if "case" not in options:
         require_petsc(petsc, False)
     options.petsc = petsc
     if options.json == "/dev/stdout":  # opened again, it would write over what a file holds
         options.json = "-"
-    check_destinations(made[options.command], options)
+    check_destinations(by_name[options.command], options)
     with standard_output(alone=options.json == "-") as out, warnings.catch_warnings():
         warnings.showwarning = _warn
         command = command_of(options.command, names[options.command])

@@ -247,9 +247,9 @@ class Content(Section):
             "cell.fraction": fraction,
             "stage microstructure": "microstructure" in self.stages,
         }
-        first, *others = [name for name, is_there in sources.items() if is_there] or [""]
-        value = f"beside {', '.join(others)}"
-        require(not others, first, value=value, allowed="one of them")
+        first, *later = [name for name, is_there in sources.items() if is_there] or [""]
+        value = f"beside {', '.join(later)}"
+        require(not later, first, value=value, allowed="one of them")
         method = self.modulus.method
         solved = self.round or self.meshed
         methods = (method,) if solved is None else solved.methods

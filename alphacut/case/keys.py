@@ -24,8 +24,8 @@ def every_key() -> dict[str, FieldInfo]:
 @cache
 def sections() -> dict[str, Models]:
     """The models of every section by its name; that of an image and of a round cell have one."""
-    every: dict[str, Models] = {"": [Content]}
-    return every | {name: models for name, _, models in _walk("", Content) if models}
+    models_by_section: dict[str, Models] = {"": [Content]}
+    return models_by_section | {name: models for name, _, models in _walk("", Content) if models}
 
 
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, Models]]:
@@ -53,9 +53,9 @@ def quantity_of(info: FieldInfo) -> Quantity | None:
 
 def allowed(info: FieldInfo) -> str:
     """Allowed values of a key in words; empty where it takes any text."""
-    of = quantity_of(info)
+    quantity = quantity_of(info)
     choices = [part for part in _parts(info.annotation) if isinstance(part, str)]
-    return of.allowed if of else ", ".join(choices)
+    return quantity.allowed if quantity else ", ".join(choices)
 
 
 def json_schema() -> str:

@@ -122,7 +122,7 @@ class ProbabilitySection(QuestionSection):
     random: tuple[str, ...] = Field(
         default=(), description="inputs that are random, with the shape of their membership"
     )
-    samples: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
+    samples: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = Field(
         default=200, description="random draws at each fuzzy point"
     )
 

@@ -90,15 +90,17 @@ def _parsed(path: Path, text: str) -> dict[str, object]:
 
 def _problems(error: ValidationError) -> Iterator[InputProblem]:
     """The problem of each error that Pydantic reports; what is misspelt is not missing too."""
-    details = [(_key(one["loc"]), one) for one in error.errors(include_url=False)]
-    extra = {key: _meant(key) for key, one in details if one["type"] == "extra_forbidden"}
+    details = [(_key(entry["loc"]), entry) for entry in error.errors(include_url=False)]
+    extra = {
+        key: _suggested_key(key) for key, entry in details if entry["type"] == "extra_forbidden"
+    }
     for key, detail in details:
         if key in extra:
             kind = "section" if isinstance(detail["input"], dict) else "key"
             close = extra[key].removeprefix(f"{_section(key)}.")
-            known = ", ".join(_names(key))
+            names = ", ".join(_names(key))
             cure = f"did you mean {close}?" if close else ""
-            yield InputProblem(key, f"is an unknown {kind}", "", "" if close else known, cure)
+            yield InputProblem(key, f"is an unknown {kind}", "", "" if close else names, cure)
         elif key not in extra.values():
             yield _problem(key, detail)
 
@@ -110,11 +112,11 @@ def _section(key: str) -> str:
 def _names(key: str) -> list[str]:
     """Keys and sections beside a key."""
     inside = re.sub(r"\[\d+\]", "", _section(key))
-    every = (*every_key(), *sections())
-    return [name.rpartition(".")[2] for name in every if name and _section(name) == inside]
+    names = (*every_key(), *sections())
+    return [name.rpartition(".")[2] for name in names if name and _section(name) == inside]
 
 
-def _meant(key: str) -> str:
+def _suggested_key(key: str) -> str:
     """Full name of the known key that comes nearest to one that is not; empty where none does."""
     name = key.rpartition(".")[2]
     if close := nearest(name, _names(key)):
@@ -126,7 +128,7 @@ def _meant(key: str) -> str:
 def _problem(key: str, detail: ErrorDetails) -> InputProblem:
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
-        return replace(InputProblem.of(cause), key=cause.key or key)
+        return replace(InputProblem.from_error(cause), key=cause.key or key)
     what, value, cure = "", _written(detail["input"]), ""
     allowed = str(cause or KINDS.get(detail["type"], detail["msg"]))
     if detail["type"] == "missing":
@@ -138,9 +140,9 @@ def _problem(key: str, detail: ErrorDetails) -> InputProblem:
     return InputProblem(key, what, value, allowed, cure)
 
 
-def _key(place: tuple[int | str, ...]) -> str:
+def _key(location: tuple[int | str, ...]) -> str:
     """Full name of a key, without the tags of unions, which stand in angle brackets."""
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in place)
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
     return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
 
 
@@ -182,9 +184,9 @@ def lines_of_keys(text: str) -> dict[str, int]:
     return lines
 
 
-def _opened(rest: str) -> str:
+def _opened(text: str) -> str:
     """Closing mark of a value that goes on over the next lines, or an empty text."""
-    return next((quotes for quotes in ('"""', "'''") if rest.count(quotes) % 2), "")
+    return next((quotes for quotes in ('"""', "'''") if text.count(quotes) % 2), "")
 
 
 def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
@@ -193,14 +195,16 @@ def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str
     Raises:
         RefusedError: A key is unknown, or changed twice.
     """
-    known = [key for key in every_key() if not key.startswith("study.")]
+    full_keys = [key for key in every_key() if not key.startswith("study.")]
     keys: list[str] = []
     for change in changes:
         key, _, value = (part.strip() for part in change.partition("="))
-        alike = (f"did you mean {full}?" for full in known if full.endswith(f".{key}"))
-        cure = next(alike, suggestion(key, known))
+        alike = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
+        cure = next(alike, suggestion(key, full_keys))
         allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
-        require(key in known and key not in keys, "--set", value=change, allowed=allowed, cure=cure)
+        require(
+            key in full_keys and key not in keys, "--set", value=change, allowed=allowed, cure=cure
+        )
         _put(table, key, _value(value))
         keys.append(key)
     return tuple(keys)

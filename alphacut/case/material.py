@@ -14,12 +14,12 @@ from alphacut.case.meshed import MeshedCell
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
-    Each,
     Length,
     Levels,
     Loss,
     Modulus,
     ModulusOrStiffness,
+    OneOrMany,
     Quantity,
     Ratio,
     Section,
@@ -165,8 +165,8 @@ class RoundCell(Section):
     @property
     def stiffness(self) -> VoigtPhase | None:
         """The particle where it is not isotropic."""
-        of = self.inclusion_modulus
-        return of if isinstance(of, VoigtPhase) else None
+        modulus = self.inclusion_modulus
+        return modulus if isinstance(modulus, VoigtPhase) else None
 
     @property
     def square(self) -> bool:
@@ -247,9 +247,9 @@ class RoundCell(Section):
     @model_validator(mode="after")
     def _losses(self) -> Self:
         """Refuses losses of one phase alone, of spheres, and of bulk moduli that are too large."""
-        for name, other in (("matrix", "inclusion"), ("inclusion", "matrix")):
+        for name, partner in (("matrix", "inclusion"), ("inclusion", "matrix")):
             loss, bulk = (getattr(self, f"{name}_loss{x}") for x in ("", "_bulk"))
-            beside = getattr(self, f"{other}_loss") is not None
+            beside = getattr(self, f"{partner}_loss") is not None
             given = loss is not None or (bulk is None and not beside)
             require(
                 given, f"cell.{name}_loss", value=None, allowed="a loss of either phase, 0 for none"
@@ -284,7 +284,7 @@ class ImageCell(Section):
     """An image of the phases of a periodic cell, of a material that is the same in depth."""
 
     image: CaseFile = Field(description="grey or labelled image, PNG, TIFF or .npy")
-    pixel: Annotated[tuple[Length, ...], Each] = Field(
+    pixel: Annotated[tuple[Length, ...], OneOrMany] = Field(
         description="side of a pixel, or its width and height"
     )
     threshold: tuple[Number, ...] | None = Field(
@@ -294,28 +294,30 @@ class ImageCell(Section):
         default=None, description="value of each phase in a labelled image, instead of threshold"
     )
     modulus: tuple[Modulus, ...] = Field(description="Young's modulus of each phase, dark first")
-    poisson: Annotated[tuple[Ratio, ...], Each] = Field(description="Poisson's ratio of each phase")
-    loss: Annotated[tuple[Loss, ...], Each] | None = Field(
+    poisson: Annotated[tuple[Ratio, ...], OneOrMany] = Field(
+        description="Poisson's ratio of each phase"
+    )
+    loss: Annotated[tuple[Loss, ...], OneOrMany] | None = Field(
         default=None, description="loss factor tan δ of each phase's Young's modulus at real ν"
     )
-    remove: Annotated[tuple[Literal["noise", "light"], ...], Each] = Field(
+    remove: Annotated[tuple[Literal["noise", "light"], ...], OneOrMany] = Field(
         default=(), description="what is taken away first: noise, the drift of light"
     )
 
     @property
     def pairs(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber], ...]:
         """E and ν of each phase."""
-        several = self.poisson * (len(self.modulus) if len(self.poisson) == 1 else 1)
-        return tuple(zip(self.modulus, several, strict=True))
+        ratios = self.poisson * (len(self.modulus) if len(self.poisson) == 1 else 1)
+        return tuple(zip(self.modulus, ratios, strict=True))
 
     @property
     def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:
         """Loss factors of Young's modulus of each phase; its bulk modulus has the same."""
-        several = (self.loss or ()) * (len(self.modulus) if len(self.loss or ()) == 1 else 1)
-        return tuple((loss, None) for loss in several)
+        factors = (self.loss or ()) * (len(self.modulus) if len(self.loss or ()) == 1 else 1)
+        return tuple((loss, None) for loss in factors)
 
     @model_validator(mode="after")
-    def _parted(self) -> Self:
+    def _require_phases(self) -> Self:
         """Refuses phases that nothing or too much tells apart."""
         is_one = bool(self.threshold) != bool(self.labels)
         value = "beside cell.labels" if self.threshold else None
@@ -361,7 +363,7 @@ class Mesh(Section):
         description="mesh of Gmsh, prisms of 15 nodes over [-1, 1]² and θ, in place of size and"
         " layers; its physical groups are the phases of [cell.phases]",
     )
-    layers: Annotated[int, Quantity(least=1, most=10_000, whole=True)] = Field(
+    layers: Annotated[int, Quantity(least=1, most=10_000, is_integer=True)] = Field(
         default=12, description="element layers in θ, of method prism"
     )
     size: Annotated[float, Quantity(least=0.005, below=1)] = Field(

@@ -171,12 +171,12 @@ class MatricesSection(Section):
 
     def _vector(self, key: str, entries: Mapping[str, float]) -> Array:
         """A vector over the unknowns from its entries by name."""
-        places = {name: place for place, name in enumerate(self.unknowns)}
-        vector = np.zeros(len(places))
+        indices = {name: index for index, name in enumerate(self.unknowns)}
+        vector = np.zeros(len(indices))
         for name, value in entries.items():
             allowed = f"unknowns, as {', '.join(self.unknowns[:6])}"
-            require(name in places, f"matrices.{key}", value=name, allowed=allowed)
-            vector[places[name]] = value
+            require(name in indices, f"matrices.{key}", value=name, allowed=allowed)
+            vector[indices[name]] = value
         return vector
 
     def _pattern(self) -> Array:

@@ -107,8 +107,8 @@ class EnvelopeSection(Section):
             RefusedError: It is.
         """
         steps = duration / self.step
-        whole = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps
-        if not whole or steps > MOST_STEPS:
+        is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps
+        if not is_multiple or steps > MOST_STEPS:
             allowed = f"whole multiples of envelope.step, up to {MOST_STEPS:,} steps"
             raise RefusedError(key, f"{duration:g} s", allowed)
 
@@ -119,11 +119,11 @@ class Identify(Section):
     measured: CaseFile = Field(
         description="CSV file mode,frequency [Hz],q1,q2 …, or a universal file"
     )
-    floors: dict[str, Annotated[int, Quantity(least=1, whole=True)]] = Field(
+    floors: dict[str, Annotated[int, Quantity(least=1, is_integer=True)]] = Field(
         default={}, description='floor of each unknown of a universal file, as {"12.x" = 1}'
     )
     learn: Names = Field(description="inputs that are identified, as c or k1")
-    held_out: tuple[Annotated[int, Quantity(least=1, whole=True)], ...] = Field(
+    held_out: tuple[Annotated[int, Quantity(least=1, is_integer=True)], ...] = Field(
         default=(), description="modes that are predicted and not learned from"
     )
     frequency_deviation: Share | None = Field(

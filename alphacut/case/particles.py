@@ -23,10 +23,10 @@ class PackingSection(Section):
     Radii are log-normal between two ends (eq. 11), or those of a file.
     """
 
-    packings: Annotated[int, Quantity(least=5, most=10_000, whole=True)] = Field(
+    packings: Annotated[int, Quantity(least=5, most=10_000, is_integer=True)] = Field(
         default=20, description="independent packings"
     )
-    particles: Annotated[int, Quantity(least=10, most=1_000_000, whole=True)] = Field(
+    particles: Annotated[int, Quantity(least=10, most=1_000_000, is_integer=True)] = Field(
         description="particles in each packing"
     )
     fraction: Annotated[float, Quantity(above=0, below=0.84)] = Field(
@@ -46,8 +46,8 @@ class PackingSection(Section):
         else:
             radii = MeasuredRadii.read(self.file)
         shape = SPHERES if spheres else DISCS
-        each = Packing(self.particles, self.fraction, radii, shape=shape)
-        return Simulated(each, self.packings)
+        packing = Packing(self.particles, self.fraction, radii, shape=shape)
+        return Simulated(packing, self.packings)
 
     @model_validator(mode="after")
     def _one_law(self) -> Self:
@@ -84,7 +84,7 @@ class Photograph(Section):
 class MicrostructureSection(Section):
     """Particles from which the random radius comes: one of packing, circles and image."""
 
-    seed: Annotated[int, Quantity(least=0, most=1e18, whole=True)] = Field(
+    seed: Annotated[int, Quantity(least=0, most=1e18, is_integer=True)] = Field(
         description="seed of everything left to chance"
     )
     limits: Annotated[tuple[Share, Share], after(rising)] | None = Field(

@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from alphacut.case.types import Each, Section, Some, Time, text
+from alphacut.case.types import OneOrMany, Section, Some, Time, text
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.records.read import read_recording
@@ -55,8 +55,8 @@ def _files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
         allowed=f"{allowed}; 1 to {MAX_RECORDS} files",
     )
     names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
-    every = [read_recording(path, channel) for path in paths]
-    return tuple(NamedRecording(*pair) for pair in zip(names, every, strict=True))
+    recordings = [read_recording(path, channel) for path in paths]
+    return tuple(NamedRecording(*pair) for pair in zip(names, recordings, strict=True))
 
 
 def _scale(value: object, _: ValidationInfo) -> Scale:
@@ -96,7 +96,7 @@ class RecordsSection(Section):
     Each record is corrected, then trimmed, then scaled.
     """
 
-    files: Annotated[tuple[Files, ...], Each, Some] = Field(
+    files: Annotated[tuple[Files, ...], OneOrMany, Some] = Field(
         description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")

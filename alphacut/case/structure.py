@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
-from alphacut.case.types import Each, Modulus, Quantity, Section, case_file, text
+from alphacut.case.types import Modulus, OneOrMany, Quantity, Section, case_file, text
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import flow_of
@@ -72,7 +72,10 @@ class MaterialDamping:
         alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
         pairs = [(loss.cut(level), self.joints.cut(level)) for level in alpha]
         lower, upper = (
-            [_ratio_of_loss(of[end] * energy_share) + joints[end] for of, joints in pairs]
+            [
+                _ratio_of_loss(loss_cut[end] * energy_share) + joints[end]
+                for loss_cut, joints in pairs
+            ]
             for end in (0, 1)
         )
         return PiecewiseLinear(alpha, lower, upper)
@@ -207,33 +210,33 @@ class Frame(Section):
     A key with one value for each floor may hold one value for all of them.
     """
 
-    masses: Annotated[tuple[Mass, ...], Each] = Field(description="mass of each floor")
-    lengths: Annotated[tuple[Span, ...], Each] | None = Field(
+    masses: Annotated[tuple[Mass, ...], OneOrMany] = Field(description="mass of each floor")
+    lengths: Annotated[tuple[Span, ...], OneOrMany] | None = Field(
         default=None, description="height of each storey"
     )
     modulus: Modulus | None = Field(
         default=None, description="Young's modulus where no stage computes it"
     )
-    second_moment: Annotated[tuple[Moment, ...], Each] | None = Field(
+    second_moment: Annotated[tuple[Moment, ...], OneOrMany] | None = Field(
         default=None, description="second moment of area of one column of each storey"
     )
-    columns: Annotated[tuple[Count, ...], Each] = Field(
+    columns: Annotated[tuple[Count, ...], OneOrMany] = Field(
         default=(Crisp(2.0),), description="clamped columns in each storey"
     )
-    stiffness: Annotated[tuple[Stiffness, ...], Each] | None = Field(
+    stiffness: Annotated[tuple[Stiffness, ...], OneOrMany] | None = Field(
         default=None, description="stiffness of each storey, in place of columns and modulus"
     )
     damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
-    dampers: Annotated[tuple[Damping, ...], Each] = Field(
+    dampers: Annotated[tuple[Damping, ...], OneOrMany] = Field(
         default=(ZERO,), description="viscous damper of each floor"
     )
     damper_placement: Literal["ground", "storey"] | None = Field(
         default=None, description="dampers to the ground, or between storeys"
     )
-    displacements: Annotated[tuple[Displacement, ...], Each] = Field(
+    displacements: Annotated[tuple[Displacement, ...], OneOrMany] = Field(
         default=(ZERO,), description="displacement of each floor at the start"
     )
-    velocities: Annotated[tuple[Velocity, ...], Each] = Field(
+    velocities: Annotated[tuple[Velocity, ...], OneOrMany] = Field(
         default=(ZERO,), description="velocity of each floor at the start"
     )
     rayleigh_mass: Rate = Field(default=ZERO, description="factor a of a damping a M + b K")
@@ -268,8 +271,8 @@ class Frame(Section):
 
     def per_floor(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[FuzzyNumber, ...]:
         """One value for each floor; a single one holds for all of them."""
-        several = values or ()
-        return several * self.floors if len(several) == 1 else several
+        per_storey = values or ()
+        return per_storey * self.floors if len(per_storey) == 1 else per_storey
 
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
@@ -286,8 +289,8 @@ class Frame(Section):
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        every = self._numbers(number, ratio)
-        return Structure(model, {name: every[name] for name in model.parameters})
+        numbers = self._numbers(number, ratio)
+        return Structure(model, {name: numbers[name] for name in model.parameters})
 
     def _model(self, modulus: FuzzyNumber | None, ratio: FuzzyNumber | None) -> StoreyFrame:
         return StoreyFrame(
@@ -324,8 +327,8 @@ class Frame(Section):
         if self.second_moment is not None:
             numbers["I"] = self.second_moment[0]  # of all storeys, where it is one
         for key, symbol in SYMBOLS.items():
-            each = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)
-            numbers |= {symbol.format(place): value for place, value in each}
+            per_storey = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)
+            numbers |= {symbol.format(storey): value for storey, value in per_storey}
         return numbers
 
     @model_validator(mode="after")

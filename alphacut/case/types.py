@@ -51,7 +51,7 @@ class Quantity:
         below: Values are less than this.
         most: Values are this or less.
         fuzzy: Whether it may be a fuzzy number.
-        whole: Whether it is a whole number.
+        is_integer: Whether it is a whole number.
     """
 
     si: str = ""
@@ -60,13 +60,13 @@ class Quantity:
     below: float = math.inf
     most: float = math.inf
     fuzzy: bool = False
-    whole: bool = False
+    is_integer: bool = False
 
     @property
     def allowed(self) -> str:
         """Allowed values in words."""
         kind, example = QUANTITIES[self.si]
-        kind = "whole number" if self.whole else kind
+        kind = "whole number" if self.is_integer else kind
         ends = [
             f"above {self.above:g}" * math.isfinite(self.above),
             f"from {self.least:g}" * math.isfinite(self.least),
@@ -97,10 +97,10 @@ class Quantity:
         return self.above < value < self.below and self.least <= value <= self.most
 
     def _parsed(self, value: object) -> FuzzyNumber | float | int:
-        if self.whole and isinstance(value, int) and not isinstance(value, bool):
+        if self.is_integer and isinstance(value, int) and not isinstance(value, bool):
             return value
         bare = not self.si and isinstance(value, str) and "%" not in value and "[" not in value
-        if bare or self.whole:
+        if bare or self.is_integer:
             raise ValueError("a number stands without quotes")
         return quantity.fuzzy(value, self.si) if self.fuzzy else quantity.number(value, self.si)
 
@@ -114,10 +114,10 @@ class Quantity:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """The JSON Schema: text with a unit, or a number."""
-        bare: list[dict[str, Any]] = [{"type": "integer" if self.whole else "number"}]
+        bare: list[dict[str, Any]] = [{"type": "integer" if self.is_integer else "number"}]
         bare += [{"type": "array", "items": {"type": "number"}}] * self.fuzzy
         text = {"type": "string", "examples": [QUANTITIES[self.si][1]]}
-        kinds = [text] if self.si else [*bare, text] if not self.whole else bare
+        kinds = [text] if self.si else [*bare, text] if not self.is_integer else bare
         return {"anyOf": kinds, "description": self.allowed}
 
 
@@ -137,7 +137,7 @@ def _not_empty(value: object) -> object:
     return value
 
 
-class _Each:
+class _OneOrMany:
     """An array of which one entry may stand without brackets."""
 
     def __get_pydantic_core_schema__(
@@ -154,7 +154,7 @@ class _Each:
         return {"anyOf": [array["items"], array]}
 
 
-Each = _Each()
+OneOrMany = _OneOrMany()
 Some = BeforeValidator(_not_empty)
 
 
@@ -195,7 +195,7 @@ def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
 after = AfterValidator
 """A check of a value that has its type."""
 CaseFile = Annotated[Path, text(case_file)]
-Names = Annotated[tuple[str, ...], Each, after(unlike)]
+Names = Annotated[tuple[str, ...], OneOrMany, after(unlike)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 

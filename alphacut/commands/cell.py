@@ -81,7 +81,7 @@ def difference(
     """
     gap = abs(first.modulus / second.modulus - 1)
     if not gap <= tolerance:
-        values = (f"{one.method} gives E = {one.modulus:.10g} Pa" for one in (first, second))
+        values = (f"{x.method} gives E = {x.modulus:.10g} Pa" for x in (first, second))
         raise FailedError(
             f"{' and '.join(values)}: {gap:.2e} apart, {tolerance:.2e} is allowed",
             "refine the coarser of the two or allow more",

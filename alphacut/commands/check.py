@@ -76,17 +76,17 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
             for name, part in content.items():
                 if isinstance(part, Section):
                     yield from rows_of(f"{prefix}{key}.{name}.", part)
-        several = content if isinstance(content, tuple) else (content,)
-        for number, one in enumerate(several, start=1):
-            place = f"{prefix}{key}" + (f"[{number}]" if len(several) > 1 else "")
-            if isinstance(one, Section):
-                yield from rows_of(f"{place}.", one)
-            elif isinstance(one, FuzzyNumber) and unit and section.names(key):
-                yield place, _numbers(one, unit.si), KINDS.get(type(one), "fuzzy")
+        sections = content if isinstance(content, tuple) else (content,)
+        for number, subsection in enumerate(sections, start=1):
+            row_key = f"{prefix}{key}" + (f"[{number}]" if len(sections) > 1 else "")
+            if isinstance(subsection, Section):
+                yield from rows_of(f"{row_key}.", subsection)
+            elif isinstance(subsection, FuzzyNumber) and unit and section.names(key):
+                yield row_key, _numbers(subsection, unit.si), KINDS.get(type(subsection), "fuzzy")
             elif key == "columns" and getattr(section, "stiffness", None) is None:
-                yield place, _numbers(one, ""), "default"
-            elif isinstance(one, float) and unit and unit.si and section.names(key):
-                yield place, engineering(one, unit.si), "number"
+                yield row_key, _numbers(subsection, ""), "default"
+            elif isinstance(subsection, float) and unit and unit.si and section.names(key):
+                yield row_key, engineering(subsection, unit.si), "number"
 
 
 def _numbers(number: FuzzyNumber, unit: str) -> str:

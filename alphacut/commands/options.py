@@ -47,8 +47,8 @@ class Parser(argparse.ArgumentParser):
 
     def refuse(self, word: str) -> NoReturn:
         """Raises the problem of a word that is no option of this command."""
-        known = [name for name in self._option_string_actions if name.startswith("--")]
-        allowed, cure = ", ".join(known), suggestion(word, known)
+        names = [name for name in self._option_string_actions if name.startswith("--")]
+        allowed, cure = ", ".join(names), suggestion(word, names)
         raise RefusedError(f"{self.prog.removeprefix('alphacut ')}: option", word, allowed, cure)
 
 
@@ -56,18 +56,18 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
     """Options of PETSc (``-rve_ksp_rtol 1e-10``, ``-log_view``) and those of the program."""
     ours: list[str] = []
     petsc: dict[str, str] = {}
-    rest = list(arguments)
-    while rest:
-        word = rest.pop(0)
+    words = list(arguments)
+    while words:
+        word = words.pop(0)
         if word == PETSC_LOG:
             petsc[word] = ""
             continue
         if not word.startswith(PETSC_PREFIX):
             ours.append(word)
             continue
-        has_value = bool(rest) and not re.match(r"--?[A-Za-z_]", rest[0])
-        has_value = has_value and not rest[0].endswith(".toml")
-        petsc[word.removeprefix(PETSC_PREFIX)] = rest.pop(0) if has_value else ""
+        has_value = bool(words) and not re.match(r"--?[A-Za-z_]", words[0])
+        has_value = has_value and not words[0].endswith(".toml")
+        petsc[word.removeprefix(PETSC_PREFIX)] = words.pop(0) if has_value else ""
     return ours, petsc
 
 
@@ -107,10 +107,10 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress and no table")
 
 
-def add_run(parser: argparse.ArgumentParser, place: str = "nothing is kept") -> None:
+def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is kept") -> None:
     """Adds the options of a command that keeps results: ``--out``, ``--workers``."""
     add_common(parser)
-    about = f"folder for results ({place} if left out); what is up to date there is taken"
+    about = f"folder for results ({default_place} if left out); what is up to date there is taken"
     parser.add_argument("--out", metavar="FOLDER", help=about)
     parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes (default 1)")
 
@@ -144,15 +144,15 @@ def opened(options: argparse.Namespace, folder: str = "") -> Iterator[tuple[Case
     require(
         options.workers >= 1, "--workers", value=options.workers, allowed="a whole number 1 or more"
     )
-    case, place = read(options), options.out or folder
+    case, path = read(options), options.out or folder
     fresh = getattr(options, "fresh", False)
     store = StageStore(None, case.text, fresh, options.quiet, options.workers)
-    if not place:
+    if not path:
         yield case, store
         return
-    require_writable("--out", place, folder=True)
-    with alone("--out", Path(place)) if rank() == 0 else nullcontext():
-        results = ResultsFolder.opened(Path(place))
+    require_writable("--out", path, folder=True)
+    with alone("--out", Path(path)) if rank() == 0 else nullcontext():
+        results = ResultsFolder.opened(Path(path))
         if results.is_lost:
             say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
         if fresh and rank() == 0:

@@ -53,8 +53,11 @@ def summary(document: Document) -> str:
     """Constants of fibres on two levels, references, and what the α-cuts cost."""
     nature, levels = Nature(document["nature"]), (0, -1)
     fibres = [
-        (fibre_label(key), *(between(of["lower"][k], of["upper"][k], nature, 5) for k in levels))
-        for key, of in document["fibres"].items()
+        (
+            fibre_label(key),
+            *(between(values["lower"][k], values["upper"][k], nature, 5) for k in levels),
+        )
+        for key, values in document["fibres"].items()
     ]
     head = ("of fibres", *(f"α = {document['alpha'][k]:g}" for k in levels))
     ends = document["references"].get("hashin_shtrikman_E_GPa")

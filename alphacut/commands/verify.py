@@ -49,10 +49,10 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
                 continue
             document[name] = verified(data, name, folder)
     lines = (
-        f"{name}: {one['motions_tested']} exact motions agree with it ({one['nature']})\n"
-        if one["motions_tested"]
-        else f"{name}: nothing in it is proved ({one['nature']})\n"
-        for name, one in document.items()
+        f"{name}: {verdict['motions_tested']} exact motions agree with it ({verdict['nature']})\n"
+        if verdict["motions_tested"]
+        else f"{name}: nothing in it is proved ({verdict['nature']})\n"
+        for name, verdict in document.items()
     )
     answer(options, document, out, "".join(lines))
     return 0
@@ -90,10 +90,10 @@ def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document
 
 def motions_table(trial: Trial, motions: Sequence[LinearMotion]) -> dict[str, Array]:
     """Time and outputs of motions at the nodes, by titles of columns."""
-    of, table = trial.envelope, {"time [s]": trial.envelope.time}
+    envelope, table = trial.envelope, {"time [s]": trial.envelope.time}
     for k, motion in enumerate(motions, 1):
-        values = motion.outputs(of.time)[0]
-        table |= {f"motion {k}: {x}": values[:, o] for o, x in enumerate(of.named)}
+        values = motion.outputs(envelope.time)[0]
+        table |= {f"motion {k}: {x}": values[:, o] for o, x in enumerate(envelope.named)}
     return table
 
 

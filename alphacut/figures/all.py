@@ -63,9 +63,9 @@ def _structure(results: Results) -> Iterator[Drawing]:
     if (section := results.content.frame) is not None:
         yield "fig26-frame", partial(frame.frame, section)
         yield "fig27-chain", partial(frame.chain, section)
-    richest = max(results.tasks, key=lambda task: len(task.fuzzy))
-    if richest.section.method == "graph-follower":
-        yield "fig21-25-graph-follower", partial(follower.follower, results, richest)
+    widest_task = max(results.tasks, key=lambda task: len(task.fuzzy))
+    if widest_task.section.method == "graph-follower":
+        yield "fig21-25-graph-follower", partial(follower.follower, results, widest_task)
 
 
 def drawn(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
@@ -99,8 +99,8 @@ def draw_all(results: Results, executor: Executor | None, work: Work) -> StageRe
         names += part.result()
         if work.tick:
             work.tick(count / PARTS)
-    made = [name for name, future in mesh.items() if future.result()]
-    return StageResult({"figures": [*sorted(names), *made]})
+    drawn_meshes = [name for name, future in mesh.items() if future.result()]
+    return StageResult({"figures": [*sorted(names), *drawn_meshes]})
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:

@@ -74,7 +74,7 @@ def time_axes(axes: Axes, time: Array, output: str) -> None:
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
     """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
-    task = next((one for one in results.tasks if len(one.fuzzy) > 1), results.tasks[0])
+    task = next((x for x in results.tasks if len(x.fuzzy) > 1), results.tasks[0])
     dataset, structure = results.envelopes[task.name].arrays.isel(alpha=0), results.structure
     assert structure is not None
     names = [str(name) for name in dataset["output"].values]
@@ -109,7 +109,9 @@ def identified(document: Document) -> Figure:
     prior = np.array([document["prior"][name] for name in names], float)
     unit = prior.mean(axis=1)[:, None]
     ends = (
-        np.array([[one["lower"], one["upper"]] for one in document["inputs"].values()])
+        np.array(
+            [[interval["lower"], interval["upper"]] for interval in document["inputs"].values()]
+        )
         / unit[..., None]
     )
     wide: style.Look = {"height": 0.7, "color": style.GREY, "alpha": 0.45, "label": "before"}

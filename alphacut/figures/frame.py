@@ -22,8 +22,10 @@ PITCH = 1.6
 
 def frame(section: Frame) -> Figure:
     """Fig. 26: floors, columns with their lengths or stiffnesses, displacements."""
-    known = section.lengths or (Crisp(3.0),)  # not to scale where only stiffnesses are given
-    lengths = [length.modal for length in section.per_floor(known)]
+    stated_lengths = section.lengths or (
+        Crisp(3.0),
+    )  # not to scale where only stiffnesses are given
+    lengths = [length.modal for length in section.per_floor(stated_lengths)]
     height, level = sum(lengths), 0.0
     span = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height
     high = min(9.0, 1.4 + 0.5 * height, 2.31 * height / span)

@@ -25,13 +25,13 @@ SHOWN_LEVEL = 0.5
 def maps(section: RadiusMapSection, alpha: float) -> list[HermiteMap]:
     """The radius maps at the corners of an α-cut."""
     numbers = section.numbers
-    corners = itertools.product(*(sorted(set(one.cut(alpha))) for one in numbers.values()))
+    corners = itertools.product(*(sorted(set(number.cut(alpha))) for number in numbers.values()))
     return [section.at(dict(zip(numbers, corner, strict=True))) for corner in corners]
 
 
 def modal_map(section: RadiusMapSection) -> HermiteMap:
     """The radius map at the modal values."""
-    return section.at({name: one.modal for name, one in section.numbers.items()})
+    return section.at({name: number.modal for name, number in section.numbers.items()})
 
 
 def distribution(radius: HermiteMap, at: Array) -> Array:

@@ -104,15 +104,15 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
         sys.stdout.flush()
         return
     sys.stdout.flush()
-    kept = os.dup(1)
+    duplicate = os.dup(1)
     os.dup2(2, 1)
     try:
-        target = os.dup(kept) if rank() == 0 else os.open(os.devnull, os.O_WRONLY)
+        target = os.dup(duplicate) if rank() == 0 else os.open(os.devnull, os.O_WRONLY)
         with redirect_stdout(sys.stderr), os.fdopen(target, "w", encoding="utf-8") as stream:
             yield stream
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
+        os.dup2(duplicate, 1)
+        os.close(duplicate)
 
 
 def say(message: str) -> None:

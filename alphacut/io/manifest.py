@@ -82,10 +82,10 @@ class ResultsFolder:
         try:
             require_known(document, file)
             parts = {name: StageFiles(*part) for name, part in document["stages"].items()}
-            whole = document["checksum"] == _checksum(parts) and all(map(is_plain, _names(parts)))
+            intact = document["checksum"] == _checksum(parts) and all(map(is_plain, _names(parts)))
         except (LookupError, TypeError, AttributeError):
             return cls(path, is_lost=True)
-        return cls(path, parts) if whole else cls(path, is_lost=True)
+        return cls(path, parts) if intact else cls(path, is_lost=True)
 
     def problem(self, stage: str) -> str:
         """What is wrong with the files of a stage, such as "modulus.nc was changed"; else ""."""

@@ -69,8 +69,8 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
         values = [
-            number(path, row, cells, place) if cells[place : place + 1] != [""] else np.nan
-            for place in range(len(head))
+            number(path, row, cells, column) if cells[column : column + 1] != [""] else np.nan
+            for column in range(len(head))
         ]
         mode, frequency = values[:2]
         allowed = "a mode from 1, a frequency above 0, and deviations above 0"
@@ -84,9 +84,9 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
 def _columns(path: Path, head: list[str]) -> _Columns:
     match = HEAD.fullmatch(",".join(head))
     names = [cell.strip() for cell in head]
-    floors = {int(name[1:]): place for place, name in enumerate(names) if name.startswith("q")}
-    known = match is not None and len(floors) == sum(name.startswith("q") for name in names)
-    require(known, f"{path.name}, header", value=",".join(head)[:80], allowed=ALLOWED)
+    floors = {int(name[1:]): column for column, name in enumerate(names) if name.startswith("q")}
+    is_complete = match is not None and len(floors) == sum(name.startswith("q") for name in names)
+    require(is_complete, f"{path.name}, header", value=",".join(head)[:80], allowed=ALLOWED)
     assert match is not None
     frequency_std = 2 if match["frequency"] else None
     shape_std = (3 if match["frequency"] else 2) if match["shape"] else None
@@ -95,7 +95,7 @@ def _columns(path: Path, head: list[str]) -> _Columns:
 
 def _mode(path: Path, mode: int, values: Array, columns: _Columns) -> ModeRows:
     """The measurements of one mode from its rows, shape (rows, columns)."""
-    amplitudes = {floor: values[:, place] for floor, place in columns.floors.items()}
+    amplitudes = {floor: values[:, column] for floor, column in columns.floors.items()}
     missing = {floor: np.isnan(row) for floor, row in amplitudes.items()}
     if any(gaps.any() and not gaps.all() for gaps in missing.values()):
         allowed = "an amplitude of a floor in every row of a mode, or in none"

@@ -59,7 +59,7 @@ def read_summary(folder: ResultsFolder) -> Document:
         summary: Document = json.loads(folder.content("summary.json"))
         studies = summary.get("envelopes", {})
         names = [*summary["fingerprints"], *studies, *summary["figures"]]
-        names += [output for one in studies.values() for output in one["min"]]
+        names += [output for study in studies.values() for output in study["min"]]
         is_whole = all(map(is_plain, names))
     except RefusedError as error:
         raise damaged(folder, f"damaged (summary.json {error.value})") from None
@@ -77,11 +77,11 @@ def require_same_run(summary: Document, folder: ResultsFolder) -> None:
         RefusedError: A file there is not of the run that wrote the summary.
     """
     listed = {name: part.fingerprint for name, part in folder.parts.items()}
-    other = [name for name, key in summary["fingerprints"].items() if listed.get(name) != key]
+    changed = [name for name, key in summary["fingerprints"].items() if listed.get(name) != key]
     require(
-        not other,
+        not changed,
         str(folder.path),
-        value=f"with {', '.join(other)} of another run",
+        value=f"with {', '.join(changed)} of another run",
         allowed="one run's files",
     )
 

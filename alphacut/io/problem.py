@@ -33,19 +33,21 @@ class InputProblem:
     line: int = 0
 
     @classmethod
-    def of(cls, error: RefusedError) -> Self:
+    def from_error(cls, error: RefusedError) -> Self:
         """The problem of a value that a constructor refused."""
         value = "" if error.value is None else printable(error.value)
         what = "is missing" if error.value is None else ""
         return cls(error.key, what, value, error.allowed, error.cure)
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
+        location = (
+            f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
+        )
 
         def line(value: str, allowed: str) -> str:
             has = f" is {value}" if value else ""
             what = f"{':' * bool(value)} {self.what}" if self.what else ""
-            return f"{place}{self.key}{has}{what}" + (f"; allowed: {allowed}" if allowed else "")
+            return f"{location}{self.key}{has}{what}" + (f"; allowed: {allowed}" if allowed else "")
 
         return fitted(printable(self.value), printable(self.allowed), line, printable(self.cure))
 
@@ -58,16 +60,16 @@ class BadInput(Exception):  # noqa: N818 - it names the input, not the program, 
         super().__init__("\n".join(map(str, self.problems)))
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, names: Iterable[str]) -> str:
     """The known name that comes nearest to `name`; empty if none comes near."""
-    folded = {option.lower(): option for option in known}
+    folded = {option.lower(): option for option in names}
     close = get_close_matches(name.lower().replace("-", "_"), folded, n=1, cutoff=0.6)
     return folded[close[0]] if close else ""
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
+def suggestion(name: str, names: Iterable[str]) -> str:
     """Words on the known name that comes nearest; empty if none comes near."""
-    return f"did you mean {close}?" if (close := nearest(name, known)) else ""
+    return f"did you mean {close}?" if (close := nearest(name, names)) else ""
 
 
 ELEMENTS = ("dolfinx", "petsc4py", "mpi4py", "basix", "ufl", "cffi", "gmsh", "meshio", "h5py")

@@ -28,8 +28,8 @@ NESTED = ("stochastic", "rve", "fuzzy", "frame")  # packages in folders of their
 @cache
 def own_version() -> str:
     """Version of alphacut: from its installation, else from pyproject.toml beside it."""
-    if known := version_of("alphacut"):
-        return known
+    if version := version_of("alphacut"):
+        return version
     import tomllib
 
     project = Path(__file__).resolve().parents[2] / "pyproject.toml"
@@ -47,8 +47,8 @@ def version_of(distribution: str) -> str:
 @cache
 def versions() -> dict[str, str]:
     """Versions of alphacut, Python and of the packages that are installed."""
-    own = {"alphacut": own_version(), "python": platform.python_version()}
-    return own | {name: known for name in PACKAGES if (known := version_of(name))}
+    first_versions = {"alphacut": own_version(), "python": platform.python_version()}
+    return first_versions | {name: version for name in PACKAGES if (version := version_of(name))}
 
 
 @cache

@@ -40,7 +40,7 @@ QUANTITIES = {
 """Name of the quantity of each SI unit, and a value as a user writes it."""
 STANDARD_GRAVITY = Decimal("9.80665")
 """In m/s², by the third General Conference on Weights and Measures, 1901."""
-OWN = {
+UNITS_HERE = {
     "": {"": Decimal(1), "%": Decimal("0.01")},
     "m/s^2": {"g": STANDARD_GRAVITY, "gal": Decimal("0.01"), "Gal": Decimal("0.01")},
 }
@@ -76,16 +76,16 @@ def factor(unit: str, si: str) -> Decimal:
     Raises:
         ValueError: The unit is unknown, or measures something else.
     """
-    if unit in OWN.get(si, {}):
-        return OWN[si][unit]
+    if unit in UNITS_HERE.get(si, {}):
+        return UNITS_HERE[si][unit]
     if not unit:
         raise ValueError(f"the unit is missing, such as {QUANTITIES[si][1]}")
     if not si or re.search(REFUSED, unit):
         raise ValueError(f'the unit "{unit}" is wrong')
     spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
     try:
-        one = registry().Quantity(Decimal(1), registry().parse_units(spelt))
-        return Decimal(one.to(si).magnitude)
+        si_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
+        return Decimal(si_unit.to(si).magnitude)
     except Exception:  # Pint's parser raises whatever Python's does
         raise ValueError(f'the unit "{unit}" is no unit of {QUANTITIES[si][0]}') from None
 
@@ -95,7 +95,7 @@ def decimal(text: str) -> Decimal:
     return Decimal(text.replace("\u2212", "-"))
 
 
-def one(text: str, si: str) -> Decimal:
+def parse_number(text: str, si: str) -> Decimal:
     """A single quantity such as "80 GPa", in `si`.
 
     Raises:
@@ -109,9 +109,13 @@ def one(text: str, si: str) -> Decimal:
 
 def spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
     """Both ends of the interval "20 t ± 5 %" or "20 t ± 1 t"."""
-    middle = one(f"{match[1]} {match[2]}", si)
+    middle = parse_number(f"{match[1]} {match[2]}", si)
     share = match[4].strip() == "%" and (si or match[2].strip() != "%")
-    half = abs(middle) * decimal(match[3]) / 100 if share else one(f"{match[3]} {match[4]}", si)
+    half = (
+        abs(middle) * decimal(match[3]) / 100
+        if share
+        else parse_number(f"{match[3]} {match[4]}", si)
+    )
     return middle - half, middle + half
 
 
@@ -132,11 +136,13 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
         raise ValueError("this is no quantity" if len(text) <= LONGEST else "this is too long")
     if match := LIST.fullmatch(text):
         items = [item.strip() for item in match[1].split(",")]
-        values = tuple(one(f"{item} {match[2]}" if match[2] else item, si) for item in items)
+        values = tuple(
+            parse_number(f"{item} {match[2]}" if match[2] else item, si) for item in items
+        )
     elif match := SPREAD.fullmatch(text):
         values = spread(match, si)
     else:
-        values = (one(text, si),)
+        values = (parse_number(text, si),)
     return tuple(_sized(x) for x in values)
 
 

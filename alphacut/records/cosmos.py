@@ -55,11 +55,11 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
         RefusedError: There is no such channel or there are several, or its step, unit or samples
             are not those of the format.
     """
-    every = _channels(file)
-    chosen = [entry for entry in every if not channel or channel.lower() in entry.names]
+    channels = _channels(file)
+    chosen = [entry for entry in channels if not channel or channel.lower() in entry.names]
     if len(chosen) != 1:
-        names = "; ".join(" or ".join(entry.names) for entry in every)
-        line = every[0].data if every else 0
+        names = "; ".join(" or ".join(entry.names) for entry in channels)
+        line = channels[0].data if channels else 0
         raise file.refusal(line, f"channel {channel or 'not named'}", f"one of: {names}")
     return _recording(file, chosen[0])
 
@@ -98,13 +98,13 @@ def _channels(file: TextFile) -> list[_Channel]:
     """Channels of acceleration in the order of the file; velocities and displacements are not."""
     channels: list[_Channel] = []
     reals, names = -1, list[str]()
-    for place, line in enumerate(file.lines):
+    for row, line in enumerate(file.lines):
         if REALS.fullmatch(line):
-            reals = place
+            reals = row
         elif match := CHANNEL.fullmatch(line):
             names = [match[1].lower(), match[2].strip().lower()]
         elif DATA.fullmatch(line):
-            channels.append(_Channel(place, reals, tuple(filter(None, names))))
+            channels.append(_Channel(row, reals, tuple(filter(None, names))))
         elif (match := CODE.fullmatch(line)) and channels and "acc" in line.lower():
             last = channels[-1]
             code = (match[1].lower(),) if match[1].lower() not in last.names else ()

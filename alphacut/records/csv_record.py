@@ -29,7 +29,7 @@ def read_csv_record(file: TextFile) -> Recording:
     (_, head), *rows = rows_of(file)
     time_factor, unit, size = _units(file, head)
     table = numbered_rows(file, rows)
-    step = even_step(file, time_factor * table[:, 0], [place for place, _ in rows])
+    step = even_step(file, time_factor * table[:, 0], [row for row, _ in rows])
     return Recording("CSV", unit, step, size * table[:, 1])
 
 
@@ -65,11 +65,11 @@ def numbered_rows(file: TextFile, rows: Sequence[tuple[int, list[str]]]) -> Arra
     return np.array([[_number(file, place, cells, k) for k in (0, 1)] for place, cells in rows])
 
 
-def _number(file: TextFile, place: int, cells: Sequence[str], column: int) -> float:
+def _number(file: TextFile, row: int, cells: Sequence[str], column: int) -> float:
     text = cells[column].strip() if column < len(cells) else ""
     if not NUMBER.fullmatch(text) or not np.isfinite(float(text)):
         what = f"{text[:40]!r} in column {column + 1}"
-        raise file.refusal(place, what, "numbers such as 1.25 or 1e-3")
+        raise file.refusal(row, what, "numbers such as 1.25 or 1e-3")
     return float(text)
 
 

@@ -34,7 +34,7 @@ def read_esm(file: TextFile) -> Recording:
     if size is None or "ACCELERATION" not in kind.upper():
         value = f"{kind} in {unit or 'no unit'}"
         raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}")
-    first = 1 + max(place for _, place in head.values())
+    first = 1 + max(row for _, row in head.values())
     samples = file.numbers(first, len(file.lines))
     file.require_count(samples, count, head[COUNT][1])
     return Recording("ESM", unit, step, samples * size)
@@ -43,13 +43,13 @@ def read_esm(file: TextFile) -> Recording:
 def _head(file: TextFile) -> dict[str, tuple[str, int]]:
     """Values of the head by their keys, with their lines from 0, up to the first number."""
     head: dict[str, tuple[str, int]] = {}
-    for place, line in enumerate(file.lines):
+    for row, line in enumerate(file.lines):
         match = LINE.fullmatch(line.strip())
         if match is None:
             if line.strip() and NUMBER.fullmatch(line.strip()):
                 break
             continue
-        head[match[1]] = match[2].strip(), place
+        head[match[1]] = match[2].strip(), row
     return head
 
 

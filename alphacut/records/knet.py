@@ -44,10 +44,10 @@ def read_knet(file: TextFile) -> Recording:
 
 def _field(file: TextFile, name: str, head: int) -> tuple[re.Match[str], int]:
     """Value of a line of the head, and the line from 0."""
-    for place, line in enumerate(file.lines[:head]):
+    for row, line in enumerate(file.lines[:head]):
         if line.startswith(name):
             match = NAMES[name].fullmatch(line[min(LABEL, len(line)) :])
             if match and all(float(number) > 0 for number in match.groups()):
-                return match, place
-            raise file.refusal(place, line.strip(), f"{name}, as in files of K-NET")
+                return match, row
+            raise file.refusal(row, line.strip(), f"{name}, as in files of K-NET")
     raise file.refusal(head, f"without {name}", "the head of a K-NET file")

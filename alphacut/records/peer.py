@@ -36,29 +36,29 @@ def read_peer(file: TextFile) -> Recording:
     Raises:
         RefusedError: The head or the unit is missing, or the numbers are not those it states.
     """
-    place = next((k for k, line in enumerate(file.lines[:HEAD_LINES]) if _step_line(line)), None)
-    if place is None:
+    row = next((k for k, line in enumerate(file.lines[:HEAD_LINES]) if _step_line(line)), None)
+    if row is None:
         raise file.refusal(min(3, len(file.lines) - 1), "without NPTS and DT", ALLOWED)
-    count, step = _count_and_step(file.lines[place])
+    count, step = _count_and_step(file.lines[row])
     if not 0 < step < 10:
-        raise file.refusal(place, f"a step of {step:g} s", "a step above 0 and below 10 s")
-    line, unit = _unit(file, place)
+        raise file.refusal(row, f"a step of {step:g} s", "a step above 0 and below 10 s")
+    line, unit = _unit(file, row)
     size = acceleration_factor(unit)
     if size is None or re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
         value = f"in units of {unit}" if unit else "without a unit"
         raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}", ALLOWED)
-    samples = file.numbers(place + 1, len(file.lines))
+    samples = file.numbers(row + 1, len(file.lines))
     if count is not None:
-        file.require_count(samples, count, place)
+        file.require_count(samples, count, row)
     return Recording("PEER AT2", unit, step, samples * size)
 
 
 def _unit(file: TextFile, last: int) -> tuple[int, str]:
     """Line that states the unit, and the unit; empty where no line up to `last` does."""
     for pattern in (UNIT, IN_GRAVITY):
-        for place, line in enumerate(file.lines[: last + 1]):
+        for row, line in enumerate(file.lines[: last + 1]):
             if match := pattern.search(line):
-                return place, match[1]
+                return row, match[1]
     return last, ""
 
 

@@ -88,8 +88,8 @@ def _trimmed(samples: Array, step: float, trim: Trim | None) -> Array:
         first, last = np.searchsorted(arias_shares(samples, step), ARIAS_SHARES)
     else:  # a time that is a sample's but for rounding keeps that sample
         first, last = np.ceil(trim[0] / step - 1e-6), np.floor(trim[1] / step + 1e-6)
-    kept = samples[max(int(first), 0) : int(last) + 1]
+    trimmed = samples[max(int(first), 0) : int(last) + 1]
     shown = trim if isinstance(trim, str) else f"{trim[0]:g} … {trim[1]:g} s"
     allowed = f"times within 0 … {(len(samples) - 1) * step:g} s with two samples between them"
-    require(len(kept) > 1, "trim", value=shown, allowed=allowed)
-    return kept
+    require(len(trimmed) > 1, "trim", value=shown, allowed=allowed)
+    return trimmed

@@ -81,9 +81,9 @@ class TextFile:
             RefusedError: Something there is no finite number.
         """
         values: list[float] = []
-        for place in range(first, min(last, len(self.lines))):
-            for word in _words(self.lines[place], width):
-                values.append(self._number(place, word))
+        for row in range(first, min(last, len(self.lines))):
+            for word in _words(self.lines[row], width):
+                values.append(self._number(row, word))
         return np.array(values)
 
     def _number(self, line: int, word: str) -> float:
@@ -117,5 +117,5 @@ def acceleration_factor(unit: str) -> float | None:
 def _words(line: str, width: int) -> Sequence[str]:
     if not width:
         return line.split()
-    cells = (line[place : place + width].strip() for place in range(0, len(line.rstrip()), width))
+    cells = (line[start : start + width].strip() for start in range(0, len(line.rstrip()), width))
     return [cell for cell in cells if cell]

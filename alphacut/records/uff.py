@@ -129,8 +129,8 @@ def _mode(path: Path, dataset: dict[str, Any], number: int, floors: Mapping[str,
     key = f"{path.name}, mode {number}"
     nodes = [int(node) for node in dataset["node_nums"]]
     values: dict[str, complex] = {}
-    for place, direction in enumerate(DIRECTIONS, start=1):
-        column = dataset.get(f"r{place}")
+    for axis, direction in enumerate(DIRECTIONS, start=1):
+        column = dataset.get(f"r{axis}")
         if column is not None:
             values |= {f"{n}.{direction}": complex(x) for n, x in zip(nodes, column, strict=True)}
     missing = [name for name in floors if name.lower() not in values]

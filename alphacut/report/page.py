@@ -51,14 +51,16 @@ PARTS = {
     "update": ("What do the measured modes teach?", "update", ("update-inputs",)),
     "envelopes": ("How does the structure move?", "peaks", ()),
     "records": ("How far does it move under each record?", "records", ()),
-    **{one.key: (one.title, one.key, (one.key,)) for one in QUESTIONS},
+    **{question.key: (question.title, question.key, (question.key,)) for question in QUESTIONS},
     "shares": ("What drives the width?", "shares", ()),
 }
 """Title, table and figures of each part of the summary."""
 Piece = tuple[object, ...]
 """Name of a macro of ``report.html``, and what it shows."""
 _TABLES = tomllib.loads(Path(__file__).with_name("captions.toml").read_text(encoding="utf-8"))
-FIGURES: dict[str, str] = _TABLES["figures"] | {one.key: one.caption for one in QUESTIONS}
+FIGURES: dict[str, str] = _TABLES["figures"] | {
+    question.key: question.caption for question in QUESTIONS
+}
 WORDS: dict[str, str] = _TABLES["words"]
 
 
@@ -87,7 +89,9 @@ def page(summary: Document, folder: ResultsFolder) -> str:
         name=summary["case"],
         about=" ".join(summary.get("about", "").split()),
         sections=Page(summary, folder).sections(),
-        envelopes=[plot(name, one, folder) for name, one in summary.get("envelopes", {}).items()],
+        envelopes=[
+            plot(name, envelope, folder) for name, envelope in summary.get("envelopes", {}).items()
+        ],
     )
 
 
@@ -111,7 +115,7 @@ def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
         "step": float(time[1] - time[0]),
         **{
             side: [
-                [packed(row) for row in level]
+                [packed_numbers(row) for row in level]
                 for level in band.transpose("alpha", "output", "time").values
             ]
             for side, band in bands.items()
@@ -119,7 +123,7 @@ def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
     }
 
 
-def packed(row: Array) -> str:
+def packed_numbers(row: Array) -> str:
     """Numbers as little-endian 32-bit floats in base64."""
     return base64.b64encode(np.ascontiguousarray(row, "<f4").tobytes()).decode()
 
@@ -143,13 +147,13 @@ class Page:
         summary = self.summary
         first = (material(summary), motion(summary), (ANSWERS, answers(summary)))
         remarks = [*natures(summary), *drivers(summary)]
-        yield "Key results", [*(("table", *one) for one in first), *_texts(remarks)]
+        yield "Key results", [*(("table", *shown) for shown in first), *_texts(remarks)]
         for name, (title, table, drawn) in PARTS.items():
             if part := summary.get(name):
                 yield title, [*self._drawn(drawn), *self._part(name, part, table)]
         yield "Terms", [("glossary", TERMS.items())]
-        others = [*self._drawn(tuple(self.left))]
-        yield "More", [("folded", "All other figures", others), *self._origin()]
+        figures = [*self._drawn(tuple(self.left))]
+        yield "More", [("folded", "All other figures", figures), *self._origin()]
 
     def _part(self, name: str, part: Document, table: str) -> Iterator[Piece]:
         """Words and table of a part."""
@@ -158,7 +162,7 @@ class Page:
         yield from _texts(self._words(name, part))
         if table in self.tables:
             shown: Piece = ("table", *self.tables[table])
-            answer = name in ("update", "shares", *(one.key for one in QUESTIONS))
+            answer = name in ("update", "shares", *(question.key for question in QUESTIONS))
             yield shown if answer else ("folded", "As a table", [shown])
         if name == "modulus":
             yield "folded", "Errors, checks and references", [("table", *_errors(part))]
@@ -183,10 +187,10 @@ class Page:
             yield str(part["refuted"])
         elif name == "envelopes":
             omega = self.summary.get("structure", {}).get("omega_rad_per_s", ())
-            if periods := ", ".join(f"{2 * math.pi / one:.3g}" for one in omega[:4]):
+            if periods := ", ".join(f"{2 * math.pi / item:.3g}" for item in omega[:4]):
                 yield f"Linear elastic, with natural periods of {periods} s."
-            for study, one in part.items():
-                yield f"{study}: {one['method']}, fuzzy {', '.join(one['fuzzy'])}"
+            for study, item in part.items():
+                yield f"{study}: {item['method']}, fuzzy {', '.join(item['fuzzy'])}"
             for nature in dict.fromkeys(Nature(study["nature"]) for study in part.values()):
                 yield f"{str(nature).capitalize()}: {nature.sentence}"
         elif name == "shares":
@@ -203,7 +207,7 @@ class Page:
                 try:
                     picture = base64.b64encode(self.folder.content(self.left.pop(stem))).decode()
                 except RefusedError as error:
-                    say(f"warning: a figure is left out: {InputProblem.of(error)}")
+                    say(f"warning: a figure is left out: {InputProblem.from_error(error)}")
                     continue
                 yield "figure", caption(stem, paper=self.paper), picture
 
@@ -213,9 +217,9 @@ class Page:
         yield "folded", f"Case {summary['case']}", [("code", summary["case_text"])]
         changes = [("code", change) for change in summary.get("changes", ())]
         yield "folded", "Changed on the command line", changes
-        made = f"Made by {summary['command']} in {summary['seconds']:.0f} s."
+        origin = f"Made by {summary['command']} in {summary['seconds']:.0f} s."
         versions = ("table", ("program", "version"), [*summary["versions"].items()])
-        yield "folded", "Versions", [("text", made), versions]
+        yield "folded", "Versions", [("text", origin), versions]
 
 
 def _texts(texts: Iterator[str] | list[str]) -> Iterator[Piece]:
@@ -226,14 +230,14 @@ def _errors(part: Document) -> Table:
     """Errors of E by source, largest violations of properties, and references."""
     rows: list[Row] = [(f"error: {in_words(x)}", f"{y:.2g} of E") for x, y in part["error"].items()]
     rows += [(f"check: {in_words(x)}", f"{y:.2g}") for x, y in part["checks"].items()]
-    known = {
+    references = {
         "hashin_shtrikman_E_GPa": "Hashin–Shtrikman bounds, isotropic composites",
         "mori_tanaka_E_GPa": "Mori–Tanaka, isotropic composites",
     }
     for key, value in part["references"].items():
-        if key in known:
+        if key in references:
             ends = value if isinstance(value, list) else [value]
-            rows.append((known[key], " … ".join(f"{end:.5g} GPa" for end in ends)))
+            rows.append((references[key], " … ".join(f"{end:.5g} GPa" for end in ends)))
     return ("source, property or reference at the modal values", "value"), rows
 
 

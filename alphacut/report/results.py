@@ -29,8 +29,8 @@ GRAVITY = float(STANDARD_GRAVITY)
 def cut(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
     """One cut of a quantity with five digits; guaranteed ends contain the error."""
     low, high = float(ends["lower"][level]), float(ends["upper"][level])
-    beyond = error if nature is Nature.GUARANTEED else 0.0
-    return between(max(low - beyond, min(low, 0.0)), high + beyond, nature, 5)
+    added_error = error if nature is Nature.GUARANTEED else 0.0
+    return between(max(low - added_error, min(low, 0.0)), high + added_error, nature, 5)
 
 
 def error_text(error: float, nature: Nature) -> str:
@@ -50,10 +50,12 @@ def material(summary: Document) -> Table:
         ends = cut(young, -1, nature), cut(young, 0, nature, error)
         off = error_text(error, nature) if part.get("particles") != "mesh" else "not declared"
         rows.append((name, *ends, str(nature), off))
-        others = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
-        for label, of in others.items():
-            if of:
-                rows.append((label, cut(of, -1, nature), cut(of, 0, nature), str(nature), ""))
+        further_rows = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
+        for label, values in further_rows.items():
+            if values:
+                rows.append(
+                    (label, cut(values, -1, nature), cut(values, 0, nature), str(nature), "")
+                )
         if loss := part.get("loss"):
             nature, error = Nature(loss["nature"]), loss["error"].get("E")
             ends = cut(loss["E"], -1, nature), cut(loss["E"], 0, nature)
@@ -67,8 +69,8 @@ def material(summary: Document) -> Table:
 
 def filled(head: Row, rows: list[Row]) -> Table:
     """The columns that hold something, an error that ranges leave out for example."""
-    kept = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
-    return tuple(head[k] for k in kept), [tuple(row[k] for k in kept) for row in rows]
+    columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
+    return tuple(head[k] for k in columns), [tuple(row[k] for k in columns) for row in rows]
 
 
 def fibre_label(key: str) -> str:
@@ -101,8 +103,8 @@ def motion(summary: Document) -> Table:
     for name, study in studies.items():
         where = f" ({name})" if len(studies) > 1 else ""
         for output, peak in study["peak"].items():
-            each = scales(output, peak, summary.get("structure", {}))
-            for label, factor in each if output in (study.get("drawn") or [output]) else ():
+            scaled = scales(output, peak, summary.get("structure", {}))
+            for label, factor in scaled if output in (study.get("drawn") or [output]) else ():
                 nature, error = Nature(peak["nature"]), max(peak["error"])
                 cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
                 for k in levels[len(cuts) :]:
@@ -157,9 +159,9 @@ def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
     """Limit in SI of each output that a question names, and the verdict on it, or no text."""
     limits: dict[str, tuple[float, str]] = {}
     for key, inner in (("tolerances", "limits"), ("probability", "events"), ("decision", "limits")):
-        for output, one in summary.get(key, {}).get(inner, {}).items():
-            of = one if isinstance(one, Mapping) else {"limit": one}
-            limits[output] = of["limit"], of.get("verdict", "")
+        for output, entry in summary.get(key, {}).get(inner, {}).items():
+            answer = entry if isinstance(entry, Mapping) else {"limit": entry}
+            limits[output] = answer["limit"], answer.get("verdict", "")
     return limits
 
 
@@ -174,7 +176,7 @@ def natures(summary: Document) -> Iterator[str]:
         words = [f"all {nature}" for nature in groups]
     if words:
         yield "Peaks are largest magnitudes over time, " + ", ".join(words)
-    if tested := sum(one.get("motions_tested", 0) for one in summary.get("envelopes", {}).values()):
+    if tested := sum(x.get("motions_tested", 0) for x in summary.get("envelopes", {}).values()):
         yield f"{tested} exact motions by another algorithm agree with what is guaranteed."
 
 
@@ -190,9 +192,10 @@ def answers(summary: Document) -> list[Row]:
 
 def drivers(summary: Document) -> Iterator[str]:
     """Lines on what drives the modulus, and the peak of the last output: the largest shares."""
-    of = dict(summary.get("shares", {}))
-    shown = [name for name in of if name == "E"] + [name for name in of if "peak" in name][-1:]
+    shares = dict(summary.get("shares", {}))
+    peak_names = [name for name in shares if "peak" in name]
+    shown = [name for name in shares if name == "E"] + peak_names[-1:]
     for name in shown:
-        first, *others = sorted(of[name].items(), key=lambda pair: -pair[1])[:3]
-        more = "".join(f", {x} by {share:.0%}" for x, share in others)
+        first, *more_inputs = sorted(shares[name].items(), key=lambda pair: -pair[1])[:3]
+        more = "".join(f", {x} by {share:.0%}" for x, share in more_inputs)
         yield f"Fixing {first[0]} narrows {name} by {first[1]:.0%}{more}"

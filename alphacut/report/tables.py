@@ -36,12 +36,12 @@ DIGITS = 6
 def run_text(summary: Document) -> str:
     """Every table of a run, and what drives the peak."""
     learned = summary.get("update", {})
-    shown = [one for one in (material(summary), motion(summary)) if one[1]]
+    shown = [table for table in (material(summary), motion(summary)) if table[1]]
     shown += [update(learned)] if "inputs" in learned else []
     lines = [*natures(summary), *([learned["refuted"]] if "refuted" in learned else [])]
     lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(summary)]
     lines += drivers(summary)
-    return "".join(text_table(*one) for one in shown) + "".join(f"{line}\n" for line in lines)
+    return "".join(text_table(*table) for table in shown) + "".join(f"{line}\n" for line in lines)
 
 
 def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> list[Path]:
@@ -55,41 +55,40 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
     Returns:
         The files.
     """
-    every = {name: table for name, table in tables(summary).items() if table[1]}
+    filled_tables = {name: table for name, table in tables(summary).items() if table[1]}
     for name, study in summary.get("envelopes", {}).items():
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
-            every[f"envelope_{name}-{output}"] = over_time(data, output)
-    for name, (head, rows) in every.items():
+            filled_tables[f"envelope_{name}-{output}"] = over_time(data, output)
+    for name, (head, rows) in filled_tables.items():
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
         write_text(folder / f"{name}.csv", text.getvalue(), follow_links=False)
-    return [folder / f"{name}.csv" for name in every]
+    return [folder / f"{name}.csv" for name in filled_tables]
 
 
 def tables(summary: Document) -> dict[str, Table]:
     """The table of every result by its name."""
-    every = {
+    stage_tables = {
         name: make(summary[key])
         for name, (key, make) in MAKERS.items()
         if summary.get(key) and "refuted" not in summary[key]
     }
-    answers = {
-        one.key: (one.head, one.rows(summary[one.key])) for one in QUESTIONS if one.key in summary
-    }
-    return every | answers
+    answers = {x.key: (x.head, x.rows(summary[x.key])) for x in QUESTIONS if x.key in summary}
+    return stage_tables | answers
 
 
-def ends_of(of: Document, level: int, nature: Nature) -> Row:
+def ends_of(values: Document, level: int, nature: Nature) -> Row:
     """Both ends of a cut, rounded as their nature allows."""
-    return ends(float(of["lower"][level]), float(of["upper"][level]), nature, DIGITS)
+    return ends(float(values["lower"][level]), float(values["upper"][level]), nature, DIGITS)
 
 
 def radius_map(part: Document) -> Table:
     """Parameters of the radius map."""
-    each = {name: part[name] for name in ("a1", "a2", "a3", "a4")}
+    parameters = {name: part[name] for name in ("a1", "a2", "a3", "a4")}
     rows: list[Row] = [
-        (x, " … ".join(map(_number, y if isinstance(y, list) else [y]))) for x, y in each.items()
+        (x, " … ".join(map(_number, y if isinstance(y, list) else [y])))
+        for x, y in parameters.items()
     ]
     return ("parameter of the radius map", "least … modal … greatest"), rows
 
@@ -119,13 +118,13 @@ def modulus(part: Document) -> Table:
 def update(part: Document) -> Table:
     """Inputs before and after measured modes; then the modes that were predicted."""
     rows: list[Row] = []
-    for name, of in part["inputs"].items():
-        after, unit = (of["lower"][0], of["upper"][0]), part["units"][name]
+    for name, identified in part["inputs"].items():
+        after, unit = (identified["lower"][0], identified["upper"][0]), part["units"][name]
         share = f"{part['narrowed'][name]:.0%} of the width"
         rows.append((name, _wide(part["prior"][name], unit), _wide(after, unit), share))
-    for one in part["held_out"]:
-        where, measured = "inside" if one["inside"] else "outside", f"{one['measured']:.4g} Hz"
-        rows.append((f"mode {one['mode']}", measured, _wide(one["predicted"], "Hz"), where))
+    for mode in part["held_out"]:
+        where, measured = "inside" if mode["inside"] else "outside", f"{mode['measured']:.4g} Hz"
+        rows.append((f"mode {mode['mode']}", measured, _wide(mode["predicted"], "Hz"), where))
     return ("input or mode", "before, measured", "learned, predicted", ""), rows
 
 
@@ -169,9 +168,12 @@ def records(part: Document) -> Table:
 
 def shares(part: Document) -> Table:
     """Shares of the inputs in the width of each result, on the lowest level."""
-    inputs = dict.fromkeys(name for of in part.values() for name in of)
+    inputs = dict.fromkeys(name for values in part.values() for name in values)
     rows: list[Row] = [
-        (name, *(f"{of[name]:.3f}" if name in of else "" for of in part.values()))
+        (
+            name,
+            *(f"{values[name]:.3f}" if name in values else "" for values in part.values()),
+        )
         for name in inputs
     ]
     return ("input", *(f"share of the width of {name}" for name in part)), rows
@@ -191,13 +193,13 @@ MAKERS = {
 
 def over_time(data: xarray.Dataset, output: str) -> Table:
     """Bounds of one output by time, those of each level beside each other with their error."""
-    one, unit = data.sel(output=output), Output(output).unit
+    series, unit = data.sel(output=output), Output(output).unit
     nature = Nature(data.attrs["nature"])
     words = {"lower": f"{nature} lower", "upper": f"{nature} upper", "error": "error"}
     words["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
-    columns = {"time [s]": [_number(time) for time in one["time"].values]}
-    for level in one["alpha"].values:
-        at = one.sel(alpha=level)
+    columns = {"time [s]": [_number(time) for time in series["time"].values]}
+    for level in series["alpha"].values:
+        at = series.sel(alpha=level)
         for band in filter(at.__contains__, words):
             ends = (rounded(float(x), band, nature, DIGITS) for x in at[band].values)
             columns[f"{words[band]} at alpha {level:g} [{unit}]"] = [*map(_number, ends)]
@@ -212,6 +214,6 @@ def text_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
         rows: Each of n cells.
     """
     lines = [[*head], *map(list, rows)]
-    first, *others = (max(len(line[k]) for line in lines) for k in range(len(head)))
-    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], others)] for line in lines)
+    first, *further_widths = (max(len(line[k]) for line in lines) for k in range(len(head)))
+    aligned = ([line[0].ljust(first), *map(str.rjust, line[1:], further_widths)] for line in lines)
     return "".join(f"{'  '.join(line).rstrip()}\n" for line in aligned)

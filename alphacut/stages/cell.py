@@ -104,8 +104,8 @@ def _model_of_particle(
     if cell.particles == "spheres":
         return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11)).solve
     if cell.has_series and method in ("auto", "series"):
-        own = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
-        return SeriesModel(accuracy=own, energies=bool(cell.losses)).solve
+        accuracy = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
+        return SeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve
     outline = cell.outline or circle
     if method in ("auto", "slices"):
         from alphacut.rve.slices.model import SlicesModel
@@ -188,8 +188,8 @@ def references(
     else:
         fractions = np.array([1 - share, share])
         limits = isotropic_bounds(fractions, [matrix.stiffness, inclusion.stiffness])
-        whole, _, shear = bounds.mori_tanaka(share, matrix, inclusion)
-        estimate = _across(whole / 2, shear)
+        bulk, _, shear = bounds.mori_tanaka(share, matrix, inclusion)
+        estimate = _across(bulk / 2, shear)
     found = {"fraction": fraction, **beside, "hashin_shtrikman_E_GPa": limits}
     # the estimate is of round particles
     return found | ({"mori_tanaka_E_GPa": estimate / GPA} if modal.square or spheres else {})
@@ -318,7 +318,7 @@ def require_tolerance(error: Mapping[str, float], tolerance: float | None) -> No
     Raises:
         FailedError: Their sum is larger.
     """
-    whole = sum(error.values())
-    if tolerance is not None and whole > tolerance * (1 + 1e-9):
-        what = f"the relative error of E is {whole:.2g}; the case allows {tolerance:.2g}"
+    total = sum(error.values())
+    if tolerance is not None and total > tolerance * (1 + 1e-9):
+        what = f"the relative error of E is {total:.2g}; the case allows {tolerance:.2g}"
         raise FailedError(what, "method auto reaches it")

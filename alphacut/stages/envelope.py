@@ -54,10 +54,13 @@ class EnvelopeTask:
             RefusedError: No output has that unit.
         """
         units = {Output(x).unit for x in structure.outputs}
-        own = self.section.tolerance or USUAL
-        value, allowed = f"{own.value:g} {own.unit}", f"a share, or {', '.join(sorted(units))}"
-        require(own.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
-        return own
+        wanted = self.section.tolerance or USUAL
+        value, allowed = (
+            f"{wanted.value:g} {wanted.unit}",
+            f"a share, or {', '.join(sorted(units))}",
+        )
+        require(wanted.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
+        return wanted
 
     def is_motion_of(self, section: EnvelopeSection) -> bool:
         """True if it has the inputs and the duration of [envelope]."""
@@ -66,11 +69,11 @@ class EnvelopeTask:
 
     def options(self, structure: Structure) -> dict[str, Any]:
         """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
-        method, own = self.section.method, self.tolerance(structure).value
+        method, tolerance = self.section.method, self.tolerance(structure).value
         auto = method == "auto" and self.section.tolerance is None
         if auto or not hasattr(frame.METHODS[method], "tolerance"):
             return {}
-        return {"tolerance": own * (self.section.gain if method in FOLLOWERS else 1.0)}
+        return {"tolerance": tolerance * (self.section.gain if method in FOLLOWERS else 1.0)}
 
     def compute(self, structure: Structure, work: Work) -> StageResult:
         """The envelope, and the fuzzy peak of each output's magnitude in its document.
@@ -184,12 +187,12 @@ def tasks(
         studies: Studies of the case, if any.
         limited: Outputs of the motion of [envelope] whose peaks questions compare with limits.
     """
-    every = tuple(
+    studied = tuple(
         EnvelopeTask(study.name, study.fuzzy, study.duration, section, study.figures)
         for study in studies
     ) or (EnvelopeTask("all", section.fuzzy, section.duration, section),)
     return tuple(
-        replace(task, limited=limited) if task.is_motion_of(section) else task for task in every
+        replace(task, limited=limited) if task.is_motion_of(section) else task for task in studied
     )
 
 
@@ -237,10 +240,10 @@ def require_tolerance(result: StageResult, task: EnvelopeTask, structure: Struct
     allowed, data = task.tolerance(structure), result.arrays
     errors = data["error"].max(("alpha", "time")).values
     for name, error in zip(map(str, data["output"].values), errors, strict=True):
-        meant = allowed.unit in ("", Output(name).unit)
+        has_unit = allowed.unit in ("", Output(name).unit)
         if not allowed.unit:
             error = error / max(result.document["peak"][name]["upper"])
-        if meant and error > allowed.value * (1 + 1e-9):
+        if has_unit and error > allowed.value * (1 + 1e-9):
             what = f"the error of {name} is {error:.2g}; the case allows {allowed.value:.2g}"
             cure = "method auto, or a smaller envelope.step, reaches it"
             if data.attrs["method"] not in FOLLOWERS:

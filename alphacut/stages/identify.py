@@ -42,8 +42,8 @@ def learned(
         after = identify(structure.frame, prior, used, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
-    known = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
-    predicted = [_predicted(rows[mode], after.predictions()) for mode in known]
+    modes = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
+    predicted = [_predicted(rows[mode], after.predictions()) for mode in modes]
     document = {**_document(after), "held_out": predicted}
     document["prior"] = {name: list(widest(number)) for name, number in prior.items()}
     return document, replace(structure, numbers={**structure.numbers, **after.numbers})
@@ -59,11 +59,14 @@ def require_learnable(
     """
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
     rows = {row.mode: row for row in _rows(section)}
-    some, held = f"some of modes {[*rows]}, not all", section.held_out
+    allowed, held_out = f"some of modes {[*rows]}, not all", section.held_out
     require(
-        set(held) < set(rows), "identify.held_out", value=", ".join(map(str, held)), allowed=some
+        set(held_out) < set(rows),
+        "identify.held_out",
+        value=", ".join(map(str, held_out)),
+        allowed=allowed,
     )
-    used = [_measured(section, row) for mode, row in rows.items() if mode not in held]
+    used = [_measured(section, row) for mode, row in rows.items() if mode not in held_out]
     return rows, used, structure.inputs(section.learn, "identify.learn")
 
 
@@ -101,8 +104,8 @@ def _document(after: Identified) -> Document:
     }
 
 
-def _predicted(row: ModeRows, every: Ends) -> Document:
-    low, high = (float(ends[0, row.mode - 1]) for ends in every)
+def _predicted(row: ModeRows, all_ends: Ends) -> Document:
+    low, high = (float(ends[0, row.mode - 1]) for ends in all_ends)
     measured = float(row.frequencies.mean())
     inside = low <= measured <= high
     return {"mode": row.mode, "measured": measured, "predicted": [low, high], "inside": inside}

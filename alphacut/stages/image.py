@@ -185,19 +185,21 @@ def _thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
-    judged = segmented(grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove)
-    judged.require()
-    moved = [new - old for new, old in zip(judged.thresholds, modal, strict=True)]
+    segmentation = segmented(
+        grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove
+    )
+    segmentation.require()
+    moved = [new - old for new, old in zip(segmentation.thresholds, modal, strict=True)]
     fuzzy = any(number.support.width > 0 for number in numbers)
 
     def ranges(level: Level) -> tuple[Rows, Rows]:
         if level is not None and not fuzzy:
-            return judged.ranges()
+            return segmentation.ranges()
         cuts = (cut_at(number, level) for number in numbers)
         pairs = [(low + by, high + by) for (low, high), by in zip(cuts, moved, strict=True)]
-        return threshold_ranges(judged.grey, pairs)
+        return threshold_ranges(segmentation.grey, pairs)
 
-    return ImageStudy(cell, ranges, fuzzy or judged.open > 0)
+    return ImageStudy(cell, ranges, fuzzy or segmentation.open > 0)
 
 
 def _labelled(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageStudy:

@@ -73,6 +73,6 @@ def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Ar
     if corners.max() <= MAX_FIRST_ORDER:
         return np.einsum("lecpx,pxc->lec", corners, shares), np.array(errors)
     ends = np.empty(corners.shape[:3])
-    for place in product(*map(range, ends.shape)):
-        ends[place] = loss_factors(result, corners[place]).values[CONSTANTS[place[-1]]]
+    for corner in product(*map(range, ends.shape)):
+        ends[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
     return ends, np.array(errors)

@@ -156,8 +156,8 @@ class CellCampaign:
         support, modulus = None, self.cell.constants.get("inclusion_modulus")
         if modulus is not None:
             support = (modulus.support.lower, modulus.support.upper)
-        own = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
-        return model_of(self.cell, self.mesh, self.modulus, **own)
+        options = {"estimate": estimate, "moduli": support, "petsc": self.petsc}
+        return model_of(self.cell, self.mesh, self.modulus, **options)
 
     @property
     def identity(self) -> Document:
@@ -213,15 +213,15 @@ class CellCampaign:
         """
         if not self.cell.has_series or self.modulus.method == "prism":
             return Knowledge()
-        of = {name: number.support for name, number in self.cell.constants.items()}
-        matrix, inclusion = of["matrix_modulus"], of["inclusion_modulus"]
-        poisson = of["matrix_poisson"]
+        supports = {name: number.support for name, number in self.cell.constants.items()}
+        matrix, inclusion = supports["matrix_modulus"], supports["inclusion_modulus"]
+        poisson = supports["matrix_poisson"]
         stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
-        same = poisson == of["inclusion_poisson"] and not poisson.width and poisson.lower >= 0
+        same = poisson == supports["inclusion_poisson"] and not poisson.width and poisson.lower >= 0
         if not same or not (stiffer or softer):
             return Knowledge()
-        way = 1 if stiffer else -1
-        signs = {"a1": way, "a2": way, "a3": way, "a4": -way, "fraction": way}
+        effect = 1 if stiffer else -1
+        signs = {"a1": effect, "a2": effect, "a3": effect, "a4": -effect, "fraction": effect}
         signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
@@ -233,8 +233,8 @@ class CellCampaign:
         if isinstance(self.cell, MeshedCell):
             return {}
         if self.modulus.method == "prism":
-            judged = solve(self.radius, self.cell, self.model(estimate=True))
-            return dict(zip(CONSTANTS, loss_bounds(judged, self.losses)[1], strict=True))
+            reference = solve(self.radius, self.cell, self.model(estimate=True))
+            return dict(zip(CONSTANTS, loss_bounds(reference, self.losses)[1], strict=True))
         largest = result.samples.values.output("loss_error").max(axis=0)
         return dict(zip(CONSTANTS, map(float, largest), strict=True))
 
@@ -290,8 +290,8 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         "alpha": result.alpha,
         "E_GPa": cuts["E_GPa"],
         "nu_cuts": cuts["nu"],
-        "fibres": {key: of for key, of in cuts.items() if key.removesuffix("_GPa") in FIBRES},
-        "plane": {key: of for key, of in cuts.items() if key.removesuffix("_GPa") in PLANE},
+        "fibres": {key: cut for key, cut in cuts.items() if key.removesuffix("_GPa") in FIBRES},
+        "plane": {key: cut for key, cut in cuts.items() if key.removesuffix("_GPa") in PLANE},
         "method": campaign.modulus.method,
         "plan": result.method,
         "samples": result.evaluations,

@@ -75,8 +75,8 @@ class Pipeline:
             data = results.modulus if results.image is None else results.image
             self._motion(self.structure(None if data is None else data.arrays))
         samples = self.campaign if results.modulus is not None else None
-        richest = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
-        results.shares = self.store.take(shares.stage(samples, results.structure, richest))
+        task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
+        results.shares = self.store.take(shares.stage(samples, results.structure, task))
         return results
 
     def particles(self) -> StageResult:
@@ -125,8 +125,8 @@ class Pipeline:
         )
         by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
         allowed = "loss factors of the cell, or a number"
-        known = loss is not None or not by_material
-        require(known, "frame.damping_ratio", value="material", allowed=allowed)
+        is_stated = loss is not None or not by_material
+        require(is_stated, "frame.damping_ratio", value="material", allowed=allowed)
         return content.structure_of(number, loss)
 
     def motion(self, structure: Structure, studies: bool = True) -> None:
@@ -142,12 +142,12 @@ class Pipeline:
         longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest]
         try:
-            every = self.store.take_all(stages, self.executor)
+            outcomes = self.store.take_all(stages, self.executor)
         except ContradictionError as error:
             self.store.put_text("contradiction.csv", columns_text(error.table))
             raise
         for task in results.tasks:
-            data = every[f"envelope_{task.name}"]
+            data = outcomes[f"envelope_{task.name}"]
             envelope.require_tolerance(data, task, structure)
             results.envelopes[task.name] = data
 

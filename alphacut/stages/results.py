@@ -58,17 +58,17 @@ class Results:
     @property
     def stages(self) -> dict[str, StageResult]:
         """Every result by the name of its stage."""
-        every = {name: getattr(self, name) for name in NAMES}
-        every |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
-        return {name: data for name, data in every.items() if data is not None}
+        results = {name: getattr(self, name) for name in NAMES}
+        results |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
+        return {name: data for name, data in results.items() if data is not None}
 
     def document(self) -> Document:
         """Everything in numbers, for summary.json."""
-        every = {name: getattr(self, name) for name in NAMES}
-        numbers = {name: one.document for name, one in every.items() if one is not None}
+        results = {name: getattr(self, name) for name in NAMES}
+        numbers = {name: result.document for name, result in results.items() if result is not None}
         if self.structure is not None and self.structure.frame is not None:
             numbers["structure"] = sizes(self.structure, self.structure.frame)
-        of = {task.name: task for task in self.tasks}
+        tasks = {task.name: task for task in self.tasks}
         ratio = getattr(self.content.structure_section, "damping_ratio", None)
         if self.structure is not None and isinstance(ratio, MaterialDamping):
             numbers["damping"] = {
@@ -78,7 +78,8 @@ class Results:
             }
         if self.envelopes:
             numbers["envelopes"] = {
-                name: envelope.document(data, of[name].fuzzy) | {"drawn": list(of[name].figures)}
+                name: envelope.document(data, tasks[name].fuzzy)
+                | {"drawn": list(tasks[name].figures)}
                 for name, data in self.envelopes.items()
             }
         if self.suite is not None:
@@ -90,7 +91,7 @@ class Results:
 
 def sizes(structure: Structure, frame: StoreyFrame) -> Document:
     """Frequencies, weight in N, and the height in m of the storey of each drift."""
-    modal, omega = {x: of.modal for x, of in structure.numbers.items()}, frequencies(frame)
+    modal, omega = {x: number.modal for x, number in structure.numbers.items()}, frequencies(frame)
     drifts = [name for name in structure.outputs if name.startswith("drift")]
     heights = {name: modal.get(name.replace("drift", "l")) for name in drifts}
     return {

@@ -51,15 +51,15 @@ def compute_shares(
 
     They are of the lowest level: by result, then by input.
     """
-    each: Document = {}
+    shares: Document = {}
     if campaign is not None and len(campaign.inputs) > 1:
         cell = of_cell(campaign)
-        each = {x: _by_input(cell, cell.share[:, 0, k]) for k, x in enumerate(("E", "ν"))}
+        shares = {x: _by_input(cell, cell.share[:, 0, k]) for k, x in enumerate(("E", "ν"))}
     if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
         peak = of_peaks(structure.frame, structure, task)
         for column, name in enumerate(structure.outputs):
-            each[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
-    return StageResult(each)
+            shares[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
+    return StageResult(shares)
 
 
 def _by_input(shares: Shares, values: Array) -> dict[str, float]:
@@ -75,9 +75,9 @@ def of_cell(campaign: CellCampaign) -> Shares:
     propagation = replace(campaign, modulus=modulus).propagation
 
     def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
-        of = propagation(inputs, Reduced(), progress=False)
-        columns = [of.column(name) for name in OUTPUTS]
-        return of.lower[:, columns], of.upper[:, columns]
+        cell_bounds = propagation(inputs, Reduced(), progress=False)
+        columns = [cell_bounds.column(name) for name in OUTPUTS]
+        return cell_bounds.lower[:, columns], cell_bounds.upper[:, columns]
 
     return width_shares(bounds, campaign.inputs)
 
@@ -94,12 +94,12 @@ def of_peaks(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask)
         motion["interruptible"] = False
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
-            of = peaks(
+            peak_bounds = peaks(
                 frame.envelope(model, fuzzy, step=step, method=method, progress=False, **motion)
             )
         # what is reached is nearer the truth than a proved bound with a gap
-        proved = np.array([nature is Nature.GUARANTEED for nature in of.natures])
-        return of.lower[0], np.where(proved, of.reached[0], of.upper[0])
+        proved = np.array([nature is Nature.GUARANTEED for nature in peak_bounds.natures])
+        return peak_bounds.lower[0], np.where(proved, peak_bounds.reached[0], peak_bounds.upper[0])
 
     return width_shares(bounds, structure.inputs(task.fuzzy), groups=groups)
 

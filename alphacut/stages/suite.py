@@ -86,7 +86,7 @@ def suite(
 ) -> tuple[SuiteRecord, ...]:
     """The records of a suite, in the order of the case."""
     mode = nominal_mode(structure)
-    return tuple(_record(section, envelope, one, mode) for one in section.recordings)
+    return tuple(_record(section, envelope, recording, mode) for recording in section.recordings)
 
 
 def _record(
@@ -187,8 +187,8 @@ def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: N
     first = next(iter(peaks.values()))
     outputs = {
         name: {
-            "proved": statistics(np.stack([one.most(name).upper for one in peaks.values()])),
-            "reached": statistics(np.stack([one.most(name).lower for one in peaks.values()])),
+            "proved": statistics(np.stack([x.most(name).upper for x in peaks.values()])),
+            "reached": statistics(np.stack([x.most(name).lower for x in peaks.values()])),
         }
         for name in first.outputs
     }

@@ -17,7 +17,7 @@ CURE = "take it from the head of the file"
 def test_value_and_allowed_are_cut_and_never_the_cure():
     for value, allowed in (("v" * 9000, "a number"), ("v", "a" * 9000), ("v" * 9000, "a" * 9000)):
         error = RefusedError("key", value, allowed, CURE)
-        for message in (str(error), str(InputProblem.of(error))):
+        for message in (str(error), str(InputProblem.from_error(error))):
             assert len(message) <= 300
             assert message.endswith(CURE)
             assert message.startswith("key is v")
