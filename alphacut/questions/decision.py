@@ -11,7 +11,7 @@ from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, verdict
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.question import Motion, Question, Row, limit_words, peak_document
+from alphacut.questions.question import Motion, NumberRow, Question, Row, limit_words, peak_document
 
 
 def _document(name: str, answer: Passing, limits: dict[str, float], peaks: Peaks) -> Document:
@@ -93,6 +93,21 @@ class DecisionQuestion(Question):
             )
             for name, limit in document["limits"].items()
         ]
+
+    @staticmethod
+    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
+        """A row for each limit."""
+        head = ("limited output", "unit", "limit", "verdict", "from α", "nature")
+        head += ("least possibility", "greatest possibility", "least necessity")
+        head += ("greatest necessity", "least margin", "peak at most", "peak reached")
+        rows: list[NumberRow] = []
+        for name, limit in document["limits"].items():
+            peak = limit.get("peak") or {"proved": [None], "reached": [None]}
+            first = (name, limit["unit"], limit["limit"], limit["verdict"], limit["from_level"])
+            degrees = (*limit["possibility"], *limit["necessity"])
+            ends = (limit["margin"]["lower"][0], peak["proved"][0], peak["reached"][0])
+            rows.append((*first, limit["nature"], *degrees, *ends))
+        return head, rows
 
     @staticmethod
     def words(document: Document) -> str:

@@ -15,7 +15,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.quantity import between, engineering
-from alphacut.questions.question import Motion, Question, Row, limit_words
+from alphacut.questions.question import Motion, NumberRow, Question, Row, limit_words
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
@@ -96,6 +96,22 @@ class FragilityQuestion(Question):
             )
             for name, limit in document["limits"].items()
         ]
+
+    @staticmethod
+    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
+        """A row for each limit and level."""
+        measure = f"{document['measure']} [{document['unit']}]" if document["unit"] else "scale"
+        head = ("limited output", "unit", "limit", "α", f"least median {measure}")
+        head += (f"greatest median {measure}", "least dispersion", "greatest dispersion", "nature")
+        rows: list[NumberRow] = []
+        for name, limit in document["limits"].items():
+            spread = limit.get("dispersion")
+            for k, alpha in enumerate(document["alpha"]):
+                ends = [limit["median"][side][k] for side in ("lower", "upper")]
+                ends += [spread[side][k] if spread else None for side in ("lower", "upper")]
+                first = (name, limit["output_unit"], limit["limit"], alpha)
+                rows.append((*first, *ends, limit["nature"]))
+        return head, rows
 
     @staticmethod
     def words(document: Document) -> str:

@@ -16,7 +16,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.quantity import between
-from alphacut.questions.question import Motion, Question, Row, event_words
+from alphacut.questions.question import Motion, NumberRow, Question, Row, event_words
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
@@ -115,6 +115,24 @@ class ProbabilityQuestion(Question):
             )
             for name, event in document["events"].items()
         ]
+
+    @staticmethod
+    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
+        """A row for each limit and level."""
+        head = ("limited output", "unit", "limit", "α", "at least", "at most", "nature")
+        head += (
+            f"{CONFIDENCE:.0%} interval from",
+            f"{CONFIDENCE:.0%} interval to",
+            "between nodes",
+        )
+        rows: list[NumberRow] = []
+        for name, event in document["events"].items():
+            interval, first = event["interval"], (name, event["unit"], event["limit"])
+            for k, alpha in enumerate(document["alpha"]):
+                ends = (alpha, event["lower"][k], event["upper"][k], event["nature"])
+                outer = (interval["lower"][k], interval["upper"][k], event["error"][k])
+                rows.append((*first, *ends, *outer))
+        return head, rows
 
     @staticmethod
     def words(document: Document) -> str:

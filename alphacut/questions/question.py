@@ -90,6 +90,7 @@ class Motion:
 
 
 Row = tuple[str, ...]
+NumberRow = tuple[str | float | None, ...]
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,11 @@ class Question(ABC):
     @abstractmethod
     def rows(document: Document) -> list[Row]:
         """The answer as a table: what, answer, nature first."""
+
+    @staticmethod
+    @abstractmethod
+    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
+        """The answer as numbers in SI for CSV: titles with units, or with a column for them."""
 
     @staticmethod
     @abstractmethod

@@ -14,7 +14,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.question import PEAK_ERROR, Motion, Question, Row, peak_document
+from alphacut.questions.question import PEAK_ERROR, Motion, NumberRow, Question, Row, peak_document
 
 
 def _row(name: str, support: Document, document: Document) -> Row:
@@ -96,10 +96,23 @@ class TolerancesQuestion(Question):
             scale = f"up to {rounded(largest, 'upper', Nature.ATTAINED):.4g}"
         exceeded = f"exceeded at {passed:.4g}" if passed is not None else "none is exceeded"
         if passed is not None and document["clear"] is not None:
-            exceeded = f"none seen up to {document['clear']:.4g}, {exceeded}"
-        head = ("scale of all tolerances", f"{scale}, {exceeded}", document["nature"], "")
+            exceeded = f"no exceedance found up to {document['clear']:.4g}, {exceeded}"
+        head = ("scale of all ranges", scale, document["nature"], exceeded)
         supports = document["supports"].items()
         return [head, *(_row(name, support, document) for name, support in supports)]
+
+    @staticmethod
+    def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
+        """The scale, then the range of each input."""
+        head = ("quantity", "unit", "from", "to", "from in the case", "to in the case")
+        head += ("most plausible", "nature")
+        scale = (None, document["kept"], None, 1.0, None, document["nature"])
+        rows: list[NumberRow] = [("scale of all ranges", "", *scale)]
+        for name, support in document["supports"].items():
+            ends = (None, None) if document["kept"] is None else support["kept"]
+            unit, last = of_storey_frame(name).unit, (support["modal"], document["nature"])
+            rows.append((name, unit, *ends, *support["own"], *last))
+        return head, rows
 
     @staticmethod
     def words(document: Document) -> str:

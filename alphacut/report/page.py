@@ -22,6 +22,7 @@ from alphacut.io.problem import InputProblem
 from alphacut.questions.all import QUESTIONS
 from alphacut.report.results import (
     ANSWERS,
+    MEANING,
     Row,
     Table,
     answers,
@@ -147,7 +148,8 @@ class Page:
         summary = self.summary
         first = (material(summary), motion(summary), (ANSWERS, answers(summary)))
         remarks = [*natures(summary), *drivers(summary)]
-        yield "Key results", [*(("table", *shown) for shown in first), *_texts(remarks)]
+        meaning = [("text", f"{MEANING}.")]
+        yield "Key results", [*meaning, *(("table", *shown) for shown in first), *_texts(remarks)]
         for name, (title, table, drawn) in PARTS.items():
             if part := summary.get(name):
                 yield title, [*self._drawn(drawn), *self._part(name, part, table)]

@@ -15,6 +15,9 @@ Table = tuple[Row, list[Row]]
 """Titles of the columns, and the rows."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")
 ISOTROPIC = "Hashin–Shtrikman bounds of an isotropic E"
+MEANING = "Least … largest value if every input stays in its range; α = 1: most plausible"
+"""First line of all results, for readers who do not know α-cuts; "nominal" is α = 1."""
+TOLERANCE_TABLE = "table on the page and in tolerances.csv"
 ANSWERS = ("question", "answer", "nature")
 EXCEEDED = {
     "exceeded": "yes",
@@ -181,13 +184,15 @@ def natures(summary: Document) -> Iterator[str]:
 
 
 def answers(summary: Document) -> list[Row]:
-    """A row for each answer to a question: what, answer, nature."""
-    return [
-        (f"{question.key}: {row[0]}", *row[1:3])
-        for question in QUESTIONS
-        if question.key in summary
-        for row in question.rows(summary[question.key])
-    ]
+    """A row for each answer to a question: what, answer, nature; of tolerances the first two."""
+    rows: list[Row] = []
+    for question in QUESTIONS:
+        if question.key in summary:
+            found = question.rows(summary[question.key])
+            if question.key == "tolerances":
+                found = [found[0], ("ranges", f"of {len(found) - 1} inputs", TOLERANCE_TABLE)]
+            rows += [(f"{question.key}: {row[0]}", *row[1:3]) for row in found]
+    return rows
 
 
 def drivers(summary: Document) -> Iterator[str]:

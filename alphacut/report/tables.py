@@ -16,6 +16,7 @@ from alphacut.io.netcdf import dataset_of
 from alphacut.io.quantity import ends, engineering
 from alphacut.questions.all import QUESTIONS
 from alphacut.report.results import (
+    MEANING,
     Row,
     Table,
     answers,
@@ -41,7 +42,9 @@ def run_text(summary: Document) -> str:
     lines = [*natures(summary), *([learned["refuted"]] if "refuted" in learned else [])]
     lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(summary)]
     lines += drivers(summary)
-    return "".join(text_table(*table) for table in shown) + "".join(f"{line}\n" for line in lines)
+    first = f"{MEANING}\n" if shown else ""
+    texts = [text_table(*table) for table in shown]
+    return first + "".join(texts) + "".join(f"{line}\n" for line in lines)
 
 
 def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> list[Path]:
@@ -56,6 +59,10 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
         The files.
     """
     filled_tables = {name: table for name, table in tables(summary).items() if table[1]}
+    for question in QUESTIONS:
+        if question.key in summary:
+            head, rows = question.number_rows(summary[question.key])
+            filled_tables[question.key] = head, [tuple(map(_cell, row)) for row in rows]
     for name, study in summary.get("envelopes", {}).items():
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
@@ -91,6 +98,12 @@ def radius_map(part: Document) -> Table:
         for x, y in parameters.items()
     ]
     return ("parameter of the radius map", "least … modal … greatest"), rows
+
+
+def _cell(value: str | float | None) -> str:
+    if isinstance(value, str):
+        return value
+    return "" if value is None else repr(float(value))  # exact: a bound stays one
 
 
 def _number(value: float) -> str:
@@ -167,16 +180,13 @@ def records(part: Document) -> Table:
 
 
 def shares(part: Document) -> Table:
-    """Shares of the inputs in the width of each result, on the lowest level."""
-    inputs = dict.fromkeys(name for values in part.values() for name in values)
+    """Shares of the inputs in the width of each result, on the lowest level, largest first."""
     rows: list[Row] = [
-        (
-            name,
-            *(f"{values[name]:.3f}" if name in values else "" for values in part.values()),
-        )
-        for name in inputs
+        (quantity, name, f"{share:.3f}")
+        for quantity, values in part.items()
+        for name, share in sorted(values.items(), key=lambda pair: -pair[1])
     ]
-    return ("input", *(f"share of the width of {name}" for name in part)), rows
+    return ("width of", "input", "share"), rows
 
 
 MAKERS = {
