@@ -107,17 +107,17 @@ class ForceSection(Section):
     def amplitudes(self) -> dict[str, FuzzyNumber]:
         """Amplitude on each floor, in SI."""
         size = self.history.size
-        return {place: _scaled(number, size) for place, (number, _) in self.amplitude.items()}
+        return {unknown: _scaled(number, size) for unknown, (number, _) in self.amplitude.items()}
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
         """Refuses amplitudes of another unit."""
         require(bool(self.amplitude), "force.amplitude", value=None, allowed="one floor or more")
-        of, example = quantity.QUANTITIES[self.history.unit]
-        for place, (_, unit) in self.amplitude.items():
+        quantity_name, example = quantity.QUANTITIES[self.history.unit]
+        for unknown, (_, unit) in self.amplitude.items():
             fits, shown = unit == self.history.unit, unit or "a number"
-            key = f"force.amplitude.{place}"
-            require(fits, key, value=shown, allowed=f'{of}, as "{example}"')
+            key = f"force.amplitude.{unknown}"
+            require(fits, key, value=shown, allowed=f'{quantity_name}, as "{example}"')
         return self
 
 
@@ -141,15 +141,15 @@ def with_forces(
     if model is None:
         raise RefusedError("force", "on a pendulum", "beside [frame] or [matrices]")
     pairs = [
-        (place, number, section.history.history)
+        (unknown, number, section.history.history)
         for section in sections
-        for place, number in section.amplitudes.items()
+        for unknown, number in section.amplitudes.items()
     ]
     if isinstance(model, StoreyFrame):
         moved: StoreyFrame | MatrixStructure = _on_floors(model, pairs)
         names = moved.force_names  # type: ignore[union-attr]
     else:
-        names = tuple(f"F{place}" for place in range(1, len(pairs) + 1))
+        names = tuple(f"F{number}" for number in range(1, len(pairs) + 1))
         moved = _on_unknowns(model, pairs, names, unknowns)
     numbers = {name: number for name, (_, number, _) in zip(names, pairs, strict=True)}
     return Structure(moved, {**structure.numbers, **numbers})
@@ -160,18 +160,20 @@ Placed = Sequence[tuple[str, FuzzyNumber, History | None]]
 
 def _on_floors(model: StoreyFrame, pairs: Placed) -> StoreyFrame:
     floors = {str(floor): floor for floor in range(1, model.floors + 1)}
-    for place, _, _ in pairs:
-        chosen("force.amplitude", place, floors)
-    loads = [Force(floors[place], number.modal, course) for place, number, course in pairs]
+    for unknown, _, _ in pairs:
+        chosen("force.amplitude", unknown, floors)
+    loads = [Force(floors[unknown], number.modal, course) for unknown, number, course in pairs]
     return replace(model, loads=loads)
 
 
 def _on_unknowns(
     model: MatrixStructure, pairs: Placed, names: Sequence[str], unknowns: Sequence[str]
 ) -> MatrixStructure:
-    for place, _, _ in pairs:
-        chosen("force.amplitude", place, tuple(unknowns))
-    rows: list[Array] = [np.array([float(x == place) for x in unknowns]) for place, _, _ in pairs]
+    for unknown, _, _ in pairs:
+        chosen("force.amplitude", unknown, tuple(unknowns))
+    rows: list[Array] = [
+        np.array([float(x == unknown) for x in unknowns]) for unknown, _, _ in pairs
+    ]
     loads = [Force(row, name, x[2]) for row, name, x in zip(rows, names, pairs, strict=True)]
     modal: Mapping[str, float] = {name: x[1].modal for name, x in zip(names, pairs, strict=True)}
     return replace(model, loads=loads, parameters={**model.parameters, **modal})

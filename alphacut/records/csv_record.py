@@ -35,12 +35,12 @@ def read_csv_record(file: TextFile) -> Recording:
 
 def rows_of(file: TextFile) -> list[tuple[int, list[str]]]:
     """Lines from 0 that are neither empty nor comments, cut at the head's separator."""
-    lines = [(place, line) for place, line in enumerate(file.lines)]
-    lines = [(place, line) for place, line in lines if line.strip() and not line.startswith("#")]
+    lines = [(row, line) for row, line in enumerate(file.lines)]
+    lines = [(row, line) for row, line in lines if line.strip() and not line.startswith("#")]
     allowed = "a header with units, and rows of numbers below it"
     require(len(lines) > 1, file.name, value=f"{len(lines)} lines", allowed=allowed)
     separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    return [(place, cells_of(file.name, place + 1, line, separator)) for place, line in lines]
+    return [(row, cells_of(file.name, row + 1, line, separator)) for row, line in lines]
 
 
 def _units(file: TextFile, head: list[str]) -> tuple[float, str, float]:
@@ -62,7 +62,7 @@ def numbered_rows(file: TextFile, rows: Sequence[tuple[int, list[str]]]) -> Arra
     Raises:
         RefusedError: A cell is no finite number.
     """
-    return np.array([[_number(file, place, cells, k) for k in (0, 1)] for place, cells in rows])
+    return np.array([[_number(file, row, cells, k) for k in (0, 1)] for row, cells in rows])
 
 
 def _number(file: TextFile, row: int, cells: Sequence[str], column: int) -> float:

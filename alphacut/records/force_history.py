@@ -50,7 +50,7 @@ def read_force_history(path: Path) -> Series:
     except ValueError as error:
         raise file.refusal(0, ",".join(head)[:80], ALLOWED, str(error)) from None
     table = numbered_rows(file, rows)
-    step = even_step(file, of_time * table[:, 0], [place for place, _ in rows])
+    step = even_step(file, of_time * table[:, 0], [row for row, _ in rows])
     samples = np.asarray(size * table[:, 1])
     if not samples.any():
         raise file.refusal(0, "zeros throughout", "a force that moves something")

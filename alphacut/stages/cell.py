@@ -247,8 +247,8 @@ def document(result: HomogenisedStiffness) -> Document:
 
 def fibres(result: HomogenisedStiffness) -> Document:
     """Constants of fibres with their declared errors, moduli in GPa; none of other particles."""
-    of = result.cell
-    if isinstance(result, HomogenisedSpheres) or of is None or not of.square or of.interphase:
+    cell = result.cell
+    if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square or cell.interphase:
         return {}
     constants, fibres = fibre_constants(result), {}
     for name, value in constants.values.items():

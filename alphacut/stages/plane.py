@@ -46,10 +46,11 @@ def cut_tables(cuts: Mapping[str, Document]) -> Iterator[tuple[tuple[str, ...], 
     for definition, suffix in SUFFIXES.items():
         rows: list[Row] = []
         for name, (unit, _) in ABOUT.items():
-            of = cuts.get(name + suffix + ("_GPa" if unit == "Pa" else ""))
-            if of is not None:
+            cut_ends = cuts.get(name + suffix + ("_GPa" if unit == "Pa" else ""))
+            if cut_ends is not None:
                 ends = (
-                    between(of["lower"][k], of["upper"][k], Nature.ATTAINED, 5) for k in (0, -1)
+                    between(cut_ends["lower"][k], cut_ends["upper"][k], Nature.ATTAINED, 5)
+                    for k in (0, -1)
                 )
                 shown = name.replace("nu", "ν") + (", GPa" if unit == "Pa" else "")
                 rows.append((shown, *ends))

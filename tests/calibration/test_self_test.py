@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from alphacut.frame import StoreyFrame, envelope, propagation
-from alphacut.frame.structures.loads import Accelerogram, frequencies
+from alphacut.frame.structures.linear import frequencies
+from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Nature
