@@ -44,7 +44,9 @@ GRACE = 8
 """Parts that are bounded before the progress of a gap counts."""
 WIDE = 0.1
 """Gap of a peak, as a share of it, above which bounds are worth nothing elsewhere either. It is
-left where parts cannot halve all inputs that share in it."""
+left where parts are not expected to close it."""
+FALL = 3
+"""Power of the inputs' widths with which gaps fall at least; remainders are of fourth degree."""
 NAMED = 3
 """Inputs that are named with their shares in a gap."""
 OWN_WORK = 0.5
@@ -349,7 +351,8 @@ class Queue:
         even = (begun - self.gap[output]) * count / most
         if count >= GRACE and gap > begun - MIN_PROGRESS * even:
             return True
-        return count > most or (gap > WIDE * self.peak[output] and not can_be_halved(shares, most))
+        after = gap * 2.0 ** (-FALL * halvings(shares, most))
+        return count > most or (gap > WIDE * self.peak[output] and after > 2 * self.gap[output])
 
     def notes(self, outer: Array, inner: Array) -> Iterator[str]:
         """Lines on an interruption, and on the inputs to narrow where a gap of a peak is left."""
@@ -393,9 +396,9 @@ def _peaks(above: Mask) -> list[tuple[int, int]]:
     return [(int(output), int(side)) for output, side in np.argwhere(above.any(0))]
 
 
-def can_be_halved(shares: Array, parts: int) -> bool:
-    """Tells whether so many parts can halve all inputs among which a gap is shared, (n,)."""
-    return not shares.any() or 1 / float((shares**2).sum()) <= np.log2(parts)
+def halvings(shares: Array, parts: int) -> float:
+    """How often so many parts can halve all inputs among which a gap is shared, (n,)."""
+    return float(np.log2(parts) * (shares**2).sum()) if shares.any() else 1.0
 
 
 def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> Envelope:

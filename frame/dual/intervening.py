@@ -25,7 +25,7 @@ from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.waves import Grid
 from alphacut.fuzzy.arrays import Array, Rows
 
-MAX_PAIRS = 700_000
+MAX_PAIRS = 100_000
 """Pairs of coefficients in a product of two polynomials at most; a pair takes 3 ns."""
 DEGREES = (4, 6)
 """Least and greatest degree of shares, before what is above the third is left to the rest."""

@@ -18,7 +18,7 @@ from alphacut.fuzzy.arrays import Array, Mask, Rows
 
 REFINED = 8
 """Rounds that improve bounds of single entries by those of the others."""
-CORNERS = 12
+CORNERS = 10
 """Inputs whose signs are all tried together."""
 SMALL = 0.1
 """Norm of linear terms, as a share of what they are taken from, up to which signs are not tried."""

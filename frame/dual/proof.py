@@ -37,7 +37,7 @@ from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.pruning import prune_ends, remainder
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
-from alphacut.frame.parts import WIDE, can_be_halved, prove
+from alphacut.frame.parts import WIDE, halvings, prove
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
@@ -234,7 +234,7 @@ class _Bounding:
             problem.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
             node, shares = int(problem.out[1].argmax()), np.zeros(len(self.box.low))
             least, shares[self.box.active] = remainder(problem, node)
-            if least > WIDE * self.goal.peak[o] and can_be_halved(shares, self.proof.parts):
+            if least > WIDE * self.goal.peak[o] and halvings(shares, self.proof.parts) >= 1:
                 what = f"the remainders of the modes are {least / self.goal.peak[o]:.2g} of a peak"
                 raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
 

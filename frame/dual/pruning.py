@@ -14,8 +14,8 @@ from alphacut.frame.dual.level import Level, Problem
 from alphacut.frame.dual.slabs import sensitivities
 from alphacut.fuzzy.arrays import Array, Rows
 
-ENDS = (0.5, 0.25)
-"""Shares of an input's range that are tried."""
+ENDS = (0.25, 0.5)
+"""Shares of an input's range that are tried, the second where the first can be pruned."""
 EFFORTS = (1, 24)
 """Slabs of a bound over an end."""
 STEPS = 40
@@ -43,15 +43,14 @@ def prune_ends(
     for slabs in EFFORTS:
         for i in range(len(best)):
             away = int(best[i] <= 0)  # the upper end lies away from a best input that is low
-            for share in ENDS:
-                if high[i] - low[i] < 2.0:
-                    break
+            for share in ENDS if high[i] - low[i] == 2.0 else ():
                 piece = low.copy(), high.copy()
                 piece[1 - away][i] = end = (1 - 2 * share) * (1 if away else -1)
                 bounds = _over_piece(level, problem, place, above, piece, slabs)
-                if bounds.max() <= problem.attained + problem.enough:
-                    pruned = np.maximum(pruned, bounds)
-                    (high if away else low)[i] = end
+                if bounds.max() > problem.attained + problem.enough:
+                    break
+                pruned = np.maximum(pruned, bounds)
+                (high if away else low)[i] = end
     return low, high, pruned
 
 

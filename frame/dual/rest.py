@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.monomials import convolve, matmul
+from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.dual.clusters import Subspaces
 from alphacut.frame.dual.intervening import BlockShares, Ends, damped_range, dots
@@ -184,7 +185,10 @@ def _inverse_form(
 
 
 def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Array]:
-    """Series of rows A⁻¹, and a bound of what they times A leave of the rows."""
+    """Series of rows A⁻¹, and a bound of what they times A leave of the rows.
+
+    Up to the order of the series that is rounding alone.
+    """
     middle, parts = np.diag(matrix.value), list[Array]()
     for degree in range(matrix.order + 1):
         known = rows.part(degree)
@@ -193,7 +197,19 @@ def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Ar
             known = known - convolve(parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul)
         parts.append(known / middle)
     found = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
-    return found, (found @ matrix - rows).size()
+    missed = rows.rest + found.size() @ matrix.rest
+    for degree, size in enumerate(rows.sizes()):
+        missed = missed + gamma(_terms(matrix, degree)) * size
+    for i, size in enumerate(found.sizes()):
+        for k, factor in enumerate(matrix.sizes()):
+            beyond = i + k > matrix.order
+            missed = missed + (1.0 if beyond else gamma(_terms(matrix, i + k))) * (size @ factor)
+    return found, missed * (1 + gamma(matrix.order**2 + 4 * len(middle)))
+
+
+def _terms(matrix: TaylorModel, degree: int) -> int:
+    """Roundings of a coefficient of rows A⁻¹, with the division by its middle."""
+    return len(matrix.rest) * 2**degree + degree + 4
 
 
 def _of_block(of_block: BlockShares) -> _Sums:

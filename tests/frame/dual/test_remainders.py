@@ -14,6 +14,7 @@ from alphacut.frame.dual import dual_function
 from alphacut.frame.dual.box import over_box
 from alphacut.frame.dual.clusters import centred, subspaces
 from alphacut.frame.dual.level import Level, Problem
+from alphacut.frame.dual.rest import _inverse_form
 from alphacut.frame.dual.structure import classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.loads import Accelerogram
@@ -306,3 +307,30 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
             assert (off <= wide.stray[1:] + 1e-13).all()
             assert (off > TIGHT * wide.stray[1:]).any()
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_forms_of_inverses_stay_within_their_rests(order):
+    rng, d, n, shares = np.random.default_rng(order), 3, 4, []
+    matrices = rng.normal(size=(d, n, n))
+    A = TaylorModel(
+        (np.diag([1.0, 2, 3, 5])[None], 0.03 * (matrices + matrices.swapaxes(1, 2))),
+        np.zeros((n, n)),
+        d,
+        order,
+    )
+    left, right = (
+        TaylorModel(
+            (rng.normal(size=(1, m, n)), 0.1 * rng.normal(size=(d, m, n))),
+            np.zeros((m, n)),
+            d,
+            order,
+        )
+        for m in (2, 3)
+    )
+    found = _inverse_form(A, left, right, 0.5)
+    for u in rng.uniform(-1, 1, (300, d)):
+        (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
+        off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
+        shares.append((off / found.rest).max())
+    assert 3e-3 <= max(shares) <= 1
