@@ -74,9 +74,9 @@ class Content(Section):
 
     @property
     def limited_outputs(self) -> tuple[str, ...]:
-        """Outputs whose peaks questions compare with limits, each once."""
+        """Peaks that questions compare with limits, each once, such as q3 and max q3."""
         sections = (section for section in self.questions.values() if section.reads_peaks)
-        return tuple(dict.fromkeys(limit.output for x in sections for limit in x.limits))
+        return tuple(dict.fromkeys(limit.peak for x in sections for limit in x.limits))
 
     @property
     def picture(self) -> ImageCell | None:

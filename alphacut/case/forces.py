@@ -152,7 +152,7 @@ def with_forces(
         names = tuple(f"F{number}" for number in range(1, len(pairs) + 1))
         moved = _on_unknowns(model, pairs, names, unknowns)
     numbers = {name: number for name, (_, number, _) in zip(names, pairs, strict=True)}
-    return Structure(moved, {**structure.numbers, **numbers})
+    return replace(structure, model=moved, numbers={**structure.numbers, **numbers})
 
 
 Placed = Sequence[tuple[str, FuzzyNumber, History | None]]

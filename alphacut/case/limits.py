@@ -1,6 +1,7 @@
 """Limits of outputs, and the sections of the questions that are about them.
 
-A limit is a text such as "drift1 <= 40 mm", "drift1 <= 0.5 %", "q3 <= 80 mm".
+A limit is a text such as "drift1 <= 40 mm" or "drift1 <= 0.5 %" of the magnitude, "max q3 <= 80 mm"
+or "min q3 >= -60 mm" of one side.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pydantic import Field, PlainValidator
 
 from alphacut.case.structure import Structure
 from alphacut.case.types import Quantity, Section, Some
+from alphacut.frame.questions.peaks import output_of
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
@@ -21,51 +23,66 @@ from alphacut.io import quantity
 
 @dataclass(frozen=True)
 class Limit:
-    """Largest magnitude allowed of an output.
+    """Largest magnitude allowed of an output, or its greatest or least value.
 
     Args:
-        output: Of the structure.
-        value: In the SI unit of the output, or as a share of the storey's height.
+        peak: The output, or "max" or "min" and the output.
+        value: In the SI unit of the output, or as a share of the storey's height; of a least value
+            its negative, which the negative of the output must not pass.
         share: Whether it is such a share.
         text: The limit as the user wrote it.
     """
 
-    output: str
+    peak: str
     value: float
     share: bool
     text: str
 
+    @property
+    def output(self) -> str:
+        """The output of the structure."""
+        return output_of(self.peak)
+
     def si(self, structure: Structure, key: str) -> float:
-        """Limit in the SI unit of its output.
+        """Limit in the SI unit of its output; a share of a fuzzy height is one of the least.
 
         Raises:
             RefusedError: The structure has no height of the storey.
         """
-        number = structure.numbers.get(self.output.replace("drift", "l"))
-        if self.share and number is None:
-            raise RefusedError(
-                key, self.text, "a storey of the frame, whose length the share is of"
-            )
-        return self.value * number.modal if self.share and number else self.value
+        if not self.share:
+            return self.value
+        height = structure.heights.get(self.output)
+        if height is None:
+            raise RefusedError(key, self.text, "a drift of a storey whose length frame.lengths has")
+        return self.value * height.support.lower
 
 
 def parse_limit(value: object) -> Limit:
     """Limit that a text such as "drift1 <= 40 mm" states.
 
     Raises:
-        RefusedError: The text is no output, "<=" and a positive quantity.
+        RefusedError: The text is no output, a comparison and a quantity, which is positive for a
+            magnitude.
     """
-    name, separator, text = (part.strip() for part in str(value).partition("<="))
-    allowed = "an output, <= and a quantity, as 'drift1 <= 40 mm' or 'drift1 <= 0.5 %'"
+    match = re.fullmatch(r"((?:max |min )?)(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
+    allowed = "'drift1 <= 40 mm', 'drift1 <= 0.5 %', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
+    if match is None or (match[3] == ">=") != (match[1] == "min "):
+        raise RefusedError("", value, allowed)
+    side, name, _, text = match.groups()
     share = name.startswith("drift") and text.endswith("%")
-    number, cure = 0.0, ""
     try:
-        number = quantity.number(text, "" if share else Output(name).unit)
-    except (ValueError, KeyError) as error:
-        cure = str(error) if separator else ""
-    is_limit = bool(separator) and re.fullmatch(r"\w+", name) is not None and number > 0
-    require(is_limit, "", value=value, allowed=allowed, cure=cure)
-    return Limit(name, number, share, str(value))
+        number = _number(text, "" if share else Output(name).unit)
+    except ValueError as error:
+        raise RefusedError("", value, allowed, str(error)) from None
+    require(number > 0 or bool(side), "", value=value, allowed=allowed)
+    return Limit(f"{side}{name}", -number if side == "min " else number, share, str(value))
+
+
+def _number(text: str, unit: str) -> float:
+    """A quantity in an SI unit, or in its own where the output's is not known here."""
+    if unit != "SI":
+        return quantity.number(text, unit)
+    return float(quantity.fuzzy_of_any_unit(text).modal)
 
 
 AnyLimit = Annotated[Limit, PlainValidator(parse_limit, json_schema_input_type=str)]
@@ -81,22 +98,46 @@ class QuestionSection(Section):
 
     key: ClassVar[str]
     reads_peaks: ClassVar[bool] = False
-    limits: Limits = Field(description="limits of outputs, 'drift1 <= 0.5 %', 'a3 <= 2 m/s^2'")
+    limits: Limits = Field(
+        description="limits of outputs, 'drift1 <= 0.5 %', 'max q3 <= 80 mm', 'min q3 >= -60 mm'"
+    )
+
+    @property
+    def named(self) -> dict[str, Limit]:
+        """Limits by the peak that they are of, or by their text where it has several."""
+        peaks = [limit.peak for limit in self.limits]
+        return {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in self.limits}
 
     def in_si(self, structure: Structure) -> dict[str, float]:
-        """The limit of each output in its SI unit.
+        """The limits by their names, in SI units.
 
         Raises:
-            RefusedError: The structure has no such output, or an output has two limits.
+            RefusedError: The structure has no such output, or a limit stands there twice.
         """
         key = f"{self.key}.limits"
-        values = {limit.output: limit.si(structure, key) for limit in self.limits}
-        structure.observing(key, tuple(values))
+        values = {name: limit.si(structure, key) for name, limit in self.named.items()}
+        structure.observing(key, tuple(dict.fromkeys(limit.output for limit in self.limits)))
         texts = ", ".join(limit.text for limit in self.limits)
-        require(
-            len(values) == len(self.limits), key, value=texts, allowed="one limit for each output"
-        )
+        once = len(values) == len(self.limits)
+        require(once, key, value=texts, allowed="each limit once")
         return values
+
+    def shown(self, name: str, structure: Structure) -> dict[str, str]:
+        """Peak and unit of a limit, for people; the name alone of several limits together."""
+        limit = self.named.get(name)
+        unit = "" if limit is None else structure.unit(limit.output)
+        return {"output": name if limit is None else limit.peak, "unit": unit}
+
+    def require_magnitudes(self) -> None:
+        """Refuses limits of one side, and several of an output.
+
+        Raises:
+            RefusedError: There are some.
+        """
+        alone = all(name == limit.output for name, limit in self.named.items())
+        texts = ", ".join(limit.text for limit in self.limits)
+        allowed = "one limit of the magnitude for each output"
+        require(alone, f"{self.key}.limits", value=texts, allowed=allowed)
 
     def check(self, structure: Structure) -> None:
         """Refuses what the structure does not have.
@@ -133,6 +174,7 @@ class ProbabilitySection(QuestionSection):
             RefusedError: It has no such output or input.
         """
         super().check(structure)
+        self.require_magnitudes()
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
 
@@ -145,6 +187,15 @@ class TolerancesSection(QuestionSection):
     most: Annotated[float, Quantity(above=0, most=100)] = Field(
         default=2.0, description="largest scale that is tried; 1 is that of the case"
     )
+
+    def check(self, structure: Structure) -> None:
+        """Refuses limits that the structure does not have, or of one side.
+
+        Raises:
+            RefusedError: There is one.
+        """
+        super().check(structure)
+        self.require_magnitudes()
 
 
 class FragilitySection(QuestionSection):
@@ -174,3 +225,7 @@ class FragilitySection(QuestionSection):
         moves = moves or bool(structure.linear and structure.linear.loads)
         allowed = "linear structures that start at rest, without forces: they scale with records"
         require(not moves, "fragility", value="of another motion", allowed=allowed)
+        for limit in self.limits:
+            positive = limit.value > 0
+            allowed = "limits that the structure at rest keeps"
+            require(positive, "fragility.limits", value=limit.text, allowed=allowed)

@@ -85,11 +85,10 @@ class MatricesSection(Section):
     stiffness: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of K")
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
     damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
-    direction: str = Field(
-        default="", description="direction of the ground: it moves all unknowns NODE.DIRECTION"
-    )
-    pattern: dict[str, float] | None = Field(
-        default=None, description="how unknowns move with the ground, in place of direction"
+    direction: str | dict[str, float] = Field(
+        default="",
+        description="direction of the ground: it moves all unknowns NODE.DIRECTION; or how it "
+        "moves each, by unknown",
     )
     accelerogram: Annotated[Accelerogram, text(read_accelerogram)] | None = Field(
         default=None, description="file of the ground's acceleration; motion is relative to it"
@@ -180,8 +179,8 @@ class MatricesSection(Section):
         return vector
 
     def _pattern(self) -> Array:
-        if self.pattern is not None:
-            return self._vector("pattern", self.pattern)
+        if isinstance(self.direction, dict):
+            return self._vector("direction", self.direction)
         ends = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
         return np.array(ends)
 
@@ -205,6 +204,6 @@ class MatricesSection(Section):
     def require_pattern(self) -> None:
         """Refuses a structure that the ground does not move."""
         ends = sorted({name.rpartition(".")[2] for name in self.unknowns})
-        allowed = f"one of {', '.join(ends[:8])}, or pattern"
+        allowed = f"one of {', '.join(ends[:8])}, or a table by unknown"
         moved = bool(self._pattern().any())
         require(moved, "matrices.direction", self.direction or None, allowed)

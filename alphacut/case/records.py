@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from alphacut.case.types import OneOrMany, Section, Some, Time, text
+from alphacut.case.types import OneOrMany, Section, Some, text
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.records.read import read_recording
@@ -93,7 +93,8 @@ Files = Annotated[tuple[NamedRecording, ...], text(_files)]
 class RecordsSection(Section):
     """Suite of records of the ground's acceleration: each moves the structure by itself.
 
-    Each record is corrected, then trimmed, then scaled.
+    Each record is corrected, then trimmed, then scaled. A motion lasts as long as its record and
+    five natural periods, and at most envelope.duration.
     """
 
     files: Annotated[tuple[Files, ...], OneOrMany, Some] = Field(
@@ -105,9 +106,6 @@ class RecordsSection(Section):
     )
     scale: Annotated[Scale, text(_scale)] = Field(
         default=Scale(), description='factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g"'
-    )
-    longest: Time | None = Field(
-        default=None, description="longest motion; else each record and five natural periods"
     )
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
@@ -14,6 +14,7 @@ from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame
 from alphacut.frame.dynamics.flow import Flow
 from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.structures.lagrangian import LagrangianSystem, pendulum
+from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.arrays import Array
@@ -110,10 +111,12 @@ class Structure:
     Args:
         model: The model at modal values.
         numbers: Every parameter, crisp or fuzzy, in SI.
+        heights: Height of the storey of each drift of a frame that has lengths, in m.
     """
 
     model: StoreyFrame | MatrixStructure | LagrangianSystem
     numbers: Mapping[str, FuzzyNumber]
+    heights: Mapping[str, FuzzyNumber] = field(default_factory=dict)
 
     @property
     def frame(self) -> StoreyFrame | None:
@@ -124,6 +127,11 @@ class Structure:
     def outputs(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
         return self.model.outputs
+
+    def unit(self, output: str) -> str:
+        """SI unit of an output."""
+        units = {str(name): Output(name).unit for name in self.outputs}
+        return units.get(output) or Output(output).unit
 
     def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
         """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.
@@ -290,7 +298,11 @@ class Frame(Section):
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
         numbers = self._numbers(number, ratio)
-        return Structure(model, {name: numbers[name] for name in model.parameters})
+        heights = {
+            f"drift{storey}": height
+            for storey, height in enumerate(self.per_floor(self.lengths), start=1)
+        }
+        return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
     def _model(self, modulus: FuzzyNumber | None, ratio: FuzzyNumber | None) -> StoreyFrame:
         return StoreyFrame(

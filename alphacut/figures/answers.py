@@ -29,7 +29,8 @@ def draw_decision(document: Document) -> Figure:
     heights = np.arange(len(limits))[::-1]
     for height, limit in zip(heights, limits.values(), strict=True):
         margins = (np.asarray(limit["margin"][side], float) for side in ("upper", "lower"))
-        low, high = (1 - margin / limit["limit"] for margin in margins)
+        size = max(abs(limit["limit"]), 1e-300)
+        low, high = (1 - margin / size for margin in margins)
         for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
             bar: Look = {"left": left, "height": 0.66 - 0.4 * level, "color": shade, "lw": 0}
             axes.barh(height, right - left, **bar)
@@ -41,7 +42,8 @@ def draw_decision(document: Document) -> Figure:
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.axvline(0.0, color=GREY, lw=0.4)
     axes.set_ylim(-0.5, len(limits) - 0.2)
-    axes.set_yticks(heights, list(limits), color=INK)
+    words = [limit_words(x["output"], x["limit"], x["unit"]) for x in limits.values()]
+    axes.set_yticks(heights, words, color=INK)
     axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
     return drawn
 
@@ -96,7 +98,7 @@ def draw_tolerances(document: Document) -> Figure:
 
 def draw_fragility(document: Document) -> Figure:
     """Band of the share of records over the measure, for the last limit, by level."""
-    name, limit = list(document["limits"].items())[-1]
+    limit = list(document["limits"].values())[-1]
     alpha = np.asarray(document["alpha"], float)
     measure = np.asarray(limit["measure"], float)
     lower, upper = (np.asarray(limit["band"][end], float) for end in ("lower", "upper"))
@@ -107,7 +109,7 @@ def draw_fragility(document: Document) -> Figure:
         axes.step(measure, end, color=INK, lw=1, where="post")
     for end in limit.get("confidence", {}).values():
         axes.plot(measure, np.asarray(end, float)[0], color=BLUE, lw=0.9, ls="--")
-    words = limit_words(name, limit["limit"], limit["output_unit"])
+    words = limit_words(limit["output"], limit["limit"], limit["output_unit"])
     axes.set_title(words, loc="left", fontsize=10)
     style.prefix_axis(axes, document["measure"], document["unit"], across=True)
     axes.set_ylabel("share of records that exceed it")

@@ -33,6 +33,7 @@ QUANTITIES = {
     "N/m": ("stiffness", "30 kN/m"),
     "N": ("force", "0.02 N"),
     "N*s": ("impulse", "0.3 kN s"),
+    "N*m": ("moment", "12 kN m"),
     "1/s": ("rate", "0.05 1/s"),
     "rad": ("angle", "1.5 rad"),
     "rad/s": ("angular velocity", "0.1 rad/s"),

@@ -8,19 +8,17 @@ import numpy as np
 
 from alphacut.case.limits import DecisionSection
 from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, verdict_words
-from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
 from alphacut.questions.question import Motion, NumberRow, Question, Row, limit_words, peak_document
 
 
-def _document(name: str, answer: Passing, limits: dict[str, float], peaks: Peaks) -> Document:
+def _document(name: str, answer: Passing, limit: float, peaks: Peaks) -> Document:
     """Degrees and margins of a limit, and on each level the greatest peak, proved and reached."""
     peak = {} if name == ANY else peak_document(peaks, name) | {"proved": peaks.most(name).upper}
     return {
         "peak": peak,
-        "limit": limits.get(name, 1.0),
-        "unit": "" if name == ANY else Output(name).unit,
+        "limit": limit,
         "possibility": answer.possibility,
         "necessity": answer.necessity,
         "margin": {"lower": answer.margin[:, 0], "upper": answer.margin[:, 1]},
@@ -50,7 +48,7 @@ def _peak(limit: Document) -> Row:
     proved, reached = limit["peak"]["proved"][0], limit["peak"]["reached"][0]
     if proved is None or not np.isfinite(proved):
         return ("not known", engineering(reached, limit["unit"]), "")
-    gap = f"{(proved - reached) / proved:.1%}" if proved > 0 else ""
+    gap = f"{(proved - reached) / abs(proved):.1%}" if proved else ""
     return (*(engineering(peak, limit["unit"]) for peak in (proved, reached)), gap)
 
 
@@ -71,10 +69,12 @@ class DecisionQuestion(Question):
         """Degrees and margins of every limit, from the peaks of the limited outputs."""
         assert motion.peaks is not None
         limits = self.section.in_si(motion.structure)
-        peaks = motion.peaks
+        peaks = motion.peaks.named({name: x.peak for name, x in self.section.named.items()})
         answers = passing(peaks, limits)
         documents = {
-            name: _document(name, answer, limits, peaks) for name, answer in answers.items()
+            name: _document(name, answer, limits.get(name, 1.0), peaks)
+            | self.section.shown(name, motion.structure)
+            for name, answer in answers.items()
         }
         return {"alpha": motion.alpha, "step": motion.step, "limits": documents}
 
@@ -83,7 +83,7 @@ class DecisionQuestion(Question):
         """A row for each limit."""
         return [
             (
-                limit_words(name, limit["limit"], limit["unit"]),
+                limit_words(limit["output"], limit["limit"], limit["unit"]),
                 verdict_words(limit["verdict"], limit["from_level"]),
                 limit["nature"],
                 degree(limit["possibility"]),
@@ -91,7 +91,7 @@ class DecisionQuestion(Question):
                 _least_margin(limit),
                 *_peak(limit),
             )
-            for name, limit in document["limits"].items()
+            for limit in document["limits"].values()
         ]
 
     @staticmethod

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.case.limits import FragilitySection
+from alphacut.case.structure import Structure
 from alphacut.frame.questions.fragility import CriticalMeasures, any_limit
 from alphacut.frame.questions.peaks import ANY
-from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
@@ -42,7 +42,8 @@ class FragilityQuestion(Question):
         )
         assert motion.suite is not None
         limits = self.section.in_si(motion.structure)
-        peaks = list(motion.suite.peaks.values())
+        names = {name: limit.peak for name, limit in self.section.named.items()}
+        peaks = [x.named(names) for x in motion.suite.peaks.values()]
         measures = [sizes[self.section.measure] for sizes in motion.suite.measures.values()]
         critical = {
             name: CriticalMeasures.of(peaks, measures, name, limit)
@@ -62,10 +63,14 @@ class FragilityQuestion(Question):
             "limits": {
                 name: self._document(measures_of_limit)
                 | {"limit": limits.get(name, 1.0), "nature": str(natures[name])}
-                | {"output_unit": "" if name == ANY else Output(name).unit}
+                | self._shown(name, motion.structure)
                 for name, measures_of_limit in critical.items()
             },
         }
+
+    def _shown(self, name: str, structure: Structure) -> Document:
+        shown = self.section.shown(name, structure)
+        return {"output": shown["output"], "output_unit": shown["unit"]}
 
     def _document(self, critical: CriticalMeasures) -> Document:
         """Numbers of one limit; of α-levels first, then of records or measures."""
@@ -88,13 +93,13 @@ class FragilityQuestion(Question):
         """A row for each limit."""
         return [
             (
-                limit_words(name, limit["limit"], limit["output_unit"]),
+                limit_words(limit["output"], limit["limit"], limit["output_unit"]),
                 _range(limit["median"], 0, document["unit"]),
                 limit["nature"],
                 _range(limit.get("dispersion"), 0, ""),
                 _range(limit["median"], -1, document["unit"]),
             )
-            for name, limit in document["limits"].items()
+            for limit in document["limits"].values()
         ]
 
     @staticmethod

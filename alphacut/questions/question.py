@@ -23,9 +23,14 @@ PEAK_ERROR = 5e-3
 """Error of the peaks of limited outputs that is aimed at, as a share of each."""
 
 
-def limit_words(output: str, limit: float, unit: str) -> str:
+def limit_words(peak: str, limit: float, unit: str) -> str:
     """A limit for people: "|drift1| ≤ 40.00 mm"; the name of several where it has no unit."""
-    return f"|{output}| ≤ {engineering(limit, unit)}" if unit else output
+    if not unit:
+        return peak
+    if peak.startswith("min "):
+        return f"{peak} ≥ {engineering(-limit, unit)}"
+    shown = peak if peak.startswith("max ") else f"|{peak}|"
+    return f"{shown} ≤ {engineering(limit, unit)}"
 
 
 def event_words(output: str, limit: float, unit: str) -> str:

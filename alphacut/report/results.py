@@ -159,12 +159,16 @@ def scales(output: str, peak: Document, structure: Document) -> Iterator[tuple[s
 
 
 def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
-    """Limit in SI of each output that a question names, and the verdict on it, or no text."""
+    """Least limit in SI of each peak that a question names, and the verdict on it, or no text."""
     limits: dict[str, tuple[float, str]] = {}
+    strict: dict[str, float] = {}
     for key, inner in (("tolerances", "limits"), ("probability", "events"), ("decision", "limits")):
-        for output, entry in summary.get(key, {}).get(inner, {}).items():
+        for name, entry in summary.get(key, {}).get(inner, {}).items():
             answer = entry if isinstance(entry, Mapping) else {"limit": entry}
-            limits[output] = answer["limit"], answer.get("verdict", "")
+            output, value = answer.get("output", name), answer["limit"]
+            if key != "decision" or output not in strict or value < strict[output]:
+                limits[output] = value, answer.get("verdict", "")
+                strict |= {output: value} if key == "decision" else {}
     return limits
 
 

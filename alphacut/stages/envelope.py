@@ -12,7 +12,7 @@ import numpy as np
 from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.peaks import Peaks, peaks, tightest
+from alphacut.frame.questions.peaks import Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
@@ -82,7 +82,8 @@ class EnvelopeTask:
             RefusedError: The structure or the method does not take these values.
         """
         result = self.envelope_of(structure, work.tick)
-        of_envelope = peaks(result)
+        signed = [name for name in self.limited if name != output_of(name)]
+        of_envelope = peaks(result, [*map(str, result.outputs), *signed])
         if not has_close(of_envelope, self.limited):
             of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
         return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
@@ -113,7 +114,7 @@ class EnvelopeTask:
         """Peaks of the limited outputs by the method that bounds peaks most closely."""
         return peaks(
             frame.envelope(
-                structure.observing("limits", self.limited),
+                structure.observing("limits", outputs_of(self.limited)),
                 structure.inputs(self.fuzzy),
                 duration=self.duration,
                 step=self.section.step,
@@ -122,8 +123,14 @@ class EnvelopeTask:
                 relative=True,
                 interruptible=False,
                 progress=work.tick or False,
-            )
+            ),
+            self.limited,
         )
+
+
+def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
+    """Outputs of some peaks, each once."""
+    return tuple(dict.fromkeys(map(output_of, peaks)))
 
 
 def has_close(peaks: Peaks, outputs: Sequence[str]) -> bool:
@@ -133,7 +140,7 @@ def has_close(peaks: Peaks, outputs: Sequence[str]) -> bool:
     columns = [peaks.outputs.index(output) for output in outputs]
     proved = all(peaks.natures[column] is Nature.GUARANTEED for column in columns)
     upper, reached = peaks.upper[:, columns], peaks.reached[:, columns]
-    return proved and bool((upper - reached <= PEAK_ERROR * upper).all())
+    return proved and bool((upper - reached <= PEAK_ERROR * np.abs(upper)).all())
 
 
 def compute_close_peaks(task: EnvelopeTask, structure: Structure, work: Work) -> StageResult:

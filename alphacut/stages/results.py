@@ -91,12 +91,10 @@ class Results:
 
 def sizes(structure: Structure, frame: StoreyFrame) -> Document:
     """Frequencies, weight in N, and the height in m of the storey of each drift."""
-    modal, omega = {x: number.modal for x, number in structure.numbers.items()}, frequencies(frame)
-    drifts = [name for name in structure.outputs if name.startswith("drift")]
-    heights = {name: modal.get(name.replace("drift", "l")) for name in drifts}
+    omega, drifts = frequencies(frame), set(structure.outputs)
     return {
         "omega_rad_per_s": omega,
         "period_s": 2 * np.pi / omega[0],
         "weight_N": sum(frame.masses) * float(STANDARD_GRAVITY),
-        "heights_m": {name: height for name, height in heights.items() if height},
+        "heights_m": {x: of.modal for x, of in structure.heights.items() if x in drifts},
     }

@@ -109,10 +109,9 @@ def _record(
     factor = wanted.value / size
     length = (len(ground.acceleration) - 1) * ground.step
     duration = length + FREE_PERIODS * mode.period
-    if section.longest is not None:
-        duration = min(section.longest, duration)
+    duration = min(envelope.duration, duration)
     steps = max(1, ceil(duration / envelope.step - 1e-9))
-    envelope.require_steps(f"records.longest of {named.name}", steps * envelope.step)
+    envelope.require_steps(f"envelope.duration of {named.name}", steps * envelope.step)
     shares = arias_shares(ground.acceleration, ground.step)
     end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
     scaled = Accelerogram(ground.step, factor * ground.acceleration)

@@ -73,7 +73,9 @@ class CriticalMeasures:
         size = np.asarray(measures)[:, None] * limit
         with np.errstate(divide="ignore"):
             low, reached, inner, high = (
-                size / np.array([row[k] for row in ends]) for k in range(4)
+                # what starts at rest has no negative peak
+                size / np.maximum([row[k] for row in ends], 0.0)
+                for k in range(4)
             )
         # the structure that reaches the greatest peak known is one of the cut
         return cls(low, reached, np.maximum(inner, reached), high)

@@ -26,13 +26,20 @@ ANY = "any of them"
 """Name of the event that any of several limits is exceeded."""
 
 
+def output_of(peak: str) -> str:
+    """The output of a peak: "q3" of "max q3"."""
+    return peak.removeprefix("max ").removeprefix("min ")
+
+
 @dataclass(frozen=True, eq=False)
 class Peaks:
-    """Largest magnitude of each output over time.
+    """Largest magnitude of each output over time, or its largest value, "max q3" or "min q3".
+
+    Of "min q3" it is the largest value of −q3.
 
     Args:
         alpha: Levels, rising, shape (A,).
-        outputs: Names, m of them.
+        outputs: Names of the peaks, m of them.
         lower: Magnitude at the nodes that each motion reaches, as the bounds have it, (A, m).
         upper: Magnitude at the nodes that none passes, as the bounds have it, shape (A, m).
         error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope
@@ -70,42 +77,85 @@ class Peaks:
         """
         k = self.outputs.index(output)
         known = self.natures[k] is not Nature.ATTAINED
-        below = known * np.maximum(self.lower[:, k] - self.error[:, k], 0.0)
+        below = self.lower[:, k] - self.error[:, k]
+        if not self._is_signed(output):
+            below = np.maximum(below, 0.0)
+        below = np.where(known, below, -np.inf if self._is_signed(output) else 0.0)
         above = np.minimum(self.most(output).upper[-1:], self.least_reached[:, k])
         return Ends(np.maximum(below, self.least_proved[:, k]), above)
+
+    @staticmethod
+    def _is_signed(output: str) -> bool:
+        return output != output_of(output)
+
+    def named(self, peaks: Mapping[str, str]) -> Peaks:
+        """Some peaks under names of their own, such as those of several limits of one output."""
+        columns = [self.outputs.index(peak) for peak in peaks.values()]
+        names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+        ends = {name: getattr(self, name)[:, columns] for name in names}
+        natures = tuple(self.natures[k] for k in columns)
+        return replace(self, outputs=tuple(peaks), natures=natures, **ends)
 
     def nature(self, outputs: Iterable[str]) -> Nature:
         """Weakest nature of some outputs' bounds."""
         return Nature.weakest(self.natures[self.outputs.index(name)] for name in outputs)
 
 
-def peaks(envelope: Envelope) -> Peaks:
-    """Fuzzy peaks of the magnitude of every output."""
-    natures = envelope.natures or (envelope.nature,) * len(envelope.outputs)
+def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
+    """Fuzzy peaks of an envelope.
+
+    Args:
+        envelope: The envelope.
+        names: Outputs, of whose magnitude they are, or "max q3", "min q3"; all outputs if empty.
+    """
+    names = tuple(names) or tuple(map(str, envelope.outputs))
+    columns = [list(map(str, envelope.outputs)).index(output_of(name)) for name in names]
+    natures = tuple(
+        (envelope.natures or (envelope.nature,) * len(envelope.outputs))[k] for k in columns
+    )
     proved = np.array([nature is Nature.GUARANTEED for nature in natures])
-    error = np.where(proved, 0.0, envelope.error)  # of proved bounds it lies inside them
-    inner = envelope.attained
-    size = np.maximum(envelope.upper, -envelope.lower)
-    away = np.maximum(np.maximum(envelope.lower, -envelope.upper), 0.0)
+    error = np.where(proved, 0.0, envelope.error[..., columns])  # of proved bounds it is in them
+    between = None if envelope.between is None else envelope.between[:, columns]
+    size, away = _sided(Ends(envelope.lower, envelope.upper), names, columns)
+    sizes, _ = _sided(envelope.attained, names, columns)
+    signed = np.array([name != output_of(name) for name in names])
+    floor = np.where(signed, -np.inf, 0.0)
     upper, lower = size.max(1), away.max(1)
-    above = within_steps(size + error, envelope.between).max(1) - upper
-    below = lower - np.maximum(away - error, 0.0).max(1)
+    above = within_steps(size + error, between).max(1) - upper
+    below = lower - np.maximum(away - error, floor).max(1)
     least = envelope.least_peaks
-    least_proved = np.zeros_like(upper) if least is None else least.lower
+    least_proved = np.zeros_like(upper) if least is None else least.lower[:, columns]
+    least_proved = np.where(signed, -np.inf, least_proved)
     lower = np.where(proved, np.maximum(lower, least_proved), lower)
     upper = np.where(proved, upper + above, upper)
-    reached = np.nan_to_num(np.maximum(inner.upper, -inner.lower).max(1), nan=0.0)
+    reached = np.where(np.isnan(sizes), floor, sizes).max(1)
     return Peaks(
         np.asarray(envelope.alpha),
-        tuple(map(str, envelope.outputs)),
+        names,
         lower,
         upper,
         np.where(proved, 0.0, np.maximum(above, below)),
-        np.maximum(reached, 0.0),
+        np.maximum(reached, floor),
         least_proved,
-        _least_reached(envelope, upper),
+        np.where(signed, np.inf, _least_reached(envelope, envelope.upper.max(1))[:, columns]),
         natures,
     )
+
+
+def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Array, Array]:
+    """Upper and lower bounds of |q|, of q ("max q") or of −q ("min q"), shape (A, T, m) each."""
+    upper, lower = [], []
+    for name, k in zip(names, columns, strict=True):
+        least, most = band.lower[..., k], band.upper[..., k]
+        pairs = {
+            "max": (most, least),
+            "min": (-least, -most),
+            "": (np.maximum(most, -least), np.maximum(np.maximum(least, -most), 0.0)),
+        }
+        pair = pairs["" if name == output_of(name) else name[:3]]
+        upper.append(pair[0])
+        lower.append(pair[1])
+    return np.stack(upper, -1), np.stack(lower, -1)
 
 
 def _least_reached(envelope: Envelope, like: Array) -> Array:
@@ -204,7 +254,8 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
         chosen("limits", name, outputs)
-        real(f"limit of {name}", float(limit), positive=True)
+        is_magnitude = not name.startswith(("max ", "min "))
+        real(f"limit of {name}", float(limit), positive=is_magnitude)
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +335,8 @@ def _any(each: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
     possible = tuple(max(one.possibility[k] for one in every) for k in (0, 1))
     least = max(one.necessity[0] for one in every)
     surely_kept = all(one.possibility[1] < 1 for one in every)  # by all motions of the highest cut
-    margin = np.min([one.margin / limits[name] for name, one in each.items()], axis=0)
+    sizes = {name: max(abs(limit), 1e-300) for name, limit in limits.items()}
+    margin = np.min([one.margin / sizes[name] for name, one in each.items()], axis=0)
     nature = Nature.weakest(one.nature for one in every)
     necessary = least, 0.0 if surely_kept else 1.0
     return Passing((possible[0], possible[1]), necessary, margin, every[0].lowest, nature)

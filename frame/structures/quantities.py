@@ -51,8 +51,9 @@ class Output(str):
 
     @property
     def _parts(self) -> tuple[str, str]:
-        kind = self.rstrip("0123456789")
-        return kind, self[len(kind) :]
+        name = self.removeprefix("max ").removeprefix("min ")
+        kind = name.rstrip("0123456789")
+        return kind, name[len(kind) :]
 
     @property
     def words(self) -> str:

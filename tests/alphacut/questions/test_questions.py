@@ -8,10 +8,12 @@ import pytest
 
 from alphacut.case.content import Content
 from alphacut.case.limits import Limit, parse_limit
+from alphacut.entry import main
 from alphacut.figures.answers import DRAWINGS
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.questions.all import QUESTIONS
+from alphacut.questions.decision import DecisionQuestion
 from alphacut.questions.probability import shaped_like
 
 ROOT = Path(__file__).parents[3]
@@ -56,6 +58,9 @@ def test_tolerances_keep_what_the_decision_keeps(summary):
         ("drift1 <= 40 mm", Limit("drift1", 0.04, False, "drift1 <= 40 mm")),
         ("drift1 <= 0.5 %", Limit("drift1", 0.005, True, "drift1 <= 0.5 %")),
         ("base_shear<=9 N", Limit("base_shear", 9.0, False, "base_shear<=9 N")),
+        ("max q3 <= -2 mm", Limit("max q3", -0.002, False, "max q3 <= -2 mm")),
+        ("min q3 >= -60 mm", Limit("min q3", 0.06, False, "min q3 >= -60 mm")),
+        ("moment <= 2 kN m", Limit("moment", 2e3, False, "moment <= 2 kN m")),
     ],
 )
 def test_limits_are_read(text, limit):
@@ -81,3 +86,55 @@ def test_every_question_is_complete():
     for question in QUESTIONS:
         assert question.__doc__
         assert len(question.head) >= 3
+
+
+LIMITS = """
+[frame]
+stiffness = ["80 kN/m ± 5 %", "60 kN/m"]
+masses = ["7 t", "7 t"]
+lengths = ["[2.9, 3, 3.1] m", "3 m"]
+damping_ratio = "2 %"
+displacements = ["50 mm", "0 mm"]
+outputs = ["q2", "drift1"]
+[envelope]
+fuzzy = ["k1"]
+alpha = [0, 1]
+duration = "2 s"
+step = "0.02 s"
+[decision]
+limits = ["drift1 <= 1 %", "drift1 <= 3 %", "max drift1 <= 60 mm", "min drift1 >= -60 mm",
+          "min drift1 >= -20 mm", "min q2 >= 1 m"]
+"""
+
+
+def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text('title = "Limits"\nstages = ["envelope"]\n' + LIMITS, encoding="utf-8")
+    assert main(["run", str(case), "--quiet", "--no-figures", "--out", str(tmp_path / "out")]) == 0
+    summary = json.loads((tmp_path / "out/summary.json").read_text(encoding="utf-8"))
+    limits = summary["decision"]["limits"]
+    assert limits["drift1 <= 1 %"]["limit"] == pytest.approx(0.029)  # of the least height
+    verdicts = {name: limit["verdict"] for name, limit in limits.items()}
+    assert verdicts == {
+        "drift1 <= 1 %": "exceeded",
+        "drift1 <= 3 %": "not exceeded",
+        "max drift1": "not exceeded",
+        "min drift1 >= -60 mm": "not exceeded",
+        "min drift1 >= -20 mm": "exceeded",
+        "min q2": "exceeded",
+        "any of them": "exceeded",
+    }
+    band = summary["envelopes"]["all"]
+    least = limits["min drift1 >= -60 mm"]["peak"]
+    assert least["proved"][0] == pytest.approx(-band["min"]["drift1"], rel=0.02)
+    assert least["reached"][0] <= least["proved"][0]
+    words = [row[0] for row in DecisionQuestion.rows(summary["decision"])]
+    assert words[2] == "max drift1 ≤ 60.00 mm"
+    assert words[4] == "min drift1 ≥ −20.00 mm"
+    assert words[5] == "min q2 ≥ 1.000 m"
+
+
+@pytest.mark.parametrize("limit", ["max q3 >= 2 mm", "min q3 <= 2 mm", "q3 <= -2 mm", "q3 >= 2 mm"])
+def test_limits_that_compare_the_wrong_way_are_refused(limit):
+    with pytest.raises(RefusedError):
+        parse_limit(limit)
