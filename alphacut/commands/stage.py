@@ -46,7 +46,15 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
 def image(document: Document) -> str:
     """The phases, and what widens the bounds."""
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
-    return "".join(shares) + width_text(document) + "\n"
+    ends = document["references"]["hashin_shtrikman_E_GPa"]
+    return (
+        plane_text(document["plane"], Nature.GUARANTEED)
+        + (loss_text(document["loss"]) if "loss" in document else "")
+        + f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n"
+        + "".join(shares)
+        + width_text(document)
+        + "\n"
+    )
 
 
 def summary(document: Document) -> str:
@@ -72,9 +80,9 @@ def summary(document: Document) -> str:
     )
 
 
-def plane_text(cuts: Document) -> str:
+def plane_text(cuts: Document, nature: Nature = Nature.ATTAINED) -> str:
     """Constants along x and y."""
-    text = "".join(text_table(*table) for table in cut_tables(cuts))
+    text = "".join(text_table(*table) for table in cut_tables(cuts, nature))
     return text if "nu_xy_free" in cuts else f"{text}{ONLY}\n"
 
 

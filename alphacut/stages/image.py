@@ -14,15 +14,23 @@ from alphacut.case.material import ImageCell
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.provenance import file_digest
+from alphacut.rve.anisotropy import plane_constants
+from alphacut.rve.cell import Phase
+from alphacut.rve.engineering_constants import NAMES
 from alphacut.rve.image.bounds import Ends
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.model import ImageCut, ImageModel, usual_division
 from alphacut.rve.image.moduli import ModuliInterval
+from alphacut.rve.image.phase_energies import phase_energies
 from alphacut.rve.image.phase_images import ModuliImages, moduli_images, threshold_ranges
 from alphacut.rve.image.read import read_grey, require_phases
-from alphacut.stages.cell import AVERAGES, GPA
+from alphacut.rve.loss_factors import bulk_and_shear_losses
+from alphacut.rve.phase_energies import CONSTANTS, PhaseEnergies, first_order
+from alphacut.stages.cell import AVERAGES, GPA, isotropic_bounds
+from alphacut.stages.losses import LossCuts
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.segmentation import segmented
 
@@ -77,15 +85,44 @@ def compute_cuts(
         "widths_GPa": {name: value / GPA for name, value in widths.items()},
         "fractions": study.fractions,
         "division": model.division,
+        "references": {"hashin_shtrikman_E_GPa": study.isotropic_bounds},
     }
+    constants = np.array([cut.constants for cut in cuts])
     stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
     variables = {
         "E": (("alpha", "bound"), np.array([cut.modulus for cut in cuts]), {"units": "Pa"}),
         "stiffness": (("alpha", "bound", "row", "column"), stiffness, {"units": "Pa"}),
+        **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(NAMES)},
         "phase": (("y", "x"), study.ranges(None)[0].astype(np.float32)),
     }
     axes = {"alpha": list(alpha), "bound": ["lower", "upper"], "row": AXES, "column": AXES}
+    if cell.losses:
+        phase, count = study.ranges(None)[0], len(cell.pairs)
+        energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
+        ends, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
+        cuts_of = dict(zip(CONSTANTS, np.moveaxis(ends, -1, 0), strict=True))
+        variables |= {f"loss_{name}": (("alpha", "bound"), x) for name, x in cuts_of.items()}
+        facts["loss"] = {
+            **{name: {"lower": x[:, 0], "upper": x[:, 1]} for name, x in cuts_of.items()},
+            "error": dict(zip(CONSTANTS, map(float, errors), strict=True)),
+            "nature": str(Nature.ESTIMATED),
+        }
     return StageResult(facts, xarray.Dataset(variables, axes, {"nature": NATURE}))
+
+
+def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
+    """Ends of the loss factors of E, G, K at modal moduli, (levels, 2, 3), and errors, (3,)."""
+
+    def constants_of(moduli: Array) -> Array:
+        return plane_constants(moduli, average)
+
+    shares, _ = energies.shares(constants_of)
+    equal = np.array([bulk_and_shear_losses(None, False)] * len(shares))
+    corners = cuts.corners(shares, equal)
+    ends = np.einsum("lecpx,pxc->lec", corners, shares)
+    widest = corners[0, 1, 0]
+    _, errors = first_order(energies, widest, constants_of)
+    return ends, errors + np.ptp(widest) ** 2 * ends[0, 1]
 
 
 def _widths(
@@ -111,6 +148,13 @@ def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) 
         "nu": {"lower": top.poisson[0], "upper": top.poisson[1]},
         "G_T_GPa": _pair(top.bounds.shear(average)),
         "average": AVERAGES[average],
+        "plane": {
+            name + ("" if name == "nu_xy" else "_GPa"): {
+                end: [cut.constants[k, place] / (1.0 if name == "nu_xy" else GPA) for cut in cuts]
+                for place, end in enumerate(("lower", "upper"))
+            }
+            for k, name in enumerate(NAMES)
+        },
         "nature": NATURE,
         "cuts": {
             "alpha": alpha,
@@ -155,6 +199,12 @@ class ImageStudy:
             for young, poisson in self.cell.pairs
         ]
         return moduli_images(*self.ranges(threshold), moduli)
+
+    @property
+    def isotropic_bounds(self) -> list[float]:
+        """Hashin and Shtrikman's bounds of an isotropic E in GPa at the modal values."""
+        phases = [Phase(young.modal, nu.modal).stiffness for young, nu in self.cell.pairs]
+        return isotropic_bounds(np.array([*self.fractions.values()]), phases)
 
     @property
     def fractions(self) -> dict[str, float]:

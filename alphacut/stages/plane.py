@@ -25,7 +25,7 @@ PLANE = {
     for name, (unit, about) in ABOUT.items()
 }
 """Unit and meaning of each output."""
-ONLY = "Plane strain alone: constants without stress along the fibres need two isotropic phases"
+ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
 
 
 def plane_outputs(result: HomogenisedStiffness) -> dict[str, float]:
@@ -37,11 +37,14 @@ def plane_outputs(result: HomogenisedStiffness) -> dict[str, float]:
     }
 
 
-def cut_tables(cuts: Mapping[str, Document]) -> Iterator[tuple[tuple[str, ...], list[Row]]]:
+def cut_tables(
+    cuts: Mapping[str, Document], nature: Nature = Nature.ATTAINED
+) -> Iterator[tuple[tuple[str, ...], list[Row]]]:
     """Titles and rows of α-cuts on the lowest and highest level, a table for each definition.
 
     Args:
         cuts: By the names of `PLANE`, of moduli in GPa with "_GPa" after them.
+        nature: Of the cuts.
     """
     for definition, suffix in SUFFIXES.items():
         rows: list[Row] = []

@@ -67,6 +67,19 @@ class StiffnessBounds:
         low, high = stiffest / least, softest / most
         return (1 - low) / 2 - UNIT * (1 + low), (1 - high) / 2 + UNIT * (1 + high)
 
+    def constants(self) -> Array:
+        """Bounds of E_x, E_y (Pa), ν_xy and G_xy (Pa) in plane strain, shape (4, 2)."""
+        low, high = inverse_below(self.upper), inverse_above(self.lower)
+        slack = 4 * UNIT
+        moduli = [(1 / high[k, k] * (1 - slack), 1 / low[k, k] * (1 + slack)) for k in range(3)]
+        # low ≤ S ≤ high bounds S12 about the middle by √(d11 d22)/2, d = high − low
+        middle = (low[0, 1] + high[0, 1]) / 2
+        reach = np.sqrt((high - low)[0, 0] * (high - low)[1, 1]) / 2 + slack * abs(high).max()
+        ratios = np.outer([-middle - reach, -middle + reach], [1 / high[0, 0], 1 / low[0, 0]])
+        beyond = slack * abs(ratios).max()
+        poisson = (ratios.min() - beyond, ratios.max() + beyond)
+        return np.array([*moduli[:2], poisson, moduli[2]])
+
     def contains(self, stiffness: Array) -> bool:
         """True if a symmetric stiffness, shape (3, 3), lies between the bounds."""
         ends = stiffness - self.lower, self.upper - stiffness
@@ -88,6 +101,26 @@ def _young_rounding(shear: float, bulk: float) -> float:
 def inverse_below(matrix: Array) -> Array:
     """Matrix below the inverse of every symmetric matrix up to the one passed, shape (…, 3, 3).
 
+    Raises:
+        FailedError: The matrix is singular to rounding.
+    """
+    inverse, error = _inverse(matrix)
+    return np.asarray(inverse - error * np.eye(matrix.shape[-1]))
+
+
+def inverse_above(matrix: Array) -> Array:
+    """Matrix above the inverse of every symmetric matrix from the one passed on, as above.
+
+    Raises:
+        FailedError: The matrix is singular to rounding.
+    """
+    inverse, error = _inverse(matrix)
+    return np.asarray(inverse + error * np.eye(matrix.shape[-1]))
+
+
+def _inverse(matrix: Array) -> tuple[Array, Array]:
+    """Computed inverse and a bound of the norm of its error.
+
     With X the computed inverse and R = I − X·matrix, the true one differs from X by at most
     ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
 
@@ -101,7 +134,7 @@ def inverse_below(matrix: Array) -> Array:
         what = "a bound of the compliance is singular to rounding"
         raise FailedError(what, "lower the contrast of the phases")
     error = SAFETY * gap / (1 - gap) * np.abs(inverse).sum(axis=-1).max(axis=-1)
-    return np.asarray(inverse - error[..., None, None] * np.eye(matrix.shape[-1]))
+    return inverse, np.asarray(error[..., None, None])
 
 
 def residual_above(inverse: Array, matrix: Array) -> Array:

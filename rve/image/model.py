@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from alphacut.rve.anisotropy import ISOTROPIC, require_average
 from alphacut.rve.image.bounds import Ends, StiffnessBounds
@@ -29,11 +30,13 @@ class ImageCut:
         bounds: Of the stiffness.
         modulus: Interval of E, in Pa, nested in those of lower levels.
         poisson: Interval of ν.
+        constants: Intervals of E_x, E_y, ν_xy and G_xy in plane strain, likewise nested.
     """
 
     bounds: StiffnessBounds
     modulus: Ends
     poisson: Ends
+    constants: Array
 
 
 @dataclass(frozen=True)
@@ -86,8 +89,10 @@ class ImageModel:
             nested([ends(one.bounds, self.average) for one in solutions])
             for ends in (StiffnessBounds.young, StiffnessBounds.poisson)
         )
-        rows = zip(solutions, moduli, ratios, strict=True)
-        return [ImageCut(s.bounds, e, nu) for s, e, nu in rows][::-1]
+        ends = np.array([one.bounds.constants() for one in solutions])
+        constants = [np.minimum.accumulate(ends[..., 0]), np.maximum.accumulate(ends[..., 1])]
+        rows = zip(solutions, moduli, ratios, np.stack(constants, axis=-1), strict=True)
+        return [ImageCut(s.bounds, e, nu, c) for s, e, nu, c in rows][::-1]
 
     def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
         """Refuse cuts that contradict bounds of images inside them, at another accuracy.

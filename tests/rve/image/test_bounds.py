@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import FailedError
+from alphacut.rve import Phase, SeriesModel
 from alphacut.rve.anisotropy import AVERAGES
+from alphacut.rve.cell import square_moduli
+from alphacut.rve.engineering_constants import EngineeringConstants
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient, System, inner
 from alphacut.rve.image.fields.element import airy_element, displacement_element
@@ -18,8 +21,12 @@ from alphacut.rve.image.fields.side import (
     least_energy,
     solve_side,
 )
-from alphacut.rve.image.moduli import PlaneModuli
+from alphacut.rve.image.model import ImageModel
+from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
+from alphacut.rve.image.phase_energies import phase_energies
+from alphacut.rve.image.phase_images import moduli_images
 from alphacut.rve.image.solve import solve_image
+from alphacut.stochastic import HermiteMap
 
 TIGHT = ConjugateGradient(accuracy=1e-11)
 
@@ -212,6 +219,41 @@ def test_the_modulus_is_inside_its_bounds_where_it_falls_with_the_shear_modulus(
     low, high = bounds.young()
     assert low <= inside.min() <= low + 1e-9 * abs(low) + 1e-12
     assert inside.max() <= high <= inside.max() + 1e-4 * (shear[1] + shear[1] ** 2 / bulk[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_intervals_of_constants_hold_all_stiffnesses_between_the_bounds_and_meet(seed):
+    rng = np.random.default_rng(seed)
+    roots = rng.normal(size=(2, 3, 3))
+    lower, change = (root @ root.T + 0.1 * np.eye(3) for root in roots)
+    ends = StiffnessBounds(lower, lower + change).constants()
+    for turn in np.linalg.qr(rng.normal(size=(300, 3, 3)))[0]:
+        part = turn @ np.diag(rng.uniform(0, 1, 3) ** 0.2) @ turn.T  # 0 ≤ part ≤ 1
+        root = np.linalg.cholesky(change)
+        between = EngineeringConstants.of_stiffness(lower + root @ part @ root.T, np.zeros((3, 3)))
+        assert (ends[:, 0] <= between.values).all()
+        assert (between.values <= ends[:, 1]).all()
+    for exact, place in ((lower, 1), (lower + change, 0)):
+        values = EngineeringConstants.of_stiffness(exact, np.zeros((3, 3))).values
+        assert ends[[0, 1, 3], 1 - place] == pytest.approx(values[[0, 1, 3]], rel=1e-9)
+
+
+def test_energies_of_a_disc_of_pixels_are_near_those_of_a_round_particle():
+    size, phases = 40, [Phase(20e9, 0.3), Phase(80e9, 0.2)]
+    x = (np.arange(size) + 0.5) / size * 2 - 1
+    inside = (x[:, None] ** 2 + x**2 < 0.36).astype(int)
+    moduli = [PlaneModuli.of_young(phase.modulus, phase.poisson) for phase in phases]
+    images = moduli_images(inside, inside, [ModuliInterval(one, one) for one in moduli])
+    solution = ImageModel(division=2).solve(images)
+    found = phase_energies(solution, images, inside, count=2)
+    radius = float(np.sqrt(4 * inside.mean() / np.pi))
+    cell = SeriesModel(energies=True).solve(HermiteMap(radius, 0, radius, 0), phases[0], phases[1:])
+    exact = cell[0].energies.values
+    assert abs(found.values - exact).max() < 0.01 * exact.sum(axis=(0, 1)).max()
+    work = found.values.sum(axis=(0, 1))
+    for end in (solution.bounds.lower, solution.bounds.upper):
+        assert work == pytest.approx(square_moduli(end), rel=1e-3)
+    assert (found.errors < 1e-3 * work).all()
 
 
 def test_the_inverse_is_below_in_every_direction():
