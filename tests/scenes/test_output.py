@@ -13,7 +13,7 @@ from scipy.signal import lsim
 from tests.alphacut.small import SMALLER, written
 
 ROOT = Path(__file__).parents[2]
-SHORT = ("envelope.duration=4 s", "envelope.step=0.02 s", "envelope.alpha=[0, 0.5, 1]")
+SHORT = ("envelope.duration=2 s", "envelope.step=0.02 s", "envelope.alpha=[0, 0.5, 1]")
 COARSE = {  # case: most lines, changes of its text, changes of its keys
     "paper": (20, SMALLER, ()),
     "building": (25, {}, (*SHORT, "envelope.tolerance=2 mm", "probability.samples=40")),
@@ -70,7 +70,7 @@ def test_the_closing_output_fits_on_a_screen(runs, name):
 
 def motion(young, roof, height, mass_damping, stiffness_damping):
     """Roof displacement, drift and base shear of the building, by scipy, shape (T, 3), in SI."""
-    time = np.arange(0, 4 + 1e-9, 0.01)
+    time = np.arange(0, 2 + 1e-9, 0.01)
     text = (ROOT / "cases" / "building.record.csv").read_text(encoding="utf-8")
     record = np.array([x.split(",") for x in text.splitlines() if x[:1].isdigit()], float)
     masses = np.array([40e3] * 7 + [roof])

@@ -18,7 +18,7 @@ limits = ["drift1 <= 30 mm", "q2 <= 60 mm"]
 [tolerances]
 limits = ["drift1 <= 26 mm"]
 """
-SHORTER = ("duration=4 s", "step=0.02 s", "alpha=[0, 0.5, 1]")
+SHORTER = ("duration=2 s", "step=0.02 s", "alpha=[0, 0.5, 1]")
 
 
 @pytest.fixture(scope="module")
