@@ -13,9 +13,7 @@ from alphacut.case.content import Content
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import MaterialDamping, Structure
 from alphacut.frame.questions.peaks import Peaks
-from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.columns import columns_text
 from alphacut.io.files import as_json, say
 from alphacut.questions.all import questions_of
 from alphacut.questions.question import Motion, Question
@@ -141,11 +139,7 @@ class Pipeline:
         results.tasks = envelope.tasks(section, content.study if studies else (), limited)
         longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
         stages = [envelope.stage(structure, task) for task in longest]
-        try:
-            outcomes = self.store.take_all(stages, self.executor)
-        except ContradictionError as error:
-            self.store.put_text("contradiction.csv", columns_text(error.table))
-            raise
+        outcomes = self.store.take_all(stages, self.executor)
         for task in results.tasks:
             data = outcomes[f"envelope_{task.name}"]
             envelope.require_tolerance(data, task, structure)

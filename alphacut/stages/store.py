@@ -13,8 +13,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import FailedError, require
+from alphacut.io.columns import columns_text
 from alphacut.io.files import Document, as_json, rank, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
@@ -145,7 +147,7 @@ class StageStore:
         with showing(self.shown) as tick:
             for done, future in enumerate(as_completed(under_way), start=1):
                 stage = under_way[future]
-                with named_worker(stage):
+                with self._reported(stage):
                     result = future.result()
                 with TemporaryDirectory() as scratch:
                     results[stage.name] = self._put(stage, result, Path(scratch))
@@ -187,7 +189,7 @@ class StageStore:
         self.folder.require_free(f"{stage.name}.nc")
         samples = self._samples(self.folder) if stage.has_samples else None
         with TemporaryDirectory() as scratch:
-            with showing(self.shown) as tick, named_worker(stage):
+            with showing(self.shown) as tick, self._reported(stage):
                 result = stage.compute(Work(Path(scratch), samples, self.workers, tick))
             return self._put(stage, result, Path(scratch))
 
@@ -223,24 +225,27 @@ class StageStore:
         self.folder.put(stage.name, stage.key, scratch)
         return self._read(stage.name)
 
+    @contextmanager
+    def _reported(self, stage: Stage) -> Iterator[None]:
+        """Names the stage where a process dies, and writes the motion that contradicts a proof.
+
+        Raises:
+            FailedError: A process died.
+            ContradictionError: A motion contradicts a proof.
+        """
+        try:
+            yield
+        except BrokenExecutor as error:
+            cure = "out of memory, or a crash in compiled code; the stages that are done stay"
+            raise FailedError(f"a worker process died in stage {stage.name}", cure) from error
+        except ContradictionError as error:
+            self.put_text("contradiction.csv", columns_text(error.table))
+            raise
+
     def put_text(self, name: str, text: str) -> None:
         """Writes a text file of the run itself, such as summary.json."""
         if self.folder is not None and rank() == 0:
             put_text(self.folder, name, text)
-
-
-@contextmanager
-def named_worker(stage: Stage) -> Iterator[None]:
-    """Names the stage where a process dies that computes for it.
-
-    Raises:
-        FailedError: One died.
-    """
-    try:
-        yield
-    except BrokenExecutor as error:
-        cure = "out of memory, or a crash in compiled code; the stages that are done stay"
-        raise FailedError(f"a worker process died in stage {stage.name}", cure) from error
 
 
 def put_text(folder: ResultsFolder, name: str, text: str) -> None:

@@ -8,7 +8,7 @@ from alphacut.commands import verify
 from alphacut.entry import main
 from alphacut.frame import propagation
 from alphacut.frame.verification.self_test import with_motions_tested
-from tests.alphacut.small import written
+from tests.alphacut.small import FRAME, written
 
 PROOF = ("--set", "envelope.method=auto")
 
@@ -59,6 +59,17 @@ def test_a_contradiction_ends_a_run_and_leaves_the_motion(tmp_path, capfd, monke
     titles, numbers = columns(folder / "contradiction.csv")
     assert "motion of q1 [m]" in titles
     assert numbers.shape[1] == len(titles)
+
+
+def test_a_contradiction_in_the_motion_of_a_question_leaves_it_too(tmp_path, capfd, monkeypatch):
+    def planted_in_question(found, model):
+        return (planted if "a1" in found.outputs else with_motions_tested)(found, model)
+
+    monkeypatch.setattr(propagation, "with_motions_tested", planted_in_question)
+    case, folder = written(tmp_path, FRAME + '[decision]\nlimits = ["a1 <= 1 m/s^2"]\n'), tmp_path
+    assert run(case, folder / "out") == 1
+    assert "the proof is wrong: a1" in capfd.readouterr().err
+    assert "motion of a1 [m/s^2]" in columns(folder / "out" / "contradiction.csv")[0]
 
 
 def test_a_folder_without_an_envelope_is_refused(tmp_path, capfd):
