@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from alphacut.fuzzy import (
 )
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.numbers import outer_steps
 from alphacut.io.files import Document
@@ -31,8 +31,10 @@ from alphacut.io.provenance import file_digest, source_digest, versions
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.phase_energies import CONSTANTS
 from alphacut.rve.result import HomogenisedStiffness
+from alphacut.rve.series.model import SeriesModel
 from alphacut.stages.cell import (
     GPA,
+    SPHERES,
     AnyCell,
     Solve,
     cell_at,
@@ -50,6 +52,10 @@ from alphacut.stochastic.theta.quadrature import between_nodes
 if TYPE_CHECKING:
     import xarray
 
+COARSER = 100.0
+"""Multiple of the tolerance at which guaranteed cuts are tested."""
+LARGEST_SIZE = 0.7
+"""Largest elements that they are tested with, over half the cell's side."""
 SHOWN = 61
 """Points over θ of a stored stress curve."""
 BOUNDS = {
@@ -176,11 +182,15 @@ class CellCampaign:
     @property
     def propagation(self) -> Callable[..., Bounds]:
         """The function from fuzzy inputs and a plan to the α-cuts of all outputs."""
+        shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
+        return partial(propagate, self.task, alpha=self.modulus.alpha, shared=shared)
+
+    @property
+    def task(self) -> CellTask:
+        """The function from points of the fuzzy inputs to all outputs."""
         numbers = inputs_of(self.radius, self.cell)
         crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
-        task = CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
-        shared = tuple(x for x in self.inputs if x != "inclusion_modulus") or tuple(self.inputs)
-        return partial(propagate, task, alpha=self.modulus.alpha, shared=shared)
+        return CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
 
     def run(self, work: Work) -> StageResult:
         """The α-cuts with all samples; a store beside them goes on after an interruption."""
@@ -193,7 +203,39 @@ class CellCampaign:
             store=work.samples,
             identity=self.identity if work.samples else None,
         )
+        self.require_consistent(result)
         return stage_result(result, self)
+
+    def require_consistent(self, result: Bounds) -> None:
+        """Requires that a coarser model agrees with guaranteed cuts of E at points inside them.
+
+        The points are the middles of the narrowest and of the widest cut of the inputs. The
+        tolerance is `COARSER` times as large, elements are twice as large.
+
+        Raises:
+            FailedError: E of such a point lies outside a cut by more than both errors.
+        """
+        if result.nature_of("E") is not Nature.GUARANTEED:
+            return
+        modulus, size = self.modulus, min(2 * self.mesh.size, LARGEST_SIZE)
+        usual = SPHERES if self.cell.particles == "spheres" else SeriesModel.accuracy
+        tolerance = COARSER * (modulus.tolerance or usual)
+        other = replace(
+            self,
+            mesh=self.mesh.model_copy(update={"size": size}),
+            modulus=modulus.model_copy(update={"tolerance": tolerance}),
+        )
+        cuts, error = np.stack(result.bounds("E"), 1), sum(self.errors(result).values())
+        levels = result.alpha[[-1, 0]]
+        points = [{x: float(np.mean(n.cut(a))) for x, n in result.inputs.items()} for a in levels]
+        for alpha, sample in zip(levels, other.task(points), strict=True):
+            value = float(np.asarray(sample["E"]))
+            slack = value * (error + sample["error:space"] + sample["error:theta"])
+            for low, high in cuts[result.alpha <= alpha]:
+                if not low - slack <= value <= high + slack:
+                    what = f"E of a cell inside a cut is {value / GPA:.9g} GPa, the cut"
+                    what += f" {low / GPA:.9g} … {high / GPA:.9g} GPa"
+                    raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
     @property
     def losses(self) -> LossCuts | None:
