@@ -12,12 +12,15 @@ from alphacut.case.load import Case
 from alphacut.commands.options import Command, add_quiet, add_run, answer, opened
 from alphacut.figures.all import drawn
 from alphacut.fuzzy.campaign.workers import pool
+from alphacut.fuzzy.refused import require
 from alphacut.io.files import Document, alone, as_json, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary
 from alphacut.io.provenance import FORMAT, command, door, versions
+from alphacut.report.comparison import comparison
+from alphacut.report.markup import write_markup
 from alphacut.report.page import render_page
-from alphacut.report.tables import run_text, write_tables
+from alphacut.report.tables import run_text, tables, text_table, write_csv, write_tables
 from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stages.store import StageStore, put_text
@@ -72,17 +75,24 @@ def computed(case: Case, store: StageStore, petsc: Mapping[str, str], *, figures
 
 def add_page(parser: argparse.ArgumentParser) -> None:
     """Adds the options of a report."""
-    parser.add_argument("folder", metavar="FOLDER", help="results of a run, as results/paper")
+    parser.add_argument(
+        "folder", metavar="FOLDER", nargs="+", help="results of a run; of two to compare them"
+    )
     parser.add_argument(
         "--out", metavar="FILE.html", help="file for the page (default: FOLDER/report.html)"
     )
     parser.add_argument("--csv", metavar="FOLDER", help="folder for every table as a CSV file")
+    parser.add_argument(
+        "--tables", metavar="FOLDER", help="folder for every table in Markdown and in LaTeX"
+    )
     add_quiet(parser)
 
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
-    """Writes the page, and the tables where they are requested."""
-    folder = ResultsFolder.opened(Path(options.folder))
+    """Writes the page, and the tables where they are requested; compares two runs."""
+    if len(options.folder) > 1:
+        return compare(options, out)
+    folder = ResultsFolder.opened(Path(options.folder[0]))
     page = render_page(folder)
     path = Path(options.out) if options.out else folder.path / PAGE
     if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
@@ -90,11 +100,33 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
             put_text(ResultsFolder.opened(folder.path), PAGE, page)
     else:
         write_text(path, page)
-    tables = []
+    summary, files = read_summary(folder), list[Path]()
     if options.csv:
-        tables = write_tables(read_summary(folder), folder, Path(options.csv))
-    document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, tables)]}
-    answer(options, document, out, "".join(f"{file}\n" for file in (path, *tables)))
+        files = write_tables(summary, folder, Path(options.csv))
+    if options.tables:
+        files += write_markup(tables(summary), Path(options.tables))
+    document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, files)]}
+    answer(options, document, out, "".join(f"{file}\n" for file in (path, *files)))
+    return 0
+
+
+def compare(options: argparse.Namespace, out: TextIO) -> int:
+    """Shows two runs side by side, and writes the table where it is requested."""
+    folders = options.folder
+    require(len(folders) == 2, "FOLDER", value=f"{len(folders)} folders", allowed="one or two")
+    require(not options.out, "--out", value=options.out, allowed="none where two are compared")
+    first, second = (read_summary(ResultsFolder.opened(Path(name))) for name in folders)
+    table = comparison(first, second)
+    allowed = "two runs with a quantity in common"
+    require(bool(table[1]), "FOLDER", value=" and ".join(folders), allowed=allowed)
+    named, files = {"comparison": table}, list[Path]()
+    if options.csv:
+        files += write_csv(named, Path(options.csv))
+    if options.tables:
+        files += write_markup(named, Path(options.tables))
+    rows = [dict(zip(table[0], row, strict=True)) for row in table[1]]
+    text = text_table(*table) + "".join(f"{file}\n" for file in files)
+    answer(options, {"rows": rows, "tables": [*map(str, files)]}, out, text)
     return 0
 
 

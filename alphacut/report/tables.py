@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
-from alphacut.io.quantity import ends, engineering
+from alphacut.io.quantity import MINUS, ends, engineering
 from alphacut.questions.all import QUESTIONS
 from alphacut.report.results import (
     MEANING,
@@ -67,10 +67,16 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
             filled_tables[f"envelope_{name}-{output}"] = over_time(data, output)
+    return write_csv(filled_tables, folder)
+
+
+def write_csv(filled_tables: Mapping[str, Table], folder: Path) -> list[Path]:
+    """Writes each table as a CSV file, with the minus of ASCII; returns the files."""
     for name, (head, rows) in filled_tables.items():
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
-        write_text(folder / f"{name}.csv", text.getvalue(), follow_links=False)
+        content = text.getvalue().replace(MINUS, "-")
+        write_text(folder / f"{name}.csv", content, follow_links=False)
     return [folder / f"{name}.csv" for name in filled_tables]
 
 
@@ -92,12 +98,12 @@ def ends_of(values: Document, level: int, nature: Nature) -> Row:
 
 def radius_map(part: Document) -> Table:
     """Parameters of the radius map."""
-    parameters = {name: part[name] for name in ("a1", "a2", "a3", "a4")}
-    rows: list[Row] = [
-        (x, " … ".join(map(_number, y if isinstance(y, list) else [y])))
-        for x, y in parameters.items()
-    ]
-    return ("parameter of the radius map", "least … modal … greatest"), rows
+    rows: list[Row] = []
+    for name in ("a1", "a2", "a3", "a4"):
+        corners = part[name] if isinstance(part[name], list) else [part[name]]
+        least, modal, greatest = corners[0], corners[len(corners) // 2], corners[-1]
+        rows.append((name, *map(_number, (least, modal, greatest))))
+    return ("parameter of the radius map", "least", "modal", "greatest"), rows
 
 
 def _cell(value: str | float | None) -> str:

@@ -1,0 +1,72 @@
+"""Two runs side by side, and tables in Markdown and LaTeX."""
+
+import csv
+import json
+import re
+
+import pytest
+
+from alphacut.entry import main
+from alphacut.report.markup import latex, markdown
+from tests.alphacut.one_case import run
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("designs")
+    (folder / "a").mkdir()
+    (folder / "b").mkdir()
+    first = run(folder / "a", "--no-figures")
+    stiffer = "frame.modulus='[44, 45, 46] GPa'"
+    return first, run(folder / "b", "--no-figures", "--set", stiffer)
+
+
+def test_two_runs_stand_side_by_side(runs, capsys):
+    a, b = runs
+    assert main(["report", str(a), str(b)]) == 0
+    head, *lines = (re.split(" {2,}", x) for x in capsys.readouterr().out.splitlines())
+    rows = {line[0]: dict(zip(head, line, strict=False)) for line in lines}
+    peaks = [
+        json.loads((x / "summary.json").read_text())["envelopes"]["all"]["peak"]["q2"]["upper"][0]
+        for x in runs
+    ]
+    ratio = float(rows["greatest peak of q2"]["second over first"])
+    assert ratio == pytest.approx(peaks[1] / peaks[0], abs=1e-3)
+    assert rows["|q2| ≤ 300.0 mm"]["first"] == "not exceeded"
+    assert "width of the peak of drift1" in rows
+
+
+def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
+    a, b = runs
+    assert main(["report", str(a), str(b), "--quiet", "--csv", str(tmp_path)]) == 0
+    with (tmp_path / "comparison.csv").open(encoding="utf-8") as file:
+        assert len(list(csv.reader(file))) > 5
+    assert main(["report", str(a), "--quiet", "--tables", str(tmp_path)]) == 0
+    names = {path.stem for path in tmp_path.glob("*.tex")}
+    assert names == {path.stem for path in tmp_path.glob("*.md")} >= {"decision", "peaks"}
+    text = (tmp_path / "decision.tex").read_text(encoding="utf-8")
+    assert r"$\leq$" in text
+    assert "≤" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["{a}", "{a}", "{a}"], "3 folders"),
+        (["{a}", "{b}", "--out", "x.html"], "--out"),
+        (["{a}", "nowhere"], "nowhere"),
+    ],
+)
+def test_what_cannot_be_compared_is_said_in_one_line(runs, words, message, capsys):
+    named = dict(zip("ab", map(str, runs), strict=True))
+    assert main(["report", *(word.format(**named) for word in words)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_special_letters_are_those_of_the_language():
+    table = ("a_b", "50 %"), [("x|y", "1 … 2")]
+    assert markdown(table) == "| a_b | 50 % |\n| --- | ---: |\n| x\\|y | 1 … 2 |\n"
+    assert r"a\_b & 50 \%" in latex(table)
+    assert r"1 \dots{} 2" in latex(table)
