@@ -96,7 +96,7 @@ class AxialStiffness:
 
     @classmethod
     def of_result(cls, result: HomogenisedStiffness) -> Self | None:
-        """Of a result with its cell, of two isotropic phases, and its stiffness; None of others."""
+        """Of a result with its cell, of two isotropic phases, and its stiffness; else None."""
         cell, stiffness, errors = result.cell, result.stiffness, result.stiffness_errors
         if cell is None or stiffness is None or errors is None:
             return None
