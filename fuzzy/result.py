@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +15,11 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, chosen, require
 from alphacut.fuzzy.sets.claimed import Claimed
-from alphacut.fuzzy.sets.numbers import Stepwise, outer_steps, rising
+from alphacut.fuzzy.sets.numbers import Stepwise, new_axes, outer_steps, rising
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
     from alphacut.fuzzy.campaign.call import Samples
     from alphacut.fuzzy.sets.numbers import FuzzyNumber
@@ -309,6 +310,28 @@ class Bounds:
             ends = pair if pair[0] <= pair[1] else (least, most)
             head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
             yield f"{head}, {words} {_digits(miss)}{differs}"
+
+    def plot(self, axes: Axes | None = None, output: str = "", **line: Any) -> Axes:
+        """Draws an output on Matplotlib's axes, new ones if none are given.
+
+        Without time its membership as a line; over time the α-cuts as bands, darker with α.
+
+        Args:
+            axes: The axes.
+            output: Name of the output; the first if left out.
+            line: Keywords of `Axes.plot`, or of `Axes.fill_between` over time.
+
+        Returns:
+            The axes.
+        """
+        output = output or self.outputs[0]
+        if self.time is None:
+            return self.number(output).plot(axes, **line)
+        axes, ends = new_axes() if axes is None else axes, self.bounds(output)
+        look = {"color": "tab:blue", "alpha": 0.8 / len(self.alpha), "lw": 0} | line
+        for lower, upper in zip(*ends, strict=True):
+            axes.fill_between(self.time, lower, upper, **look)
+        return axes
 
     def to_dataset(self) -> xarray.Dataset:
         """Bounds over (alpha, time, output), where they are attained over (…, parameter)."""

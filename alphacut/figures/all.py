@@ -9,12 +9,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from alphacut.export.mesh import draw_mesh
-from alphacut.figures import answers, envelope, follower, frame, material
+from alphacut.figures import answers, envelope, follower, frame, fuzzy_numbers, material, overview
 from alphacut.figures.style import report_style, save
+from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.campaign.workers import submitted
 from alphacut.io.provenance import NESTED, version_of
-from alphacut.stages.cell import modal_cell
+from alphacut.stages.cell import GPA, modal_cell
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, StageResult, StageStore, Work
 
@@ -40,11 +43,22 @@ def drawings(results: Results) -> Iterator[Drawing]:
 
 def _material(results: Results) -> Iterator[Drawing]:
     """Map of radii, which the stage microstructure draws itself; modulus, image, stress."""
-    map_of = results.content.radius_map
+    content, map_of = results.content, results.content.radius_map
+    if results.is_paper and content.modulus.method == "prism":
+        cell, mesh = modal_cell(*content.round_cell), content.mesh
+        yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
     if map_of is not None and results.microstructure is None:
         yield "fig13-p-box", partial(material.p_box, map_of)
     if map_of is not None:
         yield "fig14-cone", partial(material.cone, map_of)
+    if (data := results.modulus) is not None and results.is_paper:
+        given = content.round_cell[1].inclusion_modulus
+        if isinstance(given, FuzzyNumber):
+            cuts = data.document["E_GPa"]
+            ends = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
+            number = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, ends))
+            yield "fig36-fuzzy-numbers", partial(fuzzy_numbers.kinds, given, number)
+            yield "fig37-alpha-cuts", partial(fuzzy_numbers.alpha_cuts, given)
     if (data := results.modulus) is not None:
         yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)
         yield "fig17-mean-stress", partial(material.mean_stress, data.arrays)
@@ -59,6 +73,8 @@ def _structure(results: Results) -> Iterator[Drawing]:
     """The structure, its fuzzy mapping and the walk of the Graph Follower."""
     if not results.envelopes or results.structure is None:
         return
+    if results.is_paper:
+        yield "fig02-stages", partial(overview.stages, results)
     yield "fig20-mapping", partial(envelope.mapping, results)
     if (section := results.content.frame) is not None:
         yield "fig26-frame", partial(frame.frame, section)

@@ -7,13 +7,16 @@ from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import real, require
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Cut(NamedTuple):
@@ -72,6 +75,30 @@ class FuzzyNumber(ABC):
         x = np.asarray(x, float)
         grade = np.minimum(_highest_level(x, levels, lower), _highest_level(-x, levels, -upper))
         return np.where(np.isnan(x), np.nan, grade)
+
+    def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
+        """Draws the membership as a line on Matplotlib's axes, new ones if none are given.
+
+        Args:
+            axes: The axes.
+            line: Keywords of `Axes.plot`, such as `color`.
+
+        Returns:
+            The axes.
+        """
+        axes = new_axes() if axes is None else axes
+        levels, lower, upper = map(np.asarray, self.cuts)
+        values = np.concatenate([lower[:1], lower, upper[::-1], upper[:1]])
+        axes.plot(values, np.concatenate([[0.0], levels, levels[::-1], [0.0]]), **line)
+        return axes
+
+
+def new_axes() -> Axes:
+    """Axes of a new figure of Matplotlib, which is imported now."""
+    import matplotlib.pyplot as plt
+
+    axes: Axes = plt.subplots()[1]
+    return axes
 
 
 def level(alpha: float) -> float:

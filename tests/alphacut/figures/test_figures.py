@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 import xarray
 
-from alphacut.figures import envelope, material, style
+from alphacut.figures import envelope, fuzzy_numbers, material, overview, style
+from alphacut.frame import StoreyFrame, propagation
+from alphacut.fuzzy import Triangular
 from alphacut.report.page import caption
+from alphacut.rve import Cell, Phase
+from alphacut.stochastic import HermiteMap
 from tests.alphacut.one_case import run
 
 
@@ -103,3 +107,34 @@ def test_an_image_shows_its_phases_and_the_cuts_of_its_modulus():
     assert picture.images[0].get_array().shape == (4, 4)
     ends = np.concatenate([line.get_xdata() for line in cuts.lines])
     assert (ends.min(), ends.max()) == pytest.approx((20, 30))
+
+
+def test_numbers_and_bounds_are_drawn_with_their_own_ends():
+    number = Triangular(1.0, 2.0, 4.0)
+    with style.report_style():
+        _, axes = style.figure()
+        (line,) = number.plot(axes, color="red").lines
+        assert line.get_xydata().tolist() == [[1, 0], [1, 0], [2, 1], [2, 1], [4, 0], [4, 0]]
+        motion = propagation.envelope(
+            StoreyFrame([1e3], stiffness=[4e4], q0=[0.1]),
+            {"m1": 1e3},
+            duration=1.0,
+            step=0.1,
+            alpha=[0, 1],
+        )
+        bands = motion.plot(style.figure()[1]).collections
+    ends = [band.get_paths()[0].get_extents() for band in bands]
+    assert len(ends) == 2
+    assert ends[0].ymax == pytest.approx(motion.upper[0].max())
+
+
+def test_a_mesh_and_six_cuts_are_those_of_the_case():
+    cell = Cell(Phase(20e9), Phase(80e9), HermiteMap(0.2, 0.1, 0.6, 0.1))
+    with style.report_style():
+        plane, density, prisms = overview.domains(cell, 0.5, 3).axes
+        cuts = fuzzy_numbers.alpha_cuts(Triangular(75e9, 80e9, 85e9))
+    assert "3 layers" in density.get_title(loc="left")
+    assert len(prisms.collections) == 4
+    assert plane.get_title(loc="left") == "physical domain, θ = -1"
+    bars = [line.get_xdata() for line in cuts.axes[0].lines[1:]]
+    assert np.array(bars) / 1e9 == pytest.approx(np.array([[75 + k, 85 - k] for k in range(6)]))

@@ -1,0 +1,83 @@
+"""Fuzzy numbers (Fig. 36) and their α-cuts (Fig. 37), of a case's own input and result."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from alphacut.figures import style
+from alphacut.figures.style import BLUE, INK, ORANGE
+from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal
+from alphacut.io.quantity import axis_prefix
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CUTS = 6
+"""Levels in Fig. 37."""
+
+
+def kinds_of(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
+    """A number of each kind: parts of an input, and a result whose α-cuts are joined."""
+    half, three_quarters = given.cut(0.5), given.cut(0.75)
+    ends = (given.support.lower, *three_quarters, given.support.upper)
+    return {
+        "crisp": Crisp(given.modal),
+        "interval": Interval(*half),
+        "triangular": given,
+        "trapezoidal": Trapezoidal(*ends),
+        "piecewise linear": result,
+    }
+
+
+def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
+    """Fig. 36: membership of each kind of number: the particle's modulus, and the cell's at last.
+
+    Args:
+        given: Young's modulus of the particle, in Pa.
+        result: Young's modulus of the cell, in Pa.
+    """
+    import matplotlib.pyplot as plt
+
+    numbers = kinds_of(given, result)
+    drawn, panels = plt.subplots(1, len(numbers), figsize=(11.0, 2.6), sharey=True)
+    for axes, (name, number) in zip(panels, numbers.items(), strict=True):
+        number.plot(axes, color=BLUE, lw=1.6)
+        margin = 0.15 * (number.support.width or given.support.width)
+        axes.set_xlim(number.support.lower - margin, number.support.upper + margin)
+        axes.set_ylim(0, 1.08)
+        style.title(axes, name)
+        source = "E" if number.modal == result.modal else "E$_i$"
+        style.prefix_axis(axes, source, "Pa", across=True)
+    panels[0].set_ylabel("membership μ")
+    return drawn
+
+
+def alpha_cuts(number: FuzzyNumber) -> Figure:
+    """Fig. 37: a triangular number in six α-cuts.
+
+    Args:
+        number: Young's modulus of the particle, in Pa.
+    """
+    drawn, axes = style.figure()
+    alpha = np.linspace(0, 1, CUTS)
+    number.plot(axes, color=INK, lw=1.4)
+    factor, unit = axis_prefix(number.support.upper, "Pa")
+    for level in alpha:
+        cut = number.cut(float(level))
+        axes.plot(cut, [level, level], color=ORANGE, lw=2.5, marker="o", ms=4)
+        words = f"{factor * cut.lower:.4g} … {factor * cut.upper:.4g} {unit}"
+        axes.annotate(
+            f"α = {level:.1f}: {words}" if cut.width else f"α = {level:.1f}",
+            (cut.upper, level),
+            xytext=(8, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8,
+        )
+    axes.set_xlim(right=number.support.upper + 0.35 * number.support.width)
+    style.membership_axes(axes, "")
+    axes.set_ylim(-0.06, 1.06)
+    style.prefix_axis(axes, "fuzzy Young's modulus of the particle E$_i$", "Pa", across=True)
+    return drawn

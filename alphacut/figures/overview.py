@@ -1,0 +1,184 @@
+"""The paper's first figures: the three domains of the cell (Fig. 1) and the chain (Fig. 2)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from alphacut.figures import style
+from alphacut.figures.style import BLUE, INK, ORANGE, PURPLE, Look
+from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy.arrays import Array, Mask, Rows
+from alphacut.rve.cell import Cell
+from alphacut.stages.results import Results
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+    from alphacut.rve.mesh.prism_grid import PrismGrid
+
+MATRIX, PARTICLE = "#f6d9b8", "#b79ad9"
+BOX_WIDTH, PITCH = 2.4, 3.3
+"""Width of a stage's box in Fig. 2, and distance of the boxes."""
+
+
+def domains(cell: Cell, size: float, layers: int) -> Figure:
+    """Fig. 1: physical, stochastic and product domain, from the mesh that is solved.
+
+    Args:
+        cell: Radius map and phases.
+        size: Edge length of the triangles, in halves of the cell's side.
+        layers: Layers of prisms in θ.
+    """
+    import matplotlib.pyplot as plt
+
+    from alphacut.rve.mesh.columns import extrude
+    from alphacut.rve.mesh.triangulation import reference_radius
+
+    radius = reference_radius(cell.radius, cell.outline)
+    grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
+    points = grid.positions(cell.radius)
+    levels = points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
+    drawn = plt.figure(figsize=(11.0, 4.2))
+    widths = drawn.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
+    draw_plane_mesh(drawn.add_subplot(widths[0]), grid, levels[layers // 2])
+    draw_density(drawn.add_subplot(widths[1]), cell, levels[:, 0, 2])
+    draw_prisms(drawn.add_subplot(widths[2], projection="3d"), grid, levels)
+    return drawn
+
+
+def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
+    """Physical domain: the triangles of the middle level, coloured by phase."""
+    corners = grid.plane.triangles[:, :3]
+    for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
+        x, y = level[:, 0], level[:, 1]
+        face = np.full(len(corners[mask]), 1.0)
+        axes.tripcolor(x, y, corners[mask], face, cmap=single_colour(colour), ec=INK, lw=0.25)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x$_1$/a")
+    axes.set_ylabel("x$_2$/a")
+    axes.grid(visible=False)
+    style.title(axes, f"physical domain, θ = {level[0, 2]:g}")
+
+
+def single_colour(colour: str) -> Colormap:
+    """A colour map of one colour."""
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap([colour])
+
+
+def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
+    """Stochastic domain: the density of θ, and the levels of the mesh."""
+    law = cell.radius.distribution
+    theta = np.linspace(law.lower, law.upper, 300)
+    axes.plot(law.pdf(theta), theta, color=BLUE, lw=1.6)
+    axes.fill_betweenx(theta, 0, law.pdf(theta), color=BLUE, alpha=0.15, lw=0)
+    axes.hlines(levels, 0, law.pdf(levels), color=ORANGE, lw=0.9)
+    axes.set_xlabel("density $f_Θ$")
+    axes.set_ylabel("θ")
+    axes.set_xlim(0)
+    style.title(axes, f"stochastic domain, {len(levels) - 1} layers")
+
+
+def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
+    """Product domain: faces of the prisms on the cell's sides in front and on the cone."""
+    from matplotlib.colors import to_rgb
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    plane, edges = grid.plane.points, boundary_edges(grid)
+    cone = layer_faces(levels, edges, grid.plane.arc)
+    axes.add_collection3d(Poly3DCollection(cone, facecolor=PARTICLE, edgecolor=PURPLE, lw=0.3))
+    corners = grid.plane.triangles[~grid.plane.inside, :3]
+    thin = {"facecolor": (*to_rgb(MATRIX), 0.15), "edgecolor": (*to_rgb(INK), 0.35), "lw": 0.2}
+    for side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
+        axes.add_collection3d(Poly3DCollection(layer_faces(levels, edges, side), **thin))
+    axes.add_collection3d(Poly3DCollection(levels[0][corners], facecolor=MATRIX, ec=INK, lw=0.15))
+    axes.set_xlim(-1, 1)
+    axes.set_ylim(-1, 1)
+    axes.set_zlim(levels[0, 0, 2], levels[-1, 0, 2])
+    axes.set_xlabel("x$_1$/a")
+    axes.set_ylabel("x$_2$/a")
+    axes.set_zlabel("θ")
+    axes.set_xticks([-1, 0, 1])
+    axes.set_yticks([-1, 0, 1])
+    axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
+    axes.view_init(elev=25, azim=-55)
+    axes.set_title(f"product domain, {len(grid.cells):,} prisms", loc="left", fontsize=10)
+
+
+def boundary_edges(grid: PrismGrid) -> Rows:
+    """Corners of every edge of the planar triangles, shape (edges, 2)."""
+    triangles = grid.plane.triangles[:, :3]
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [0, 2]], triangles[:, [1, 2]]])
+    return np.asarray(np.unique(np.sort(pairs, axis=1), axis=0))
+
+
+def layer_faces(levels: Array, edges: Rows, nodes: Mask) -> Array:
+    """Quadrilaterals of each layer over the edges between chosen nodes, shape (n, 4, 3)."""
+    first, second = edges[nodes[edges].all(axis=1)].T
+    below, above = levels[:-1], levels[1:]
+    faces = np.stack([below[:, first], below[:, second], above[:, second], above[:, first]], axis=2)
+    return np.asarray(faces.reshape(-1, 4, 3))
+
+
+def stages(results: Results) -> Figure:
+    """Fig. 2: the stages of the run, with the data that each hands to the next."""
+    from matplotlib.patches import FancyBboxPatch
+
+    boxes, arrows = stages_of(results)
+    drawn, axes = style.figure(2.9 * len(boxes), 1.9)
+    box: Look = {"boxstyle": "round,pad=0.02", "facecolor": "#dbe9f4", "edgecolor": INK, "lw": 1}
+    centred: Look = {"ha": "center", "va": "top"}
+    for number, (title, lines) in enumerate(boxes):
+        left, middle = PITCH * number, PITCH * number + BOX_WIDTH / 2
+        axes.add_patch(FancyBboxPatch((left, 0), BOX_WIDTH, 1.5, **box))
+        axes.text(middle, 1.4, title, weight="bold", size=10, **centred)
+        axes.text(middle, 1.1, "\n".join(lines), size=8, **centred)
+    for number, words in enumerate(arrows):
+        start, end = PITCH * number + BOX_WIDTH, PITCH * (number + 1)
+        arrow = {"arrowstyle": "-|>", "color": ORANGE}
+        axes.annotate("", (end, 0.75), (start, 0.75), arrowprops=arrow)
+        axes.text((start + end) / 2, 0.85, words, ha="center", size=9, color=ORANGE)
+    axes.set_xlim(-0.1, PITCH * len(boxes) - PITCH + BOX_WIDTH + 0.1)
+    axes.set_ylim(-0.1, 1.6)
+    axes.axis("off")
+    return drawn
+
+
+def stages_of(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]:
+    """Title and lines of each stage of a run, and what goes from each to the next."""
+    content = results.content
+    boxes: list[tuple[str, list[str]]] = []
+    arrows: list[str] = []
+    if content.radius is not None and results.modulus is not None:
+        numbers = getattr(content.radius, "numbers", {})
+        lines = [f"{x} = [{', '.join(f'{y:.4g}' for y in ends_of(n))}]" for x, n in numbers.items()]
+        boxes.append(("radius of the particle", lines))
+        arrows.append("r(θ)")
+    if (data := results.modulus) is not None:
+        cuts = data.document["E_GPa"]
+        lines = [f"method {data.document['method']}", f"{data.arrays.sizes['sample']} samples"]
+        lines += [f"E = {cuts['lower'][0]:.5g} … {cuts['upper'][0]:.5g} GPa"]
+        boxes.append(("cell on the product domain", lines))
+        arrows.append("fuzzy E")
+    if results.structure is not None:
+        fuzzy = {name: None for task in results.tasks for name in task.fuzzy}
+        outputs = ", ".join(results.structure.outputs[:4])
+        boxes.append(("structure", [f"fuzzy: {', '.join(fuzzy)}", f"outputs: {outputs}"]))
+        arrows.append("flow q(t; p)")
+        lines = [
+            f"{task.name}: {', '.join(task.fuzzy)} for {task.duration:g} s"
+            for task in results.tasks[:5]
+        ]
+        boxes.append(("envelopes", [f"by {results.tasks[0].section.method}", *lines]))
+        arrows.append("bounds")
+    return boxes, arrows[:-1]
+
+
+def ends_of(number: FuzzyNumber) -> list[float]:
+    """Support and modal value of a fuzzy number, each once, rising."""
+    return sorted({number.support.lower, number.modal, number.support.upper})
