@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from alphacut.case.load import load
+from alphacut.case.particles import PackingSection
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.stages.cell import model_of, references, require_bounds, solve
 from tests.alphacut.case.test_load import fraction_case
@@ -45,3 +46,14 @@ def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
     for outside in ends * [0.9949, 1.0051] * 1e9:
         with pytest.raises(RefusedError):
             require_bounds((outside, outside), bounds, "spheres")
+
+
+@pytest.mark.parametrize(("shape", "densest"), [("spheres", 0.58), ("cylinders", 0.82)])
+def test_a_packing_that_is_too_dense_names_the_cell_of_that_fraction(shape, densest):
+    section = PackingSection(
+        particles=20, fraction=0.83, smallest_radius="1 mm", largest_radius="2 mm"
+    )
+    with pytest.raises(RefusedError) as refused:
+        section.source(spheres=shape == "spheres")
+    assert f"up to {densest}" in str(refused.value)
+    assert "set cell.fraction = 0.83" in str(refused.value)
