@@ -76,7 +76,8 @@ class Content(Section):
     def limited_outputs(self) -> tuple[str, ...]:
         """Peaks that questions compare with limits, each once, such as q3 and max q3."""
         sections = (section for section in self.questions.values() if section.reads_peaks)
-        return tuple(dict.fromkeys(limit.peak for x in sections for limit in x.limits))
+        peaks = (limit.peak for x in sections for limit in x.limits)
+        return tuple(dict.fromkeys(peak.removeprefix("mean ") for peak in peaks))
 
     @property
     def picture(self) -> ImageCell | None:

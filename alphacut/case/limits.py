@@ -1,7 +1,7 @@
 """Limits of outputs, and the sections of the questions that are about them.
 
 A limit is a text such as "drift1 <= 40 mm" or "drift1 <= 0.5 %" of the magnitude, "max q3 <= 80 mm"
-or "min q3 >= -60 mm" of one side.
+or "min q3 >= -60 mm" of one side, "mean drift1 <= 30 mm" of the mean over the records of a suite.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Limit:
     """Largest magnitude allowed of an output, or its greatest or least value.
 
     Args:
-        peak: The output, or "max" or "min" and the output.
+        peak: The output, or "max", "min" or "mean" and the output.
         value: In the SI unit of the output, or as a share of the storey's height; of a least value
             its negative, which the negative of the output must not pass.
         share: Whether it is such a share.
@@ -64,7 +64,7 @@ def parse_limit(value: object) -> Limit:
         RefusedError: The text is no output, a comparison and a quantity, which is positive for a
             magnitude.
     """
-    match = re.fullmatch(r"((?:max |min )?)(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
+    match = re.fullmatch(r"((?:max |min |mean )?)(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift1 <= 0.5 %', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
     if match is None or (match[3] == ">=") != (match[1] == "min "):
         raise RefusedError("", value, allowed)
@@ -74,7 +74,8 @@ def parse_limit(value: object) -> Limit:
         number = _number(text, "" if share else Output(name).unit)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    require(number > 0 or bool(side), "", value=value, allowed=allowed)
+    is_signed = side in ("max ", "min ")
+    require(number > 0 or is_signed, "", value=value, allowed=allowed)
     return Limit(f"{side}{name}", -number if side == "min " else number, share, str(value))
 
 
@@ -226,6 +227,6 @@ class FragilitySection(QuestionSection):
         allowed = "linear structures that start at rest, without forces: they scale with records"
         require(not moves, "fragility", value="of another motion", allowed=allowed)
         for limit in self.limits:
-            positive = limit.value > 0
-            allowed = "limits that the structure at rest keeps"
+            positive = limit.value > 0 and not limit.peak.startswith("mean ")
+            allowed = "limits of each record that the structure at rest keeps"
             require(positive, "fragility.limits", value=limit.text, allowed=allowed)

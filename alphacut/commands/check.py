@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import pi
 from typing import TextIO
 
 from alphacut.case.content import Content
 from alphacut.case.keys import quantity_of
+from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
 from alphacut.commands.options import Command, add_common, answer, read
@@ -16,9 +17,11 @@ from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
 from alphacut.io.quantity import engineering
+from alphacut.report.results import GRAVITY
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
 from alphacut.stages.readiness import overhangs, require_runnable
+from alphacut.stages.suite import SuiteRecord, suite, warnings
 
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
@@ -41,10 +44,34 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         text += f"first natural period: {period:.4g} s, at the most plausible values\n"
     if linear and (record := linear.ground):
         peak = engineering(record.extremes[0], "m/s^2")
-        text += f"record: {len(record.acceleration)} samples, peak {peak}\n"
+        in_g = f"{record.extremes[0] / GRAVITY:.3g} g"
+        text += f"record: {len(record.samples)} samples of {record.step:g} s, peak {peak}, {in_g}\n"
         text += "".join(f"{words}\n" for words in overhangs(content, Structure(linear, {})))
+    if content.records is not None and content.envelope is not None and linear:
+        moved = Structure(linear, {})
+        text += records_text(content.records, suite(content.records, content.envelope, moved))
     answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
+
+
+def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str:
+    """What the files of a suite hold, and what is made of them."""
+    rows = []
+    for named, record in zip(section.recordings, records, strict=True):
+        read, measures = named.recording, record.measures
+        of_file = (
+            named.name,
+            read.file_format,
+            read.unit,
+            f"{read.step:g} s",
+            f"{len(read.samples)}",
+        )
+        ends = (f"{read.offset_share:.2%}", f"{read.peak / GRAVITY:.3g} g")
+        used = tuple(f"{measures[name] / GRAVITY:.3g} g" for name in ("PGA", "Sa(T1)"))
+        rows.append((*of_file, *ends, *used, f"{record.duration:.4g} s"))
+    head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
+    text = text_table((*head, "Sa(T1) used", "motion"), rows)
+    return text + "".join(f"warning: {words}\n" for words in warnings(records))
 
 
 def structure(content: Content) -> StoreyFrame | MatrixStructure | None:

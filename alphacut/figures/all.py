@@ -34,6 +34,8 @@ def drawings(results: Results) -> Iterator[Drawing]:
     yield from _structure(results)
     if results.learned is not None and "refuted" not in results.learned:
         yield "update-inputs", partial(envelope.identified, results.learned)
+    if results.suite is not None:
+        yield "spectra", partial(envelope.spectra, results.suite)
     for key, draw in answers.DRAWINGS.items():
         if key in results.answers:
             yield key, partial(draw, results.answers[key])

@@ -125,3 +125,19 @@ def identified(document: Document) -> Figure:
     axes.set_xlabel("value over the middle of what it was before")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return drawn
+
+
+def spectra(suite: Document) -> Figure:
+    """Pseudo-acceleration of each record over the period, their mean, and T1."""
+    drawn, axes = style.figure(7.2, 3.6)
+    periods = np.asarray(suite["spectra"]["period_s"], float)
+    names = [name for name in suite["spectra"] if name != "period_s"]
+    curves = np.array([suite["spectra"][name] for name in names], float)
+    axes.plot(periods, curves.T, color=style.GREY, lw=0.6)
+    axes.plot(periods, curves.mean(0), color=style.BLUE, lw=1.6, label="mean")
+    axes.axvline(suite["period_s"], color=style.ORANGE, lw=1.2, ls="--", label="T1")
+    axes.set_xscale("log")
+    axes.set_xlabel("period [s]")
+    axes.set_ylabel(f"Sa [m/s²], damping {suite['damping_ratio']:.3g}")
+    axes.legend(fontsize=8)
+    return drawn

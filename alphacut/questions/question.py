@@ -29,7 +29,8 @@ def limit_words(peak: str, limit: float, unit: str) -> str:
         return peak
     if peak.startswith("min "):
         return f"{peak} ≥ {engineering(-limit, unit)}"
-    shown = peak if peak.startswith("max ") else f"|{peak}|"
+    of_mean = f"mean |{peak.removeprefix('mean ')}|" if peak.startswith("mean ") else f"|{peak}|"
+    shown = peak if peak.startswith("max ") else of_mean
     return f"{shown} ≤ {engineering(limit, unit)}"
 
 

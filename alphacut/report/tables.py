@@ -67,6 +67,8 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
             filled_tables[f"envelope_{name}-{output}"] = over_time(data, output)
+    if "records" in summary:
+        filled_tables["spectra"] = spectra(summary["records"]["spectra"])
     return write_csv(filled_tables, folder)
 
 
@@ -183,6 +185,18 @@ def records(part: Document) -> Table:
             rows.append((f"{word} of all", "", "", output, Output(output).unit, *ends, ""))
     head = ("record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit")
     return (*head, "greatest peak", "peak reached", "nature"), rows
+
+
+def spectra(part: Document) -> Table:
+    """Pseudo-acceleration of each record at each period, and their mean."""
+    names = [name for name in part if name != "period_s"]
+    columns = [part[name] for name in names]
+    rows: list[Row] = []
+    for k, period in enumerate(part["period_s"]):
+        values = [column[k] for column in columns]
+        numbers = (period, *values, sum(values) / len(values))
+        rows.append(tuple(map(_number, numbers)))
+    return ("period [s]", *(f"{name} [m/s^2]" for name in (*names, "mean"))), rows
 
 
 def shares(part: Document) -> Table:

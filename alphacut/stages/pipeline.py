@@ -174,6 +174,8 @@ class Pipeline:
         results.structure = structure
         mode = suite.nominal_mode(structure)
         records = suite.suite(section, task.section, structure)
+        for words in suite.warnings(records):
+            say(f"warning: {words}")
         limited = self.content.limited_outputs or structure.outputs
         stages = suite.stages(structure, replace(task, limited=limited), records)
         outcomes = self.store.take_all(stages, self.executor)
@@ -181,7 +183,8 @@ class Pipeline:
         results.suite = json.loads(as_json(suite.document(peaks, records, mode)))
         times = (task.section.alpha, task.duration, task.section.step)
         moved = suite.motion(peaks, records, mode)
-        self._answer(Motion(structure, task.fuzzy, *times, suite.any_record(peaks), moved))
+        worst = suite.with_means(suite.any_record(peaks), peaks)
+        self._answer(Motion(structure, task.fuzzy, *times, worst, moved))
 
     def _peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks of the motion of [envelope]: of the study that has it, else of limited outputs."""

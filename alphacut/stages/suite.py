@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, pi
@@ -13,7 +13,7 @@ from alphacut.case.motion import EnvelopeSection
 from alphacut.case.records import NamedRecording, RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.frame import Accelerogram
-from alphacut.frame.questions.peaks import Peaks
+from alphacut.frame.questions.peaks import Peaks, joined, output_of
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import require
@@ -27,6 +27,10 @@ from alphacut.stages.store import Stage, StageResult, Work
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
+PERIODS = np.geomspace(0.05, 4.0, 45)
+"""Periods of response spectra, in s."""
+MAX_OFFSET = 0.01
+"""Mean of a record as a share of its peak that is said."""
 QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
 """Statistics of a suite's peaks; 84 % is one standard deviation of a normal law above the mean."""
 
@@ -54,6 +58,7 @@ class SuiteRecord:
         duration: Length of the motion, in s.
         measures: "PGA" and "Sa(T1)" of the scaled record, in m/s², and "scale", 1.
         cut_share: Share of the Arias intensity after the end of the motion.
+        offset_share: Mean of the record over its peak, after the correction.
     """
 
     name: str
@@ -61,6 +66,7 @@ class SuiteRecord:
     duration: float
     measures: Mapping[str, float]
     cut_share: float
+    offset_share: float
 
 
 def nominal_mode(structure: Structure) -> Nominal:
@@ -117,7 +123,21 @@ def _record(
     scaled = Accelerogram(ground.step, factor * ground.acceleration)
     sizes = {name: size * (factor if name != "scale" else 1.0) for name, size in measures.items()}
     cut_share = 0.0 if duration >= length else float(1 - shares[end])
-    return SuiteRecord(named.name, scaled, steps * envelope.step, sizes, cut_share)
+    offset = float(ground.samples.mean()) / ground.extremes[0]
+    return SuiteRecord(named.name, scaled, steps * envelope.step, sizes, cut_share, offset)
+
+
+def warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
+    """Sentences on records that are not centred, or are cut."""
+    for record in records:
+        if abs(record.offset_share) > MAX_OFFSET:
+            yield (
+                f"the mean of record {record.name} is {record.offset_share:.1%} of its peak;"
+                ' records.baseline = "mean" subtracts it'
+            )
+        if record.cut_share > 0:
+            share = f"{record.cut_share:.1%} of the Arias intensity of record {record.name}"
+            yield f"{share} lies after the end of its motion, {record.duration:g} s"
 
 
 def under(structure: Structure, record: SuiteRecord) -> Structure:
@@ -181,6 +201,28 @@ def any_record(peaks: Mapping[str, Peaks]) -> Peaks:
     return replace(first, natures=tuple(map(Nature.weakest, columns)), **ends)
 
 
+def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
+    """The peaks of any record, and beside them "mean q3", the mean over the records.
+
+    The mean of each structure lies between the means of the least and of the greatest peaks. That a
+    structure reaches the mean of greatest peaks is not known, as each record has its own worst one;
+    but one of a higher cut has at least the mean of its least peaks, and at most that of its
+    greatest.
+    """
+    plain = [name for name in worst.outputs if name == output_of(name)]
+    columns = {f"mean {name}": name for name in plain}
+    means = {
+        end: np.mean([getattr(x.named(columns), end) for x in peaks.values()], axis=0)
+        for end in ("lower", "upper", "error", "least_proved")
+    }
+    least = np.maximum(means["lower"] - means["error"], means["least_proved"])
+    most = means["upper"] + means["error"]
+    means["reached"] = np.maximum.accumulate(least[::-1])[::-1]
+    means["least_reached"] = np.minimum.accumulate(most[::-1])[::-1]
+    mean = replace(worst.named(columns), **means)
+    return joined(worst, mean)
+
+
 def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal) -> Document:
     """Measures and peaks of each record, and mean, median and 84 % of each output's peaks."""
     first = next(iter(peaks.values()))
@@ -205,7 +247,17 @@ def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: N
             for record in records
         },
         "statistics": outputs,
+        "spectra": {
+            "period_s": PERIODS,
+            **{record.name: spectrum(record.ground, mode) for record in records},
+        },
     }
+
+
+def spectrum(ground: Accelerogram, mode: Nominal) -> Array:
+    """Pseudo-accelerations at `PERIODS` with the nominal damping, in m/s²."""
+    ratio = min(mode.ratio, 0.999)
+    return np.array([spectral_acceleration(ground, float(x), ratio) for x in PERIODS])
 
 
 def statistics(values: Array) -> Document:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -28,7 +29,7 @@ ANY = "any of them"
 
 def output_of(peak: str) -> str:
     """The output of a peak: "q3" of "max q3"."""
-    return peak.removeprefix("max ").removeprefix("min ")
+    return peak.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +87,7 @@ class Peaks:
 
     @staticmethod
     def _is_signed(output: str) -> bool:
-        return output != output_of(output)
+        return output.startswith(("max ", "min "))
 
     def named(self, peaks: Mapping[str, str]) -> Peaks:
         """Some peaks under names of their own, such as those of several limits of one output."""
@@ -166,6 +167,14 @@ def _least_reached(envelope: Envelope, like: Array) -> Array:
     return envelope.least_peaks.upper + between
 
 
+def joined(first: Peaks, second: Peaks) -> Peaks:
+    """Peaks of different names on the same levels."""
+    names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+    ends = {name: np.hstack([getattr(first, name), getattr(second, name)]) for name in names}
+    outputs, natures = (*first.outputs, *second.outputs), (*first.natures, *second.natures)
+    return replace(first, outputs=outputs, natures=natures, **ends)
+
+
 def tightest(first: Peaks, second: Peaks) -> Peaks:
     """Peaks of the same motions on the same levels, from two envelopes of them.
 
@@ -178,33 +187,12 @@ def tightest(first: Peaks, second: Peaks) -> Peaks:
     """
     outputs = tuple(dict.fromkeys((*first.outputs, *second.outputs)))
     columns = [_tightest_column(first, second, output) for output in outputs]
-    return Peaks(
-        alpha=first.alpha,
-        outputs=outputs,
-        lower=np.hstack([column.lower for column in columns]),
-        upper=np.hstack([column.upper for column in columns]),
-        error=np.hstack([column.error for column in columns]),
-        reached=np.hstack([column.reached for column in columns]),
-        least_proved=np.hstack([column.least_proved for column in columns]),
-        least_reached=np.hstack([column.least_reached for column in columns]),
-        natures=tuple(column.natures[0] for column in columns),
-    )
+    return reduce(joined, columns)
 
 
 def _column(peaks: Peaks, output: str) -> Peaks:
     """Peaks of an output alone, arrays of shape (A, 1)."""
-    k = peaks.outputs.index(output)
-    return Peaks(
-        alpha=peaks.alpha,
-        outputs=(output,),
-        lower=peaks.lower[:, [k]],
-        upper=peaks.upper[:, [k]],
-        error=peaks.error[:, [k]],
-        reached=peaks.reached[:, [k]],
-        least_proved=peaks.least_proved[:, [k]],
-        least_reached=peaks.least_reached[:, [k]],
-        natures=(peaks.natures[k],),
-    )
+    return peaks.named({output: output})
 
 
 def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:

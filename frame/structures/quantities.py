@@ -51,7 +51,7 @@ class Output(str):
 
     @property
     def _parts(self) -> tuple[str, str]:
-        name = self.removeprefix("max ").removeprefix("min ")
+        name = self.removeprefix("max ").removeprefix("min ").removeprefix("mean ")
         kind = name.rstrip("0123456789")
         return kind, name[len(kind) :]
 

@@ -114,3 +114,41 @@ def test_fragility_of_one_storey_holds_its_closed_form(tmp_path):
         assert max(exact) * 0.996 <= high
         assert high < 1.3 * max(exact)
         assert low > 0.9 * min(exact)
+
+
+def test_the_mean_over_records_lies_between_means_of_ends(tmp_path):
+    path, out = written(tmp_path), tmp_path / "out"
+    limits = 'limits = ["mean drift1 <= 9 mm"]'
+    path.write_text(path.read_text() + f"\n[decision]\n{limits}\n", encoding="utf-8")
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    peak = summary["decision"]["limits"]["mean drift1"]["peak"]
+    records = summary["records"]
+    assert peak["proved"][0] == pytest.approx(
+        records["statistics"]["drift1"]["proved"]["mean"][0], rel=1e-9
+    )
+    grounds, means = [r.ground for r in records_of(tmp_path)[0]], []
+    for k in np.linspace(0.96, 1.04, 21) * 8e6:
+        period = 2 * np.pi * np.sqrt(20e3 / k)
+        peaks = [spectral_acceleration(x, period, 0.05) / (k / 20e3) for x in grounds]
+        means.append(np.mean(peaks))
+    assert peak["reached"][0] <= max(means)
+    assert max(means) * 0.996 <= peak["proved"][0]
+    assert (out / "figures/spectra.svg").is_file()
+    spectra = records["spectra"]
+    exact = [
+        spectral_acceleration(grounds[0], x, records["damping_ratio"]) for x in spectra["period_s"]
+    ]
+    assert spectra[records_of(tmp_path)[0][0].name] == pytest.approx(exact)
+
+
+def test_check_shows_what_was_read_and_says_what_is_off(tmp_path, capsys):
+    path = written(tmp_path)
+    text = (tmp_path / "two.csv").read_text().splitlines()
+    moved = [text[0], *(f"{t},{float(a) + 0.2}" for t, a in (x.split(",") for x in text[1:]))]
+    (tmp_path / "two.csv").write_text("\n".join(moved) + "\n")
+    assert main(["check", str(path), "--set", "envelope.duration='1 s'"]) == 0
+    told = capsys.readouterr().out
+    assert "mean/peak" in told
+    assert "the mean of record two is" in told
+    assert "of the Arias intensity of record" in told
