@@ -1,4 +1,4 @@
-"""Branch and bound for the modal model: every bound between attained and proved.
+"""Spatial branch and bound for the modal model (Adjiman, Floudas 1998), up to the gap asked for.
 
 All nodes, outputs and sides share one tree of boxes, and each box its polynomials. A box is closed
 for a problem by one of five tests, all but the third on the quadratic Taylor model with the

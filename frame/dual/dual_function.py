@@ -1,5 +1,8 @@
 """The dual function of one bound and its minimisation.
 
+The step is that of the deflected subgradient (Camerini, Fratta, Maffioli 1975) with a target value
+(Polyak 1969).
+
 Scaled variables are used: ẑ = (z − z₀)/s for each intervening variable, within [−1, 1] over the
 box, so that ẑ(u) = a·u + u·Q u ± R with a, Q and R of order one. For a node, an output and a
 side,

@@ -1,5 +1,7 @@
 """Intervening variables of the modes (section 7) as Taylor models with proved remainders.
 
+Functions of the inputs of which the motion is made (Barthelemy, Haftka 1993).
+
 An output is Σ_k Σ_s c_ks e_s(ω_k, g_k; t) over modes k and sources s (loads, velocity, start):
 few numbers a mode, its frequency ω_k = √(λ − g²), its decay g_k = (a + b λ)/2 + ζ √λ and its
 shares c_ks = (r·x)(x·M v_s)/(x·M x), r the output's row and v_s the pattern of the ground or the

@@ -8,8 +8,8 @@
 
        max Σ_k F_k(z_k(u)) ≤ Σ_k max (F_k − μ_k·z_k) + max μ·(z − R)(u) + |μ|·R,
 
-so that nothing rests on how μ is found. The cost is one of modes, tables and nodes, and hardly
-one of inputs (`dual_function`, `level`).
+by Lagrangian relaxation (Geoffrion 1974; Lemaréchal 2001), so that nothing rests on how μ is
+found. The cost is one of modes, tables and nodes, and hardly one of inputs (`dual_function`).
 3. Where the modes' own maxima lie too far from one u, their ranges are halved: slabs of few z,
    not boxes of many u. Near the peaks, that is; elsewhere a wider gap is left.
 4. What the maxima name leads to inputs whose exact motion is the other end of the gap (`box`).

@@ -3,7 +3,7 @@
 Every method is a frozen dataclass with two claims that tests measure: `order`, and
 `stability_limit`, the largest ω h without growth of an undamped oscillation. All derivatives of a
 step with respect to parameters share one factorisation (`jet.inverse`): it is the scheme that is
-differentiated, not the differential equation.
+differentiated, not the differential equation (internal differentiation: Bock 1981).
 """
 
 from __future__ import annotations

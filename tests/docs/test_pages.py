@@ -15,6 +15,21 @@ EQUATIONS = (ROOT / "docs/theory/equations.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| (\d+) \|.*\| `([\w/]+\.py)` \| (?:`([\w.]+)`)? ?\|$", re.MULTILINE)
 
 
+BIBLIOGRAPHY = (ROOT / "docs/theory/bibliography.md").read_text(encoding="utf-8")
+SOURCE = re.compile(r"^\| [^|]+ \| ([^,|]+),[^|]*\((\d{4})\) \| `([\w/]+\.py)` \|$", re.MULTILINE)
+
+
+@pytest.mark.parametrize(("author", "year", "file"), SOURCE.findall(BIBLIOGRAPHY))
+def test_a_source_is_cited_where_the_bibliography_says(author, year, file):
+    text = " ".join((ROOT / file).read_text(encoding="utf-8").split())
+    assert re.search(rf"{re.escape(author)}\b.{{0,120}}?{year}", text)
+
+
+def test_every_row_of_the_bibliography_is_a_source():
+    rows = [row for row in BIBLIOGRAPHY.splitlines() if row.startswith("| ")][1:]
+    assert len(rows) == len(SOURCE.findall(BIBLIOGRAPHY)) > 20
+
+
 def test_every_equation_of_the_paper_has_a_row():
     assert [int(number) for number, _, _ in ROW.findall(EQUATIONS)] == list(range(1, 24))
 
