@@ -56,7 +56,7 @@ def stays_below(
 ) -> bool:
     """Shows by a concave function above that g·x + x·H·x/2 ≤ allowed for low ≤ x ≤ high.
 
-    That is the same plus Σ s_i (x_i − low_i)(high_i − x_i)/2 (αBB: Adjiman, Floudas 1998), and above
+    That is the same plus Σ s_i (x_i − low_i)(high_i − x_i)/2 (αBB: Adjiman, Floudas 1998). Above
     it, where it is concave, lies each of its tangents. `work` (3, d) and `L` (d, d) are scratch.
     """
     if allowed <= 0:

@@ -122,7 +122,7 @@ class Pencil:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Bounds of solutions of T y = r: by Ostrowski's comparison matrix (1937), or in the norm √Σ D y².
+    """Bounds of solutions of T y = r: by Ostrowski's comparison matrix (1937), or in √Σ D y².
 
     With A = D^-½ T D^-½ and J = diag ±1, as T_jj is positive or negative, (J y)·A y has no part of
     the blocks that join those above to those below. So |A y| ≥ least |y| where neither the block
