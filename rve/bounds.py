@@ -28,7 +28,7 @@ def voigt(fraction: Array, matrix: Array, inclusion: Array) -> Array:
 
 def reuss(fraction: Array, matrix: Array, inclusion: Array) -> Array:
     """Stiffness at uniform stress, as `voigt`."""
-    soft = (np.asarray(np.linalg.inv(one), float) for one in (matrix, inclusion))
+    soft = (np.asarray(np.linalg.inv(stiffness), float) for stiffness in (matrix, inclusion))
     return np.asarray(np.linalg.inv(voigt(fraction, *soft)), float)
 
 
@@ -44,7 +44,7 @@ def voigt_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
 
 def reuss_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
     """Stiffness at uniform stress, as `voigt_of_phases`."""
-    compliance = [np.asarray(np.linalg.inv(one), float) for one in stiffness]
+    compliance = [np.asarray(np.linalg.inv(phase), float) for phase in stiffness]
     return np.asarray(np.linalg.inv(voigt_of_phases(fractions, compliance)), float)
 
 
@@ -62,8 +62,8 @@ def hashin_shtrikman_of_phases(fractions: Array, stiffness: Sequence[Array]) -> 
     Returns:
         Shape (2 moduli, 2 ends, …).
     """
-    bulk = np.array([float(bulk_modulus(one)) for one in stiffness])
-    shear = np.array([float(one[2, 2]) for one in stiffness])
+    bulk = np.array([float(bulk_modulus(phase)) for phase in stiffness])
+    shear = np.array([float(phase[2, 2]) for phase in stiffness])
     ends = []
     for end in (np.min, np.max):
         k, g = end(bulk), end(shear)

@@ -230,8 +230,8 @@ def moduli_of_energies(energies: Array, loads: Array) -> Array:
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
     """
     moduli = np.full((*energies.shape[:-1], 3), np.nan)
-    for k, place in enumerate((0, 2, 1)[: len(loads)]):
-        moduli[..., place] = energies[..., k] / (loads[k] @ loads[k])
+    for k, modulus in enumerate((0, 2, 1)[: len(loads)]):
+        moduli[..., modulus] = energies[..., k] / (loads[k] @ loads[k])
     return moduli
 
 

@@ -82,16 +82,16 @@ def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfi
         element: Coordinate element.
     """
     cells, places = (
-        np.array_split(one, comm.size)[comm.rank]
-        for one in (cells, np.zeros((nodes, element.reference_value_shape[0])))
+        np.array_split(rows, comm.size)[comm.rank]
+        for rows in (cells, np.zeros((nodes, element.reference_value_shape[0])))
     )
 
     def stay(*_: Any) -> Any:
-        kept = dolfinx.graph.adjacencylist(np.full((len(cells), 1), comm.rank, np.int32))
-        return getattr(kept, "_cpp_object", kept)
+        graph = dolfinx.graph.adjacencylist(np.full((len(cells), 1), comm.rank, np.int32))
+        return getattr(graph, "_cpp_object", graph)
 
-    own = {"partitioner": stay} if comm.size > 1 else {}
-    return dolfinx.mesh.create_mesh(comm, cells=cells, x=places, e=element, **own)
+    options = {"partitioner": stay} if comm.size > 1 else {}
+    return dolfinx.mesh.create_mesh(comm, cells=cells, x=places, e=element, **options)
 
 
 @contextmanager

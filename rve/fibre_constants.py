@@ -88,5 +88,5 @@ def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
         return total, float(rule.weights @ (values * errors)) / total
 
     value, error = mean(gauss_rule(cell.radius.distribution, points=_FINE))
-    other, _ = mean(gauss_rule(cell.radius.distribution, points=_COARSER))
-    return value, error + abs(other / value - 1)
+    coarser, _ = mean(gauss_rule(cell.radius.distribution, points=_COARSER))
+    return value, error + abs(coarser / value - 1)

@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.rve.fenicsx import PETSc, compiled, fem, petsc, ufl
 
-WHOLE = slice(None)
+ALL_PARTS = slice(None)
 """All parts of a form."""
 
 
@@ -76,14 +76,14 @@ class CellForm:
         for constant, value in zip(self._phases, stiffness, strict=True):
             constant.value[:] = value
 
-    def add_stiffness(self, matrix: PETSc.Mat, parts: slice = WHOLE) -> None:
+    def add_stiffness(self, matrix: PETSc.Mat, parts: slice = ALL_PARTS) -> None:
         """Add the stiffness of eq. 7 to a matrix, whose local-to-global map reduces it."""
         for form in self._stiffness[parts]:
             petsc.assemble_matrix(matrix, form)
         matrix.assemble()
 
-    def load(self, uniform: Array, parts: slice = WHOLE) -> Array:
+    def load(self, uniform: Array, parts: slice = ALL_PARTS) -> Array:
         """Forces −⟨Bᵀ C ε̄⟩ of a macroscopic strain (3,) on this rank's nodes, (nodes · 2,)."""
         self._uniform.value[:] = uniform
-        every = [fem.assemble_vector(form).array for form in self._load[parts]]
-        return np.asarray(np.sum(every, axis=0))
+        vectors = [fem.assemble_vector(form).array for form in self._load[parts]]
+        return np.asarray(np.sum(vectors, axis=0))

@@ -90,10 +90,10 @@ def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
     if result.energies is None:
         raise RefusedError("energies", None, "a model with energies=True")
     values, errors = first_order(result.energies, losses, result.constants_of)
-    beyond = np.ptp(losses) ** 2 * values
+    second_order = np.ptp(losses) ** 2 * values
     if losses.max() > MAX_FIRST_ORDER and result.method == "series":
-        values, beyond = _by_complex_moduli(result, losses), np.zeros(3)
-    errors = errors + beyond + ROUND_OFF * abs(values)
+        values, second_order = _by_complex_moduli(result, losses), np.zeros(3)
+    errors = errors + second_order + ROUND_OFF * abs(values)
     return LossFactors(
         *(dict(zip(CONSTANTS, map(float, x), strict=True)) for x in (values, errors))
     )

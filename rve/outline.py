@@ -50,9 +50,9 @@ class Ellipse:
 
     def __call__(self, angle: Array) -> Array:
         """Distances over ρ at angles."""
-        own = angle - np.radians(self.turn)
+        turned = angle - np.radians(self.turn)
         return np.asarray(
-            1 / np.sqrt(np.cos(own) ** 2 / self.aspect + np.sin(own) ** 2 * self.aspect)
+            1 / np.sqrt(np.cos(turned) ** 2 / self.aspect + np.sin(turned) ** 2 * self.aspect)
         )
 
 
@@ -75,7 +75,7 @@ def reach(outline: Outline) -> float:
 def extents(outline: Outline) -> tuple[float, float, float]:
     """Greatest |x1| and |x2|, and least distance from the centre, for ρ = 1."""
     s = outline(_ANGLES)
-    wide, high = (float((s * abs(way(_ANGLES))).max()) for way in (np.cos, np.sin))
+    wide, high = (float((s * abs(direction(_ANGLES))).max()) for direction in (np.cos, np.sin))
     return wide, high, float(s.min())
 
 

@@ -49,7 +49,7 @@ class StressCurve:
         >>> import numpy as np
         >>> from alphacut.stochastic import TruncatedNormal, gauss_rule
         >>> stiffness = np.tile(4e9 * np.eye(3), (2, 1, 1))
-        >>> curve = StressCurve.of(gauss_rule(TruncatedNormal(), points=2), stiffness)
+        >>> curve = StressCurve.from_stiffness(gauss_rule(TruncatedNormal(), points=2), stiffness)
         >>> [f"{mean:.4g}" for mean in curve.mean]
         ['4e+07', '8e+07']
     """
@@ -61,7 +61,7 @@ class StressCurve:
     stiffness: Array | None = None
 
     @classmethod
-    def of(cls, rule: ThetaRule, stiffness: Array) -> StressCurve:
+    def from_stiffness(cls, rule: ThetaRule, stiffness: Array) -> StressCurve:
         """Stress under the loads of eq. 15 from the stiffness at the nodes."""
         s11 = STRAIN * (stiffness[:, 0, 0] + stiffness[:, 0, 1])
         return cls(rule.nodes, rule.weights, s11, 2 * STRAIN * stiffness[:, -1, -1], stiffness)
@@ -247,8 +247,8 @@ class HomogenisedStiffness:
         modulus = self.modulus
 
         def ratio(moduli: Array) -> Array:
-            other = float(self.constants_of(moduli)[0])
-            return np.array([other / modulus, modulus / other if other > 0 else np.inf])
+            changed = float(self.constants_of(moduli)[0])
+            return np.array([changed / modulus, modulus / changed if changed > 0 else np.inf])
 
         return float(spread(ratio, self.moduli, self._known_errors(errors)).max())
 

@@ -52,10 +52,10 @@ def require_continuous(radius_map: RadiusMap) -> Array:
     law = radius_map.distribution
     theta = np.linspace(law.lower, law.upper, 2049)
     radii = radius_map(theta)
-    place = int(np.argmax(abs(np.diff(radii))))
-    if abs(radii[place + 1] - radii[place]) > JUMP:
-        value = f"{radii[place]:.4g} and {radii[place + 1]:.4g} side by side"
-        raise RefusedError(f"r at θ = {theta[place]:.4g}", value, "maps without a jump")
+    jump = int(np.argmax(abs(np.diff(radii))))
+    if abs(radii[jump + 1] - radii[jump]) > JUMP:
+        value = f"{radii[jump]:.4g} and {radii[jump + 1]:.4g} side by side"
+        raise RefusedError(f"r at θ = {theta[jump]:.4g}", value, "maps without a jump")
     return np.asarray(radii)
 
 
@@ -96,7 +96,7 @@ def require_parts(
     kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
     rows = inclusions if isinstance(inclusions, Sequence) else ()
     right = callable(radius_map) and hasattr(radius_map, "distribution")
-    if not (right and rows and all(isinstance(one, kinds) for one in (matrix, *rows))):
+    if not (right and rows and all(isinstance(phase, kinds) for phase in (matrix, *rows))):
         parts = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
         raise RefusedError(
             "parts of the cell",

@@ -57,9 +57,9 @@ def _ring(grid: PrismGrid, thickness: float) -> Ring | None:
     if not thickness:
         return None
     plane = grid.plane
-    own = grid.phase[: len(plane.triangles)] == grid.names.index(INTERPHASE)
+    in_ring = grid.phase[: len(plane.triangles)] == grid.names.index(INTERPHASE)
     nodes: Mask = np.zeros(len(plane.points), bool)
-    nodes[plane.triangles[own]] = True
+    nodes[plane.triangles[in_ring]] = True
     return Ring(thickness, nodes)
 
 
@@ -116,10 +116,10 @@ def _levels(prisms: Prisms) -> tuple[Array, Rows]:
     below, above = level[prisms.cells[:, BELOW]], level[prisms.cells[:, ABOVE]]
     if (below != below[:, :1]).any() or (above != below[:, :1] + 1).any():
         wrong = (below != below[:, :1]).any(axis=1) | (above != below[:, :1] + 1).any(axis=1)
-        place = prisms.points[prisms.cells[np.argmax(wrong), 0]]
+        x, y, z = prisms.points[prisms.cells[np.argmax(wrong), 0]]
         raise MeshError(
-            f"the prism at ({place[0]:.4g}, {place[1]:.4g}, θ = {place[2]:.4g}) does not stand on"
-            " one level with its top on the next",
+            f"the prism at ({x:.4g}, {y:.4g}, θ = {z:.4g}) does not stand on one level with its top"
+            " on the next",
             "extrude the plane along θ, all columns by the same layers",
         )
     return np.asarray(heights), level
@@ -182,10 +182,10 @@ def _plane(
     return Triangulation(points, vertices, ends, triangles, inside, arc, radius, outline)
 
 
-def _rows_in(rows: Rows, others: Rows) -> Mask:
-    """Whether each row of pairs is among others, shape (n,)."""
+def _rows_in(rows: Rows, candidates: Rows) -> Mask:
+    """Whether each row of pairs is among candidates, shape (n,)."""
     size = int(rows.max(initial=0)) + 1
-    return np.isin(rows @ [size, 1], others @ [size, 1])
+    return np.isin(rows @ [size, 1], candidates @ [size, 1])
 
 
 def _at_most(size: float, bend: Sizes, x: float, y: float) -> float:

@@ -79,12 +79,12 @@ def _require_cell(grid: PrismGrid) -> None:
         lowest = lowest or pairs
 
 
-def _same(pairs: list[tuple[Rows, Rows]], others: list[tuple[Rows, Rows]]) -> bool:
+def _same(pairs: list[tuple[Rows, Rows]], expected: list[tuple[Rows, Rows]]) -> bool:
     """True if nodes have the same partners, in whatever order."""
     return all(
-        dict(zip(*map(np.ndarray.tolist, one), strict=True))
+        dict(zip(*map(np.ndarray.tolist, nodes), strict=True))
         == dict(zip(*map(np.ndarray.tolist, two), strict=True))
-        for one, two in zip(pairs, others, strict=True)
+        for nodes, two in zip(pairs, expected, strict=True)
     )
 
 
@@ -114,9 +114,9 @@ def write(
         volumes = [gmsh.model.addDiscreteEntity(3) for _ in names]
         gmsh.model.mesh.addNodes(3, volumes[0], tags, points.ravel())
         for k, (volume, name) in enumerate(zip(volumes, names, strict=True)):
-            own = np.flatnonzero(phase == k)
+            prisms = np.flatnonzero(phase == k)
             gmsh.model.mesh.addElementsByType(
-                volume, gmsh_prisms.PRISM_15, own + 1, (cells[own] + 1).ravel()
+                volume, gmsh_prisms.PRISM_15, prisms + 1, (cells[prisms] + 1).ravel()
             )
             gmsh.model.addPhysicalGroup(3, [volume], name=name)
         gmsh.write(str(path))

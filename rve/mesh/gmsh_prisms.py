@@ -82,11 +82,13 @@ def extruded(
 def _name_surfaces(gmsh: Any) -> None:
     """Name the sides of the cell and the ends of θ."""
     ends = {LEVELS[0]: (2, 0.0), LEVELS[1]: (2, 1.0)}
-    for name, (axis, place) in (SIDES | ends).items():
+    for name, (axis, coordinate) in (SIDES | ends).items():
         tags = []
         for dimension, tag in gmsh.model.getEntities(2):
             box = gmsh.model.getBoundingBox(dimension, tag)
-            if abs(box[axis] - place) + abs(box[axis + 3] - place) < 1e-5:  # boxes are enlarged
+            if (
+                abs(box[axis] - coordinate) + abs(box[axis + 3] - coordinate) < 1e-5
+            ):  # boxes are enlarged
                 tags.append(tag)
         gmsh.model.addPhysicalGroup(2, tags, name=name)
 
@@ -98,8 +100,8 @@ def read(gmsh: Any) -> Prisms:
         MeshError: A volume has no physical group or two, or a mesh of other elements.
     """
     tags, xyz, _ = gmsh.model.mesh.getNodes()
-    place = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
-    place[tags] = np.arange(len(tags))
+    number = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
+    number[tags] = np.arange(len(tags))
     names: list[str] = []
     cells: list[Rows] = []
     phases: list[Rows] = []
@@ -118,9 +120,9 @@ def read(gmsh: Any) -> Prisms:
     if lone or not names:
         what = f"volume {lone[0]}" if lone else "the mesh"
         raise MeshError(f"{what} has no physical group that names its phase")
-    used, packed = np.unique(place[np.concatenate(cells)], return_inverse=True)
+    used, numbers = np.unique(number[np.concatenate(cells)], return_inverse=True)
     points: Array = np.asarray(xyz, float).reshape(-1, 3)[used]
-    return Prisms(points, packed.reshape(-1, 15), np.concatenate(phases), tuple(names))
+    return Prisms(points, numbers.reshape(-1, 15), np.concatenate(phases), tuple(names))
 
 
 def _cells_of(gmsh: Any, volume: int, name: str) -> Rows:

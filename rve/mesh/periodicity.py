@@ -94,9 +94,9 @@ def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
     if len(sides[0]) != len(sides[1]) or (gaps > SAME_PLACE).any():
         lone = int(np.argmax(np.append(gaps > SAME_PLACE, True)))
         longer = max(sides, key=len)
-        place = f"x{axis + 1} = ±1 at x{2 - axis} = {along[longer[lone]]:.6g}"
+        side = f"x{axis + 1} = ±1 at x{2 - axis} = {along[longer[lone]]:.6g}"
         raise MeshError(
-            f"a node of the sides {place} has no partner on the opposite side",
+            f"a node of the sides {side} has no partner on the opposite side",
             "mesh opposite sides alike",
         )
     return sides[0], sides[1]

@@ -50,8 +50,8 @@ def triangles(
         ]
     phase = np.repeat(phases, [len(block) for block in blocks])
     # the centres of arcs are points without triangles
-    used, packed = np.unique(np.concatenate(blocks), return_inverse=True)
-    return xyz.reshape(-1, 3)[used, :2], packed.reshape(-1, 3), phase
+    used, numbers = np.unique(np.concatenate(blocks), return_inverse=True)
+    return xyz.reshape(-1, 3)[used, :2], numbers.reshape(-1, 3), phase
 
 
 def surfaces(

@@ -23,7 +23,7 @@ _ACCURACY = 1e-9  # of the series
 _POINTS = 14  # of slices in θ
 
 
-def judged(result: HomogenisedStiffness) -> HomogenisedStiffness:
+def with_errors(result: HomogenisedStiffness) -> HomogenisedStiffness:
     """The result with its declared errors.
 
     Args:
@@ -35,12 +35,12 @@ def judged(result: HomogenisedStiffness) -> HomogenisedStiffness:
     """
     assert result.cell is not None
     exact = _exact(result.cell)
-    own, truth = _readings(result.curve), _readings(exact.curve)
+    moduli, truth = _readings(result.curve), _readings(exact.curve)
     # where one load is lacking, s11 is along x1
-    truth = truth[1:] if len(own) == 1 else truth
-    pairs = [_apart(*pair) for pair in zip(own, truth, strict=False)]
-    apart = np.max(pairs, axis=0)  # nan where a modulus is not known
-    error = np.asarray((1 + apart) * (1 + exact.modulus_errors) - 1)
+    truth = truth[1:] if len(moduli) == 1 else truth
+    pairs = [_relative_distance(*pair) for pair in zip(moduli, truth, strict=False)]
+    distance = np.max(pairs, axis=0)  # nan where a modulus is not known
+    error = np.asarray((1 + distance) * (1 + exact.modulus_errors) - 1)
     return replace(result, errors={"space": error}, energies=_judged_energies(result, exact))
 
 
@@ -79,10 +79,10 @@ def _readings(curve: StressCurve) -> Sequence[Array]:
     if curve.stiffness is None:
         return [np.array([s11 / STRAIN, np.nan, s12 / (2 * STRAIN)])]
     mean = np.asarray(np.tensordot(curve.weights, curve.stiffness, axes=1), float)
-    both, first, second = axial_moduli(mean, square=False)
-    return [second, first, both]
+    mean_axes, first, second = axial_moduli(mean, square=False)
+    return [second, first, mean_axes]
 
 
-def _apart(first: Array, second: Array) -> Array:
+def _relative_distance(first: Array, second: Array) -> Array:
     """Relative distance by the larger of both ratios."""
     return np.asarray(np.maximum(first / second, second / first) - 1)

@@ -97,7 +97,10 @@ def _fields(
     form, grid = problem.form, problem.form.grid
     problem.assemble(stiffness)
     vectors = solve(problem.solver(options), problem.loads(loads)).vectors
-    fluctuation, own = fem.Function(form.space), np.arange(len(form.wedge), dtype=np.int32)
+    fluctuation, cells_of_rank = (
+        fem.Function(form.space),
+        np.arange(len(form.wedge), dtype=np.int32),
+    )
     at_nodes = at_points(strain(fluctuation), vertices_and_midpoints())
     positions = grid.positions(problem.map, problem.thickness)
     total = np.empty((grid.nodes, 2, len(vectors)))
@@ -107,14 +110,14 @@ def _fields(
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
         total[form.node, :, k] = u + positions[form.node, :2] @ tensor
         fluctuation.x.array[:] = u.ravel()
-        strains = at_nodes.eval(form.mesh, own).reshape(len(own), NODES, 3)
+        strains = at_nodes.eval(form.mesh, cells_of_rank).reshape(len(cells_of_rank), NODES, 3)
         wedges[form.wedge, ..., k] = strains + uniform
     stress = np.stack(stiffness)[grid.phase][:, None] @ wedges
     numbered = grid.cells + grid.phase[:, None] * grid.nodes
-    kept, cells = np.unique(numbered, return_inverse=True)
+    point_numbers, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)
-    mean = np.zeros((len(kept), 3, len(vectors)))
+    mean = np.zeros((len(point_numbers), 3, len(vectors)))
     np.add.at(mean, cells, stress)
     mean /= np.bincount(cells.ravel())[:, None, None]
-    nodes = kept % grid.nodes
+    nodes = point_numbers % grid.nodes
     return CellFields(positions[nodes], cells, grid.phase, total[nodes], mean, grid.names, nodes)

@@ -75,7 +75,7 @@ class PrismForm:
         self._strain = at_points(strain(self._u), points)
         self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
 
-    def place(self, radius: RadiusMap, thickness: float = 0.0) -> None:
+    def move_to(self, radius: RadiusMap, thickness: float = 0.0) -> None:
         """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
 
         An interphase, of a grid that has one, gets its thickness.
@@ -103,9 +103,9 @@ class PrismForm:
         theta, _ = self.slices()
         density = radius.distribution.pdf(theta)
         if not (density > 0).all():
-            place = f"density of θ at {theta[~(density > 0)][0]:.4g}"
+            key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
             cure = "shorten the support, or take the series"
-            raise RefusedError(place, f"{density.min():g}", "positive densities", cure)
+            raise RefusedError(key, f"{density.min():g}", "positive densities", cure)
         self.areas = self._areas()
         self._require_sound()
         self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)

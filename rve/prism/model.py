@@ -37,7 +37,7 @@ from alphacut.rve.mesh.prism_grid import LevelFunction
 from alphacut.rve.mesh.triangulation import RING_THICKNESS, reference_radius
 from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
-from alphacut.rve.prism.error_estimate import judged
+from alphacut.rve.prism.error_estimate import with_errors
 from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.own_mesh import (
@@ -180,8 +180,10 @@ class PrismModel:
         loads, stiffness = THREE_LOADS, [phase.stiffness for phase in named.phases]
         strains, solved = self._solve_system(problem, stiffness, loads, seconds)
         stress = strains.stress(stiffness)
-        whole = stress @ np.linalg.inv(loads).T
-        curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
+        stiffness_at_nodes = stress @ np.linalg.inv(loads).T
+        curve = StressCurve(
+            strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], stiffness_at_nodes
+        )
         checks = _checks(strains, stiffness, loads, named.phases) | {"residual": solved.residual}
         energies, order = energies_of(strains, named.phases, loads), [*named.order]
         return HomogenisedStiffness(
@@ -260,8 +262,8 @@ class PrismModel:
         """Solutions to project the samples on; None where each is to be solved."""
         if not (isinstance(matrix, Phase) and self.moduli and self.interface == "conforming"):
             return None
-        phases = [one for one in inclusions if isinstance(one, Phase)]
-        ratios, moduli = {one.poisson for one in phases}, [one.modulus for one in phases]
+        phases = [phase for phase in inclusions if isinstance(phase, Phase)]
+        ratios, moduli = {phase.poisson for phase in phases}, [phase.modulus for phase in phases]
         if len(phases) < len(inclusions) or len(ratios) > 1 or self.petsc:
             return None
         low, high = self.moduli
@@ -289,7 +291,7 @@ class PrismModel:
         with timed(seconds, "assemble"):
             problem.assemble(stiffness)
             loads = problem.loads(strains)
-        if all(np.array_equal(one, stiffness[0]) for one in stiffness):
+        if all(np.array_equal(matrix, stiffness[0]) for matrix in stiffness):
             # the affine field is the solution
             solved = Solutions([load.duplicate() for load in loads], (0,) * len(loads), 0.0)
         else:
@@ -305,8 +307,10 @@ class PrismModel:
     def _result(self, strains: SliceStrains, cell: Cell, residual: float) -> HomogenisedStiffness:
         """The result with its certificate and its declared errors."""
         stress, loads = strains.stress(cell.stiffness), self.loads(cell)
-        whole = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
-        curve = StressCurve(strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], whole)
+        stiffness_at_nodes = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
+        curve = StressCurve(
+            strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], stiffness_at_nodes
+        )
         result = HomogenisedStiffness(
             curve,
             self.name,
@@ -315,7 +319,7 @@ class PrismModel:
             energies=energies_of(strains, cell.phases, loads),
         )
         if self.estimate:
-            result = judged(result)
+            result = with_errors(result)
         allowed = 2 * result.largest_error if result.errors else self._roughly
         checks = _checks(strains, cell.stiffness, loads, cell.phases) | {"residual": residual}
         return replace(result, checks=require(checks, discretisation=ROUND_OFF + allowed))

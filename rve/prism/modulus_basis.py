@@ -54,7 +54,7 @@ class ModulusBasis:
     def coefficients(self, modulus: float) -> Array:
         """Of the solutions for each load, shape (fields, loads)."""
         system, loads = (
-            one[0] + modulus / self.ends[1] * one[1] for one in (self.stiffness, self.loads)
+            parts[0] + modulus / self.ends[1] * parts[1] for parts in (self.stiffness, self.loads)
         )
         return np.asarray(np.linalg.solve(system, loads))
 
@@ -135,8 +135,8 @@ def _orthonormal(vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
     basis: list[PETSc.Vec] = []
     for vector in vectors:
         size = vector.norm()
-        for one in [*basis, *basis]:
-            vector.axpy(-vector.dot(one), one)
+        for direction in [*basis, *basis]:
+            vector.axpy(-vector.dot(direction), direction)
         if vector.norm() > ROUND_OFF * size:
             vector.normalize()
             basis.append(vector)

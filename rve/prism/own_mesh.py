@@ -93,8 +93,8 @@ def require_law(grid: PrismGrid, law: object) -> FixedCell:
     """
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
-    ends, own = np.array([theta.min(), theta.max()]), (getattr(law, x, np.nan) for x in _ENDS)
-    support = np.array(list(own))
+    ends, law_ends = np.array([theta.min(), theta.max()]), (getattr(law, x, np.nan) for x in _ENDS)
+    support = np.array(list(law_ends))
     if not abs(support - ends).max() <= SAME_LEVEL * np.ptp(ends) or not hasattr(law, "pdf"):
         value = f"on {support[0]:g} … {support[1]:g}"
         allowed = f"laws on {ends[0]:g} … {ends[1]:g}, the lowest and the highest level of the mesh"

@@ -10,7 +10,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import AREA
 from alphacut.rve.fenicsx import MPI, PETSc, fem, petsc
-from alphacut.rve.form import WHOLE
+from alphacut.rve.form import ALL_PARTS
 from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.wedge import POINTS, SLICES
 from alphacut.rve.prism.form import PrismForm
@@ -54,7 +54,7 @@ class SliceStrains:
 
     def stress(self, stiffness: Sequence[Array]) -> Array:
         """Homogenised (σ11, σ22, σ12), shape (n, 3, fields), in Pa, for the phases' stiffness."""
-        stresses = [one @ strain for one, strain in zip(stiffness, self.strain, strict=True)]
+        stresses = [matrix @ strain for matrix, strain in zip(stiffness, self.strain, strict=True)]
         return np.asarray(sum(stresses))
 
     def energy(self, stiffness: Sequence[Array]) -> Array:
@@ -109,9 +109,9 @@ class PrismProblem:
             RefusedError: The density of θ is not positive everywhere.
         """
         self.map, self.thickness = radius_map, thickness
-        self.form.place(radius_map, thickness)
+        self.form.move_to(radius_map, thickness)
 
-    def assemble(self, stiffness: Sequence[Array], parts: slice = WHOLE) -> PETSc.Mat:
+    def assemble(self, stiffness: Sequence[Array], parts: slice = ALL_PARTS) -> PETSc.Mat:
         """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa.
 
         Args:
@@ -123,11 +123,11 @@ class PrismProblem:
         self.form.elastic.add_stiffness(self.matrix, parts)
         return self.matrix
 
-    def loads(self, strains: Array, parts: slice = WHOLE) -> list[PETSc.Vec]:
+    def loads(self, strains: Array, parts: slice = ALL_PARTS) -> list[PETSc.Vec]:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
-        own, size = len(self.numbering.rows), self.numbering.size
-        forces = [self.form.elastic.load(one, parts) for one in strains]
-        return [reduced(one, self.local_map, own, size) for one in forces]
+        num_rows, size = len(self.numbering.rows), self.numbering.size
+        forces = [self.form.elastic.load(strain, parts) for strain in strains]
+        return [reduced(force, self.local_map, num_rows, size) for force in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
         """The solver of the stiffness as assembled, or of another symmetric operator.
@@ -168,14 +168,14 @@ class PrismProblem:
             strain[..., k] = uniform if u is None else form.strains(u) + uniform
         parts = form.phase_areas() / AREA  # (phases, cells, 3, points)
         sums = np.einsum("pmsq,msqif->pmsif", parts, strain)
-        means = np.stack([form.by_layer(one) for one in sums])
-        fractions = np.array([form.by_layer(one.sum(axis=-1)) for one in parts])
+        means = np.stack([form.by_layer(values) for values in sums])
+        fractions = np.array([form.by_layer(areas.sum(axis=-1)) for areas in parts])
         theta, weights = form.slices()
         weight = form.of_slices(weights)[None, :, :, None] * parts
         flat = strain.reshape(-1, 3 * len(fields))
-        products = np.array([flat.T @ (one.reshape(-1, 1) * flat) for one in weight])
+        products = np.array([flat.T @ (factors.reshape(-1, 1) * flat) for factors in weight])
         means, fractions, products = (
-            self.comm.allreduce(one) for one in (means, fractions, products)
+            self.comm.allreduce(total) for total in (means, fractions, products)
         )
         phases, count = len(parts), len(fields)
         return SliceStrains(

@@ -130,12 +130,12 @@ class ProductSpace:
 def _separate_problem(model: PrismModel, law: RadiusMap | ThetaLaw) -> PrismProblem:
     """A problem that the model does not move to its next map, as it does those that it keeps."""
     if model.mesh:
-        kept = own_mesh_problem(model.mesh, model.parallel)
-        radius: RadiusMap = require_law(kept.form.grid, law)
+        shared = own_mesh_problem(model.mesh, model.parallel)
+        radius: RadiusMap = require_law(shared.form.grid, law)
     else:
-        kept = model.problem(cast("RadiusMap", law))
-        radius = kept.map
-    problem = PrismProblem(kept.form.grid, kept.comm)
+        shared = model.problem(cast("RadiusMap", law))
+        radius = shared.map
+    problem = PrismProblem(shared.form.grid, shared.comm)
     problem.move(radius)
     return problem
 

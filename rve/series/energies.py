@@ -56,7 +56,7 @@ def mean_energies(
             mean.terms,
             gauss_rule(radius_map.distribution, points=finer_count(mean.curve.theta.size)),
         )
-        values, other = (
+        values, judge = (
             np.tensordot(
                 x.weights, phase_energies(radius_map(theta), matrix, inclusion, harmonics=n), 1
             )
@@ -65,6 +65,6 @@ def mean_energies(
                 (rule, rule.nodes, count + max(2, count // 2)),
             )
         )
-        errors = SAFETY * abs(values - other) + NOISE * values.sum(axis=(0, 1))
+        errors = SAFETY * abs(values - judge) + NOISE * values.sum(axis=(0, 1))
         energies.append(PhaseEnergies(values, errors))
     return energies

@@ -8,7 +8,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.lattice_sums import ZETA_PERIOD, lattice_images, lattice_sums
 
-_FEWEST, _MOST, _SETTLED = 4, 128, 1e-12
+_FEWEST, _MOST, _CONVERGED = 4, 128, 1e-12
 
 
 def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
@@ -25,8 +25,8 @@ def longitudinal_shear(radius: Array, matrix: Phase, inclusion: Phase) -> tuple[
         count, before = 2 * count, value
         value = _moduli(radius, *shears, count)
         change = np.abs(value / before - 1)
-        if change.max() <= _SETTLED or count >= _MOST:
-            return value, change + _SETTLED
+        if change.max() <= _CONVERGED or count >= _MOST:
+            return value, change + _CONVERGED
 
 
 def _moduli(radius: Array, matrix: float, inclusion: float, count: int) -> Array:

@@ -85,22 +85,22 @@ def settled_means(
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     law = radius_map.distribution
     make_rule: Callable[..., ThetaRule] = _kept_rule if isinstance(law, Hashable) else gauss_rule
-    known: dict[int, _Averages] = {}
-    settled: dict[int, Mean] = {}
+    averages: dict[int, _Averages] = {}
+    means: dict[int, Mean] = {}
     while True:
         counts = [count, finer_count(count), finer_count(finer_count(count))]
         for n in counts:
-            if n not in known:
+            if n not in averages:
                 rule = make_rule(law, points=n)
-                known[n] = _Averages(rule, cells(radius_map(rule.nodes)))
-        own, finer, finest = (known[n] for n in counts)
-        left = _SAFETY * error_by_more_terms(own.moduli, finer.moduli, finest.moduli) + _NOISE
+                averages[n] = _Averages(rule, cells(radius_map(rule.nodes)))
+        coarse, finer, finest = (averages[n] for n in counts)
+        left = _SAFETY * error_by_more_terms(coarse.moduli, finer.moduli, finest.moduli) + _NOISE
         for k in range(len(left)):
-            if k not in settled and (points or left[k].max() <= accuracy):
+            if k not in means and (points or left[k].max() <= accuracy):
                 # each inclusion by itself, whatever its companions need
-                settled[k] = _mean(own, finest, left[k], k)
-        if len(settled) == len(left):
-            return [settled[k] for k in range(len(left))]
+                means[k] = _mean(coarse, finest, left[k], k)
+        if len(means) == len(left):
+            return [means[k] for k in range(len(left))]
         if counts[-1] >= _MOST_POINTS:
             raise RuleError(
                 f"the rule of {count} nodes in θ leaves a relative error of {left.max():.1e};"
@@ -110,12 +110,12 @@ def settled_means(
         count = counts[1]
 
 
-def _mean(own: _Averages, judge: _Averages, in_theta: Array, k: int) -> Mean:
+def _mean(result: _Averages, judge: _Averages, in_theta: Array, k: int) -> Mean:
     """Inclusion k by a rule; what the rule that judges it is off by is in no error yet."""
     return Mean(
-        curve=StressCurve.of(own.rule, own.cells.matrix[:, k]),
-        errors={"space": np.maximum(own.errors[k], judge.errors[k]), "theta": in_theta},
-        terms=int(own.cells.terms[:, k].max()),
+        curve=StressCurve.from_stiffness(result.rule, result.cells.matrix[:, k]),
+        errors={"space": np.maximum(result.errors[k], judge.errors[k]), "theta": in_theta},
+        terms=int(result.cells.terms[:, k].max()),
     )
 
 

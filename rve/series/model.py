@@ -76,7 +76,7 @@ class SeriesModel:
         means = settled_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
         seconds = perf_counter() - start
         cells = [Cell(matrix, inclusion, radius_map) for inclusion in inclusions]
-        results = [self._result(*one, seconds) for one in zip(means, cells, strict=True)]
+        results = [self._result(*pair, seconds) for pair in zip(means, cells, strict=True)]
         if not self.energies:
             return results
         energies = mean_energies(radius_map, matrix, inclusions, means)

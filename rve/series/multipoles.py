@@ -49,11 +49,11 @@ class Contrast:
     mu_i: Array
 
     @classmethod
-    def of(cls, matrix: Phase, inclusions: Sequence[Phase]) -> Contrast:
+    def of_phases(cls, matrix: Phase, inclusions: Sequence[Phase]) -> Contrast:
         """From the phases, plane strain: κ = 3 − 4ν, μ = E / 2(1 + ν)."""
         phases = (matrix, *inclusions)
-        kappa = np.array([3 - 4 * one.poisson for one in phases])
-        mu = np.array([one.modulus / (2 * (1 + one.poisson)) for one in phases])
+        kappa = np.array([3 - 4 * phase.poisson for phase in phases])
+        mu = np.array([phase.modulus / (2 * (1 + phase.poisson)) for phase in phases])
         return cls(float(kappa[0]), float(mu[0]), kappa[1:], mu[1:])
 
     @classmethod

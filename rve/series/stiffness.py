@@ -38,7 +38,7 @@ def square_stiffness(
         RefusedError: A radius lies outside [0, 1).
         SeriesError: The series does not reach `tolerance` (particles nearly in touch).
     """
-    contrast = Contrast.of(matrix, inclusions)
+    contrast = Contrast.of_phases(matrix, inclusions)
 
     def solve(radii: Array, harmonics: int) -> Array:
         columns = [

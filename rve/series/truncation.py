@@ -89,19 +89,19 @@ class Truncation:
         moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
         used, todo = np.zeros(shape, int), np.arange(radius.size)
         rate = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))
-        place = np.searchsorted(steps, np.log(1 / tolerance) / rate)
-        place = np.minimum(place, steps.size - 1)
+        step_number = np.searchsorted(steps, np.log(1 / tolerance) / rate)
+        step_number = np.minimum(step_number, steps.size - 1)
         while todo.size:
-            for step in np.unique(place[todo]):
-                rows = todo[place[todo] == step]
+            for step in np.unique(step_number[todo]):
+                rows = todo[step_number[todo] == step]
                 # what is settled stays, whatever its companions need
                 open_ = errors[rows].max(axis=2) > tolerance
-                values, left = self._judged(radius[rows], inclusions, solve, int(steps[step]))
+                values, left = self._with_error(radius[rows], inclusions, solve, int(steps[step]))
                 moduli[rows] = np.where(open_[..., None], values, moduli[rows])
                 errors[rows] = np.where(open_[..., None], left, errors[rows])
                 used[rows] = np.where(open_, steps[step], used[rows])
             todo = todo[errors[todo].max(axis=(1, 2)) > tolerance]
-            ended = todo[place[todo] == steps.size - 1]
+            ended = todo[step_number[todo] == steps.size - 1]
             if ended.size:
                 raise SeriesError(
                     f"the series at r = {radius[ended].max():.6g} reaches a relative error of"
@@ -109,19 +109,19 @@ class Truncation:
                     f" {tolerance:.1e} is allowed: {self.particles} nearly touch",
                     "lower the radius or raise the tolerance",
                 )
-            place[todo] += 1
+            step_number[todo] += 1
         return CellModuli(moduli, errors, used, self.voigt)
 
-    def _judged(
+    def _with_error(
         self, radius: Array, inclusions: int, solve: Solve, terms: int
     ) -> tuple[Array, Array]:
         """Moduli and their errors, with a margin: a quarter and a half more terms tell them."""
         counts = terms, terms + max(2, terms // 4), terms + max(4, terms // 2)
-        own, finer, finest = (
+        coarse, finer, finest = (
             np.concatenate([solve(part, n) for part in self._batches(radius, inclusions, n)])
             for n in counts
         )
-        return own, self.safety * error_by_more_terms(own, finer, finest) + self.round_off
+        return coarse, self.safety * error_by_more_terms(coarse, finer, finest) + self.round_off
 
     def _batches(self, radius: Array, inclusions: int, terms: int) -> Iterator[Array]:
         """Radii in so many parts that matrices stay small."""
@@ -129,9 +129,9 @@ class Truncation:
         yield from np.array_split(radius, min(radius.size, parts))
 
 
-def error_by_more_terms(own: Array, finer: Array, finest: Array) -> Array:
+def error_by_more_terms(coarse: Array, finer: Array, finest: Array) -> Array:
     """Relative distance from the farther of two better values.
 
     One alone may meet the value by chance, for changes have either sign.
     """
-    return np.asarray(np.maximum(np.abs(own / finer - 1), np.abs(own / finest - 1)))
+    return np.asarray(np.maximum(np.abs(coarse / finer - 1), np.abs(coarse / finest - 1)))

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 _FADE = 0.03  # least share of the last change that is taken to be left by order 4
 _ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
-_CANCELLED = 2e-14  # relative round-off for each unit of radius and contrast
+_CANCELLATION = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
 _COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
 _AXES = 1.5  # safety where the moduli along both axes differ
@@ -113,10 +113,10 @@ class SlicesModel:
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         require_interphase(interphase, self.outline)
-        every = require_continuous(radius_map)
+        all_radii = require_continuous(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
-        solved = np.concatenate([radius_map(rule.nodes), [every.min(), every.max()]])
+        solved = np.concatenate([radius_map(rule.nodes), [all_radii.min(), all_radii.max()]])
         radii, places = np.unique(np.round(solved, DIGITS), return_inverse=True)
         nodes = places[: rule.nodes.size]
         slices = [self._slice(radius, matrix, inclusions, interphase) for radius in radii]
@@ -124,15 +124,15 @@ class SlicesModel:
         results = []
         for m, inclusion in enumerate(inclusions):
             cell = Cell(matrix, inclusion, radius_map, self.outline, interphase)
-            stiffness = np.array([one.stiffness(self.order)[m] for one in slices])
+            stiffness = np.array([plane.stiffness(self.order)[m] for plane in slices])
             moduli = square_moduli(stiffness)
-            error = np.array([one.error(self.order, square=cell.square)[m] for one in slices])
-            curve = StressCurve.of(rule, stiffness[nodes])
+            error = np.array([plane.error(self.order, square=cell.square)[m] for plane in slices])
+            curve = StressCurve.from_stiffness(rule, stiffness[nodes])
             result = HomogenisedStiffness(
                 curve=curve,
                 method=self.name,
                 solver="cholesky",
-                unknowns=max(one.unknowns[self.order] for one in slices),
+                unknowns=max(plane.unknowns[self.order] for plane in slices),
                 seconds=seconds,
                 errors={
                     "space": mean_errors(curve, error[nodes], square=cell.square),
@@ -150,7 +150,7 @@ class SlicesModel:
             results.append(certified(result))
         if not self.energies:
             return results
-        pairs = [energies_with_errors(one.energies, self.order) for one in slices]
+        pairs = [energies_with_errors(plane.energies, self.order) for plane in slices]
         values, errors = (np.array(x) for x in zip(*pairs, strict=True))
         return [
             replace(
@@ -225,8 +225,7 @@ class Slice:
         by_order: Stiffness by order, in Pa, shape (3, m, 3, 3).
         unknowns: Of the linear system, by order.
         mesh_size: Edge length of the mesh, in halves of the cell's side.
-        cancelled: Relative round-off that a stiff particle's forces leave of each inclusion where
-            they cancel, shape (m, 1).
+        cancellation: Relative round-off where forces of a stiff particle cancel, shape (m, 1).
         energies: Parts of the phases in the three moduli by order, shape (m, 2, 2, 3), in Pa; empty
             where they were not asked for.
     """
@@ -234,7 +233,7 @@ class Slice:
     by_order: Array
     unknowns: Mapping[int, int]
     mesh_size: float
-    cancelled: Array
+    cancellation: Array
     energies: Mapping[int, Array] = field(default_factory=dict)
 
     def stiffness(self, order: int) -> Array:
@@ -252,9 +251,9 @@ class Slice:
                 axis count.
         """
         moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 3)
-        own = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
+        distance = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
         gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2) * (1 if square else _AXES)
-        return np.asarray((1 + own) * (1 + self._error_of_highest(gaps)) - 1)
+        return np.asarray((1 + distance) * (1 + self._error_of_highest(gaps)) - 1)
 
     def _error_of_highest(self, gaps: Array) -> Array:
         """Declared errors by order 4, shape (m, 3), from changes by each rise of order, (2, m, 3).
@@ -267,7 +266,7 @@ class Slice:
         safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
         error = safety * gaps[1] * fade / (1 - fade)
         shared = _SHARED * error.max(axis=1, keepdims=True)
-        return np.asarray(np.maximum(error, shared) + _ROUND_OFF + self.cancelled)
+        return np.asarray(np.maximum(error, shared) + _ROUND_OFF + self.cancellation)
 
 
 def solve_slice(
@@ -291,7 +290,7 @@ def solve_slice(
         np.array([*stiffness.values()]),
         {order: cell.unknowns for order, cell in cells.items()},
         mesh_size,
-        _cancelled(radius, matrix, inclusions),
+        _cancellation(radius, matrix, inclusions),
         parts,
     )
 
@@ -335,8 +334,8 @@ def solve_outline_slice(
     return OutlineSlice(
         by_order=stiffness,
         on_second_mesh=_by_order(judge, phases)[0][JUDGE],
-        unknowns={one: cell.unknowns for one, cell in cells.items()},
-        round_off=_ROUND_OFF + _cancelled(radius, matrix, inclusions),
+        unknowns={degree: cell.unknowns for degree, cell in cells.items()},
+        round_off=_ROUND_OFF + _cancellation(radius, matrix, inclusions),
         energies=parts,
     )
 
@@ -350,10 +349,12 @@ def _by_order(
         stiffness[order].append(cell.stiffness([phase.stiffness for phase in phases]))
         if energies:
             parts[order].append(cell.phase_energies(phases))
-    return tuple({order: np.array(x) for order, x in of.items()} for of in (stiffness, parts))
+    return tuple(
+        {order: np.array(x) for order, x in results.items()} for results in (stiffness, parts)
+    )
 
 
-def _cancelled(radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:
+def _cancellation(radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:
     """Relative round-off where a stiff particle's forces cancel, shape (m, 1)."""
-    contrast = [[one.stiffness[2, 2] / matrix.stiffness[2, 2]] for one in inclusions]
-    return np.asarray(_CANCELLED * radius * np.array(contrast))
+    contrast = [[phase.stiffness[2, 2] / matrix.stiffness[2, 2]] for phase in inclusions]
+    return np.asarray(_CANCELLATION * radius * np.array(contrast))

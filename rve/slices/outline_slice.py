@@ -83,6 +83,6 @@ def energies_with_errors(energies: Mapping[int, Array], order: int) -> tuple[Arr
 
     The distance from the highest other order, which is far from both where that is the lower one.
     """
-    values, other = energies[order], energies[max(set(energies) - {order})]
-    error = ORDER_SAFETY * abs(values - other)
+    values, judge = energies[order], energies[max(set(energies) - {order})]
+    error = ORDER_SAFETY * abs(values - judge)
     return values, error + NOISE * values.sum(axis=(1, 2), keepdims=True)

@@ -61,8 +61,8 @@ class PlaneCell:
         self._form.set_phases(phases)
         self._matrix.zeroEntries()
         self._form.add_stiffness(self._matrix)
-        forces = [self._form.load(one) for one in np.eye(3)]
-        loads = [reduced(one, self._local, self.unknowns, self.unknowns) for one in forces]
+        forces = [self._form.load(strain) for strain in np.eye(3)]
+        loads = [reduced(force, self._local, self.unknowns, self.unknowns) for force in forces]
         solved = solve(cholesky(self._matrix, PREFIX), loads)
         if not solved.residual <= RESIDUAL:
             raise ConvergenceError(

@@ -52,12 +52,12 @@ def theta_error(
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
     touch, target = np.sqrt(1 - (radii + thickness) ** 2), np.sqrt(1 - (between + thickness) ** 2)
     ends, width = touch.min() + touch.max(), max(np.ptp(touch), 1e-12)
-    own, gaps = rule.weights @ moduli[places], []
+    mean, gaps = rule.weights @ moduli[places], []
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
         basis, carried = (chebvander((2 * x - ends) / width, degree) for x in (touch, target))
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
         refined = scale * np.exp(np.clip(carried @ coefficients, low - span, high + span))
-        gaps.append(fine.weights @ refined / own - 1)
+        gaps.append(fine.weights @ refined / mean - 1)
     return np.asarray(_SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
 
 

@@ -87,7 +87,7 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
     matrix, _ = ksp.getOperators()
     vectors, iterations, residuals = [], [], []
     for load in loads:
-        x, rest = load.duplicate(), load.duplicate()
+        x, residual = load.duplicate(), load.duplicate()
         ksp.solve(load, x)  # eq. 7: K U = F
         reason, count = ksp.getConvergedReason(), ksp.getIterationNumber()
         if reason <= 0 or not np.isfinite(x.norm()):
@@ -97,11 +97,11 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
                 f"raise -{ksp.getOptionsPrefix()}ksp_max_it or take another solver",
             )
         LOG.debug("%s with %s: %d iterations", ksp.getType(), ksp.pc.getType(), count)
-        matrix.mult(x, rest)
-        rest.axpy(-1, load)
+        matrix.mult(x, residual)
+        residual.axpy(-1, load)
         vectors.append(x)
         iterations.append(count)
-        residuals.append(rest.norm() / (load.norm() or 1.0))
+        residuals.append(residual.norm() / (load.norm() or 1.0))
     return Solutions(vectors, tuple(iterations), max(residuals))
 
 
@@ -115,9 +115,9 @@ def in_database(options: SolverOptions) -> Iterator[None]:
         ConvergenceError: PETSc fails otherwise.
     """
     database = PETSc.Options(PREFIX)
-    own = {name: database.getString(name) for name in options.all if database.hasName(name)}
+    from_user = {name: database.getString(name) for name in options.all if database.hasName(name)}
     overrides = {name: options.all[name] for name in options.overrides}
-    for name, value in (options.all | own | overrides).items():
+    for name, value in (options.all | from_user | overrides).items():
         database[name] = value
     try:
         yield
@@ -130,7 +130,7 @@ def in_database(options: SolverOptions) -> Iterator[None]:
     finally:
         for name in options.all:
             database.delValue(name)
-        for name, value in own.items():
+        for name, value in from_user.items():
             database[name] = value
     if unused:
         value = options.overrides[unused[0]]

@@ -34,12 +34,12 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
         rows: Unknowns of this rank.
         size: Unknowns in all.
     """
-    kept = pairs >= 0
-    cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[kept]
+    has_unknown = pairs >= 0
+    cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[has_unknown]
     shape = len(pairs), size // 2
-    touch = sp.csr_matrix((np.ones(len(cell), np.int8), (cell, pairs[kept])), shape)
-    own = touch.T.tocsr()[rows.start // 2 : rows.stop // 2]
-    pattern = sp.kron((own @ touch).astype(bool), np.ones((2, 2), bool), "csr")
+    touch = sp.csr_matrix((np.ones(len(cell), np.int8), (cell, pairs[has_unknown])), shape)
+    rows_touched = touch.T.tocsr()[rows.start // 2 : rows.stop // 2]
+    pattern = sp.kron((rows_touched @ touch).astype(bool), np.ones((2, 2), bool), "csr")
     pattern.sort_indices()
     csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
     sizes = (len(rows), size)
@@ -50,9 +50,9 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
     return matrix
 
 
-def reduced(values: Array, local_map: PETSc.LGMap, own: int, size: int) -> PETSc.Vec:
-    """Vector of `own` unknowns here and `size` in all: the sum of the values (nodes · 2,)."""
-    vector = PETSc.Vec().createMPI((own, size), bsize=2, comm=local_map.comm)
+def reduced(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> PETSc.Vec:
+    """Vector of `num_rows` unknowns here and `size` in all: the sum of the values (nodes · 2,)."""
+    vector = PETSc.Vec().createMPI((num_rows, size), bsize=2, comm=local_map.comm)
     vector.setLGMap(local_map)
     nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
     vector.setValuesBlockedLocal(nodes, values, addv=PETSc.InsertMode.ADD_VALUES)
@@ -107,9 +107,9 @@ class LevelNumbering:
         self.planar, self.between = 2 * self.periodicity.count, 2 * self.periodicity.vertices
         self.stride = self.planar + self.between
         self.size = grid.layers * self.stride + self.planar
-        own = np.array_split(np.arange(grid.layers + 1), comm.size)
-        first = sum(len(part) for part in own[: comm.rank])
-        self.levels = range(first, first + len(own[comm.rank]))
+        parts = np.array_split(np.arange(grid.layers + 1), comm.size)
+        first = sum(len(part) for part in parts[: comm.rank])
+        self.levels = range(first, first + len(parts[comm.rank]))
         self.middles = range(first, min(self.levels.stop, grid.layers))
         ends = (min(k * self.stride, self.size) for k in (first, self.levels.stop))
         self.rows = range(*ends)

@@ -185,10 +185,10 @@ class ThetaPreconditioner:
         """Show the solver of a level, called by PETSc for ``-rve_ksp_view``."""
         count = f"{len(self.levels)} levels and {len(self.middles)} half-way on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
-        own = viewer.getSubViewer(PETSc.COMM_SELF)
+        of_rank = viewer.getSubViewer(PETSc.COMM_SELF)
         if self.numbering.levels.start == 0:  # the first rank's, which are like all others
-            self.levels[0].view(own)
-        viewer.restoreSubViewer(own)
+            self.levels[0].view(of_rank)
+        viewer.restoreSubViewer(of_rank)
 
     def _of_all_ranks(self, vector: PETSc.Vec) -> Array:
         self.scatter.scatter(vector, self.whole)
@@ -203,8 +203,8 @@ class ThetaPreconditioner:
 
 def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:
     """Nodal values of a level's hats: half on the vertices half-way below and above."""
-    half, one = sp.eye(corners, planar) / 2, sp.eye(planar)
-    stacked = sp.vstack([half] * below + [one] + [half] * above, "csr")
+    half, level = sp.eye(corners, planar) / 2, sp.eye(planar)
+    stacked = sp.vstack([half] * below + [level] + [half] * above, "csr")
     csr = stacked.indptr.astype(PETSc.IntType), stacked.indices.astype(PETSc.IntType)
     return PETSc.Mat().createAIJ(stacked.shape, csr=(*csr, stacked.data), comm=PETSc.COMM_SELF)
 
@@ -212,9 +212,9 @@ def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:
 def _injection(numbering: LevelNumbering) -> sp.csr_matrix:
     """J: a linear field on vertices, carried on to edge midpoints, shape (planar, between)."""
     corners, ends = numbering.periodicity.vertices, numbering.periodicity.ends(numbering.grid.plane)
-    rows, kept = np.arange(corners, numbering.periodicity.count), ends >= 0
+    rows, is_free = np.arange(corners, numbering.periodicity.count), ends >= 0
     middle = sp.csr_matrix(
-        (np.full(kept.sum(), 0.5), (np.repeat(rows, 2).reshape(-1, 2)[kept], ends[kept])),
+        (np.full(is_free.sum(), 0.5), (np.repeat(rows, 2).reshape(-1, 2)[is_free], ends[is_free])),
         (numbering.periodicity.count, corners),
     )
     linear = middle + sp.eye(numbering.periodicity.count, corners)

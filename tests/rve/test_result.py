@@ -154,7 +154,7 @@ def test_shear_along_the_fibres_is_dual_and_dilute():
 
 def test_without_a_cell_there_are_no_constants():
     result = SeriesModel().solve(PAPER, MATRIX, [PARTICLE])[0]
-    with pytest.raises(RefusedError, match="round particles and isotropic phases"):
+    with pytest.raises(RefusedError, match="round particles and two isotropic phases"):
         fibre_constants(replace(result, cell=None))
 
 

@@ -43,7 +43,7 @@ def test_a_prism_that_gmsh_does_not_return_is_missed_by_its_volume(outline):
 
 def test_dolfinx_takes_all_prisms_of_gmsh():
     form = PrismForm(extrude(size=0.5, radius=0.4, layers=3), MPI.COMM_SELF)
-    form.place(MAP)
+    form.move_to(MAP)
     assert form.areas.sum() == pytest.approx(4.0 * 3 * 3, rel=1e-12)  # slices of all layers
 
 

@@ -238,7 +238,7 @@ def test_a_map_that_folds_the_mesh_leaves_the_model_as_it_was(monkeypatch):
     mirrored = form.grid.positions(HermiteMap(0.2, 0, 0.6, 0)) * [-1, 1, 1]
     monkeypatch.setattr(type(form.grid), "positions", lambda *_: mirrored)
     with pytest.raises(FoldedMeshError):
-        form.place(HermiteMap(0.2, 0, 0.6, 0))
+        form.move_to(HermiteMap(0.2, 0, 0.6, 0))
     after = form.mesh.geometry.x, form.areas, form.slices()[0]
     assert all(np.array_equal(x, y) for x, y in zip(before, after, strict=True))
 
