@@ -128,6 +128,8 @@ def require_numbers(name: str, values: object) -> None:
     """
     listed = isinstance(values, Collection) and not isinstance(values, str)
     require(listed, name, value=repr(values), allowed="a list of numbers")
+    if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" and np.isfinite(values).all():
+        return  # at once: matrices have many entries
     for value in np.ravel(values).tolist() if isinstance(values, np.ndarray) else values:  # type: ignore[attr-defined]
         real(name, value)
 

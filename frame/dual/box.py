@@ -18,7 +18,7 @@ from alphacut.frame.dual.attained import (
     outputs_at,
 )
 from alphacut.frame.dual.level import Level
-from alphacut.frame.dual.structure import Classical, classical
+from alphacut.frame.dual.structure import Classical, classical, without_ratios
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
@@ -93,10 +93,15 @@ class Box:
 
     def attained_with_error(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
         """Values of outputs at nodes for unit coordinates (S, d) and their rounding, each (S,)."""
-        pieces = np.array_split(np.arange(len(unit)), -(-len(unit) // self._points_at_once))
-        parts = [self._motions(unit[i], node[i], output[i]) for i in pieces]
-        values, errors = zip(*parts, strict=True)
-        return np.concatenate(values), np.concatenate(errors)
+        points, place = np.unique(unit, axis=0, return_inverse=True)
+        found, count = np.empty((2, len(unit))), self._points_at_once
+        for first in range(0, len(points), count):
+            modal = self._modal(points[first : first + count])
+            inside = np.flatnonzero((place >= first) & (place < first + count))
+            for some in np.array_split(inside, -(-len(inside) // count)):
+                motions = self._motions(modal, place[some] - first, node[some], output[some])
+                found[:, some] = motions
+        return found[0], found[1]
 
     def centre_motion(self) -> tuple[Array, Array, Array]:
         """Motion at the centre, its rounding, and how far it strays from straight lines.
@@ -125,15 +130,19 @@ class Box:
         return max(MOST_ENTRIES // len(self.structure.pattern) ** 2, 1)
 
     def _modal(self, unit: Array) -> Modal:
-        return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
+        return modes_at(self._undamped, self.structure, self.names, self.inputs(unit), unit)
 
-    def _motions(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
-        modal = self._modal(unit)
+    @cached_property
+    def _undamped(self) -> LinearSystem:
+        return without_ratios(self.system)
+
+    def _motions(self, modal: Modal, point: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
+        sigma = modal.sigma[point]
         loads = {
-            name: load_at_named_nodes(modal.sigma, load, self.time, node)
+            name: load_at_named_nodes(sigma, load, self.time, node)
             for name, load in self.loads.items()
         }
-        return outputs_at(modal, np.arange(len(unit)), output, self.time[node], loads)
+        return outputs_at(modal, point, output, self.time[node], loads)
 
     def _stray(self, modal: Modal) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""

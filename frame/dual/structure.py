@@ -7,7 +7,7 @@ whose undamped modes uncouple the motion; what else a structure has is refused w
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
 
 import numpy as np
@@ -211,6 +211,13 @@ def _refuse_dashpots(system: StoreyFrame, p: Inputs) -> None:
             "Rayleigh's damping by the springs without the weights couples the modes",
             "give a damping ratio, or leave gravity out",
         )
+
+
+def without_ratios(system: LinearSystem) -> LinearSystem:
+    """The structure without damping ratios, whose damping matrix takes all modes to compute."""
+    if isinstance(system, MatrixStructure):
+        return replace(system, ratios=())
+    return replace(system, damping_ratio=None) if isinstance(system, StoreyFrame) else system
 
 
 def _of_modes(ratios: list[TaylorModel], n: int, like: TaylorModel) -> TaylorModel:
