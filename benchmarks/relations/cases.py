@@ -10,16 +10,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import combinations, product
+from functools import partial
+from itertools import combinations, product, zip_longest
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from alphacut.case.load import load
+from alphacut.case.motion import EnvelopeSection
 from alphacut.fuzzy.refused import FailedError
 from benchmarks.relations.relation import Chance, Relation
 from benchmarks.relations.stated import Stated
@@ -54,19 +56,31 @@ def command(case: Path, changes: tuple[str, ...], out: Path, way: Mapping[str, s
     """The command that runs a case in a way, its results in a folder."""
     python = [sys.executable, *(["-O"] if way["assertions"] == "off" else [])]
     if way["start"] == "mpi":
-        python = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2", *python]
+        python = [*["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2"], *python]
         python += ["-m", "mpi4py.futures"]
-    sets = [f"--set={change}" for change in changes]
-    figures = ["--no-figures"] if way["figures"] == "no" else []
-    options = [f"--out={out}", f"--workers={way['workers']}", "--quiet", *figures, *sets]
+    options = [f"--out={out}", f"--workers={way['workers']}", "--quiet"]
+    options += [f"--set={change}" for change in changes]
+    options += ["--no-figures"] if way["figures"] == "no" else []
     return [*python, "-m", "alphacut", "run", str(case.resolve()), *options]
 
 
 def surroundings(way: Mapping[str, str]) -> dict[str, str]:
     """Variables of the environment of a way."""
-    own = dict.fromkeys(LANGUAGES, way["threads"])
-    own |= {"PYTHONHASHSEED": way["hash seed"], "LC_ALL": way["locale"], "PYTHONPATH": str(ROOT)}
-    return {**os.environ, **own}
+    threads = dict.fromkeys(LANGUAGES, way["threads"])
+    others = {"PYTHONHASHSEED": way["hash seed"], "LC_ALL": way["locale"], "PYTHONPATH": str(ROOT)}
+    return {**os.environ, **threads, **others}
+
+
+def killed_after(seconds: float, words: list[str], given: Mapping[str, Any]) -> bool:
+    """Starts a command and kills it with its workers; whether it was still running."""
+    started = subprocess.Popen(words, stderr=subprocess.DEVNULL, **given)
+    with suppress(subprocess.TimeoutExpired):
+        started.wait(seconds)
+    was_running = started.poll() is None
+    with suppress(ProcessLookupError):
+        os.killpg(started.pid, signal.SIGKILL)
+    started.wait()
+    return was_running
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,15 +109,11 @@ class CaseRun:
         Raises:
             FailedError: The run ends with an error.
         """
-        words, own = command(self.case, self.changes, out, self.way), surroundings(self.way)
-        given: dict[str, Any] = {"cwd": self.way["folder"], "env": own, "start_new_session": True}
+        words = command(self.case, self.changes, out, self.way)
+        given: dict[str, Any] = {"cwd": self.way["folder"], "env": surroundings(self.way)}
+        given["start_new_session"] = True
         if self.way["killed"] == "yes":
-            first = subprocess.Popen(words, stderr=subprocess.DEVNULL, **given)
-            with suppress(subprocess.TimeoutExpired):
-                first.wait(self.moment * seconds)
-            with suppress(ProcessLookupError):
-                os.killpg(first.pid, signal.SIGKILL)
-            first.wait()
+            killed_after(self.moment * seconds, words, given)
         done = subprocess.run(words, capture_output=True, text=True, check=False, **given)
         if done.returncode:
             raise FailedError(f"exit status {done.returncode}: {done.stderr.strip()[-300:]}")
@@ -122,23 +132,20 @@ class CaseRun:
         return Stated(xr.concat(parts, "output", join="outer"))
 
 
-def numbers(value: Any) -> Any:
-    """A summary without what may differ from run to run."""
+def numbers(value: Any, path: str = "") -> list[str]:
+    """Places and digits of a summary in their order, without what may differ from run to run."""
     if isinstance(value, dict):
-        return {key: numbers(x) for key, x in value.items() if key not in FREE}
-    return [numbers(x) for x in value] if isinstance(value, list) else value
+        parts = [(f"{path}.{key}", part) for key, part in value.items() if key not in FREE]
+    elif isinstance(value, list):
+        parts = [(f"{path}[{place}]", part) for place, part in enumerate(value)]
+    else:
+        return [f"{path[1:]}: {value!r:.60}"]
+    return [line for place, part in parts for line in numbers(part, place)]
 
 
-def differences(one: Any, two: Any, path: str = "") -> Iterator[str]:
-    """Places at which two summaries differ."""
-    if isinstance(one, dict) and isinstance(two, dict) and [*one] == [*two]:
-        for key in one:
-            yield from differences(one[key], two[key], f"{path}.{key}" if path else key)
-    elif isinstance(one, list) and isinstance(two, list) and len(one) == len(two):
-        for place, pair in enumerate(zip(one, two, strict=True)):
-            yield from differences(*pair, f"{path}[{place}]")
-    elif repr(one) != repr(two):
-        yield f"{path}: {one!r:.60} against {two!r:.60}"
+def differences(one: list[str], two: list[str]) -> list[str]:
+    """What two summaries' numbers differ in."""
+    return [f"{x} against {y}" for x, y in zip_longest(one, two) if x != y]
 
 
 def pairwise(chance: Chance, ways: Mapping[str, tuple[str, ...]] = WAYS) -> list[dict[str, str]]:
@@ -168,40 +175,33 @@ def ways_checked(
     """Ways in words with the differences of their summaries from the plain run's."""
     with tempfile.TemporaryDirectory() as folder:
         begun = time.monotonic()
-        first = numbers(plain.run(Path(folder, "plain")))
+        expected = numbers(plain.run(Path(folder, "plain")))
         seconds = time.monotonic() - begun
         for number, row in enumerate(rows):
             other = replace(plain, way=row, moment=float(chance.uniform(0.1, 0.9)))
             name = ", ".join(f"{key} {x}" for key, x in row.items() if x != PLAIN[key])
             try:
-                second = numbers(other.run(Path(folder, str(number)), seconds))
-                yield name, list(differences(first, second))
+                found = numbers(other.run(Path(folder, str(number)), seconds))
+                yield name, differences(expected, found)
             except FailedError as error:
                 yield name, [str(error)]
 
 
-def _changed(key: str, value: Any) -> Any:
-    """A relation's function: the case with one key of [envelope] changed, None without one."""
-
-    def said(of: CaseRun, chance: Chance) -> CaseRun | None:
-        section = load(of.case, of.changes).content.envelope
-        if section is None or (found := value(section)) is None:
-            return None
-        others = [change for change in of.changes if not change.startswith(f"{key}=")]
-        return replace(of, changes=(*others, f"{key}={found}"))
-
-    return said
+def _changed(
+    key: str, value: Callable[[EnvelopeSection], str], case: CaseRun, _: Chance
+) -> CaseRun:
+    """The case with one key of [envelope] changed."""
+    section = load(case.case, case.changes).content.envelope
+    assert section is not None
+    others = [change for change in case.changes if not change.startswith(f"envelope.{key}=")]
+    return replace(case, changes=(*others, f"envelope.{key}={value(section)}"))
 
 
-RELATIONS = (
-    Relation(
-        "inputs in another order",
-        _changed(
-            "envelope.fuzzy", lambda x: json.dumps([*x.fuzzy][::-1]) if len(x.fuzzy) > 1 else None
-        ),
-    ),
-    Relation("one level", _changed("envelope.alpha", lambda x: f"[{x.alpha[0]}]")),
-    Relation("half the duration", _changed("envelope.duration", lambda x: f"{x.duration / 2} s")),
-    Relation("half the step", _changed("envelope.step", lambda x: f"{x.step / 2} s")),
-)
+CHANGES: dict[str, tuple[str, Callable[[EnvelopeSection], str]]] = {
+    "inputs in another order": ("fuzzy", lambda x: json.dumps([*x.fuzzy][::-1])),
+    "one level": ("alpha", lambda x: f"[{x.alpha[0]}]"),
+    "half the duration": ("duration", lambda x: f"{x.duration / 2} s"),
+    "half the step": ("step", lambda x: f"{x.step / 2} s"),
+}
+RELATIONS = tuple(Relation(name, partial(_changed, *change)) for name, change in CHANGES.items())
 """Relations of envelopes of cases."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import chain_matrix
 from alphacut.fuzzy import FuzzyNumber, Interval, Triangular
 from alphacut.fuzzy.arrays import Array
-from benchmarks.relations.relation import ROUNDED, Chance, Relation
+from benchmarks.relations.relation import ROUNDED, Chance, Relation, one_level, shuffled
 from benchmarks.relations.stated import Stated
 
-Units = tuple[int, int, int]  # powers of length, time and mass
-INPUTS: dict[str, Units] = {"k": (0, -2, 1), "m": (0, 0, 1), "rayleigh_stiffness": (0, 1, 0)}
-INPUTS |= {"rayleigh_mass": (0, -1, 0)}
+Units = tuple[int, int, int]
+"""Powers of length, time and mass."""
 OUTPUTS: dict[str, Units] = {"m": (1, 0, 0), "m/s": (1, -1, 0), "m/s^2": (1, -2, 0)}
 OUTPUTS |= {"N": (1, -2, 1)}
+METHODS = {"proof": Proof, "dual": DualProof}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,8 @@ class Frame:
         step: Of the nodes, in s.
         alpha: Levels.
         method: proof, dual or search.
-        tolerance: As a share of each peak.
+        tolerance: As a share of each peak, where `relative`.
+        relative: Whether it is one.
         workers: Threads.
         powers: Powers of two that the units of length, time and mass are smaller by.
         matrices: Whether the frame is given as matrices.
@@ -57,10 +58,10 @@ class Frame:
     alpha: tuple[float, ...] = (0.0, 0.6)
     method: str = "proof"
     tolerance: float = 1e-2
+    relative: bool = True
     workers: int = 2
     powers: Units = (0, 0, 0)
     matrices: bool = False
-    RELATIVE: ClassVar[bool] = True
 
     @classmethod
     def drawn(cls, chance: Chance) -> Self:
@@ -75,60 +76,55 @@ class Frame:
         if chance.random() < 0.5:
             damping = (float(chance.uniform(0.2, 0.8)), float(chance.uniform(5e-4, 3e-3)))
             names[-1:] = ["rayleigh_mass", "rayleigh_stiffness"]
-        inputs = chance.choice(names, count, False)
         kinds = [f"{kind}{z + 1}" for kind in ("q", "drift", "v", "a", "shear") for z in range(n)]
-        outputs = chance.choice(kinds, min(3, len(kinds)), False)
-        sampling, step = 0.02 * float(chance.choice([0.5, 1, 2.5])), 0.04
+        inputs, outputs = chance.choice(names, count, False), chance.choice(kinds, 3, False)
+        sampling = 0.02 * float(chance.choice([0.5, 1, 2.5]))
+        wave = chance.normal(size=int(0.6 / sampling))  # rises from zero and fades to it
+        wave = np.append(wave * np.sin(np.linspace(0, np.pi, len(wave))), 0.0)
         return cls(
-            stiffness,
-            masses,
-            damping,
+            *(stiffness, masses, damping),
             {str(name): float(chance.uniform(0.01, widest)) for name in inputs},
-            tuple(map(str, outputs)),
-            _record(chance, int(0.6 / sampling)),
-            sampling,
+            *(tuple(map(str, outputs)), 3 * wave / np.abs(wave).max(), sampling),
             nodes=int(chance.choice([20, 100])),
-            step=step,
+            step=0.04,
             method=method,
         )
 
     def stated(self) -> Stated:
         """Statements in SI units."""
-        units = {name: OUTPUTS[Output(name).unit] for name in self.outputs}
+        options: dict[str, Any] = {"workers": self.workers} if self.method in METHODS else {}
+        if self.method == "proof":
+            options["tolerance"] = self.tolerance
+        second = self._unit((0, 1, 0))
         result = envelope(
             self._as_matrices() if self.matrices else self._structure(),
             {name: self._number(name) for name in self.fuzzy},
-            duration=self.nodes * self.step * self._unit((0, 1, 0)),
-            step=self.step * self._unit((0, 1, 0)),
+            duration=self.nodes * self.step * second,
+            step=self.step * second,
             alpha=self.alpha,
-            method=self._method(),
-            relative=self.RELATIVE,
+            method=METHODS[self.method](**options) if options else self.method,
+            relative=self.relative,
             progress=False,
         )
-        factors = {name: 1 / self._unit(powers) for name, powers in units.items()}
-        return Stated.of_bounds(result).scaled(factors, 1 / self._unit((0, 1, 0)))
+        factors = {name: 1 / self._unit(OUTPUTS[Output(name).unit]) for name in self.outputs}
+        return Stated.of_bounds(result).scaled(factors, 1 / second)
 
     def _unit(self, powers: Units) -> float:
         """Factor on numbers with a unit."""
         return float(2.0 ** np.dot(self.powers, powers))
 
-    def _method(self) -> Proof | DualProof | str:
-        made = {"proof": Proof(tolerance=self.tolerance, workers=self.workers)}
-        return {**made, "dual": DualProof(workers=self.workers)}.get(self.method, self.method)
-
     def _structure(self) -> StoreyFrame:
-        damping: dict[str, object] = {"damping_ratio": self.damping[0]}
+        damping: dict[str, Any] = {"damping_ratio": self.damping[0]}
         if len(self.damping) == 2:
-            units = self._unit((0, -1, 0)), self._unit((0, 1, 0))
-            damping = {"rayleigh": tuple(np.multiply(self.damping, units))}
+            per_second, second = self._unit((0, -1, 0)), self._unit((0, 1, 0))
+            damping = {"rayleigh": (self.damping[0] * per_second, self.damping[1] * second)}
+        record = self.record * self._unit((1, -2, 0))
         return StoreyFrame(
-            masses=tuple(self.masses * self._unit(INPUTS["m"])),
-            stiffness=tuple(self.stiffness * self._unit(INPUTS["k"])),
-            **damping,  # type: ignore[arg-type]
-            ground=Accelerogram(
-                self.sampling * self._unit((0, 1, 0)), self.record * self._unit((1, -2, 0))
-            ),
+            masses=tuple(self.masses * self._unit((0, 0, 1))),
+            stiffness=tuple(self.stiffness * self._unit((0, -2, 1))),
+            ground=Accelerogram(self.sampling * self._unit((0, 1, 0)), record),
             outputs=self.outputs,
+            **damping,
         )
 
     def _number(self, name: str) -> FuzzyNumber:
@@ -139,16 +135,17 @@ class Frame:
 
     def _as_matrices(self) -> MatrixStructure:
         """The frame as sums of arrays times parameters; displacements, drifts, velocities alone."""
-        made, n = self._structure(), len(self.masses)
-        floors = np.eye(n)
+        frame, floors = self._structure(), np.eye(len(self.masses))
         mass = [(f"m{z + 1}", np.outer(e, e)) for z, e in enumerate(floors)]
         springs = [(f"k{z + 1}", chain_matrix(e)) for z, e in enumerate(floors)]
-        damping = [(name, made.rayleigh[0] * array) for name, array in mass]
-        damping += [(name, made.rayleigh[1] * array) for name, array in springs]
-        ratio = len(self.damping) == 1
-        own = {"ratios": ("zeta",)} if ratio else {"damping": damping}
+        damping: dict[str, Any] = {"ratios": ("zeta",)}
+        if len(self.damping) == 2:
+            terms = zip(frame.rayleigh, (mass, springs), strict=True)
+            damping = {"damping": [(x, factor * array) for factor, y in terms for x, array in y]}
         rows = {Output(x): self._row(x) for x in self.outputs}
-        return MatrixStructure(made.parameters, mass, springs, rows, ground=made.ground, **own)
+        return MatrixStructure(
+            frame.parameters, mass, springs, rows, ground=frame.ground, **damping
+        )
 
     def _row(self, output: str) -> Array:
         """Row of displacements, drifts and velocities."""
@@ -160,31 +157,18 @@ class Frame:
         return row
 
 
-def _record(chance: Chance, samples: int) -> Array:
-    """Noise that rises from zero and fades to it, at most 3 m/s²."""
-    wave = chance.normal(size=samples) * np.sin(np.linspace(0, np.pi, samples))
-    wave[[0, -1]] = 0.0
-    return np.asarray(3 * wave / np.abs(wave).max())
-
-
 def _matrices(frame: Frame, chance: Chance) -> Frame | None:
     """The matrices, where damping is linear in the inputs and outputs are plain rows."""
     plain = all(name[0] in "qdv" for name in frame.outputs)
-    ratio = len(frame.damping) == 1
-    fixed = not any(name.startswith("rayleigh") for name in frame.fuzzy)
-    known = ratio or (fixed and frame.method != "dual")  # which takes modes that damping may couple
-    return replace(frame, matrices=True) if plain and known else None
-
-
-def _shuffled(frame: Frame, chance: Chance) -> Frame:
-    order = chance.permutation([*frame.fuzzy])
-    return replace(frame, fuzzy={str(name): frame.fuzzy[str(name)] for name in order})
+    # the dual proof takes modes that damping by matrices may couple
+    fixed = frame.method != "dual" and not any(name.startswith("rayleigh") for name in frame.fuzzy)
+    return replace(frame, matrices=True) if plain and (len(frame.damping) == 1 or fixed) else None
 
 
 def _crisp(frame: Frame, chance: Chance) -> Frame | None:
-    others = [f"k{z + 1}" for z in range(len(frame.masses))]
-    others = [name for name in others if name not in frame.fuzzy]
-    return replace(frame, fuzzy={others[0]: 0.0, **frame.fuzzy}) if others else None
+    names = (f"k{z + 1}" for z in range(len(frame.masses)))
+    other = next((name for name in names if name not in frame.fuzzy), None)
+    return other and replace(frame, fuzzy={other: 0.0, **frame.fuzzy})
 
 
 def _refined(frame: Frame, chance: Chance) -> Frame:
@@ -193,22 +177,20 @@ def _refined(frame: Frame, chance: Chance) -> Frame:
     return replace(frame, record=fine, sampling=frame.sampling / 2)
 
 
+def _in_units(frame: Frame, chance: Chance) -> Frame:
+    return replace(frame, powers=tuple(map(int, chance.integers(-12, 13, 3))))
+
+
 RELATIONS = (
-    Relation("inputs in another order", _shuffled),
-    Relation("one level", lambda x, chance: replace(x, alpha=(float(chance.choice(x.alpha)),))),
-    Relation("one output", lambda x, chance: replace(x, outputs=(x.outputs[0],))),
+    Relation("inputs in another order", shuffled),
+    Relation("one level", one_level),
+    Relation("one output", lambda x, chance: replace(x, outputs=x.outputs[:1])),
     Relation("half the duration", lambda x, chance: replace(x, nodes=x.nodes // 2)),
     Relation("half the step", lambda x, chance: replace(x, step=x.step / 2, nodes=2 * x.nodes)),
     Relation("one more crisp input", _crisp),
     Relation("record refined", _refined),
-    Relation(
-        "record padded", lambda x, chance: replace(x, record=np.append(x.record, np.zeros(7)))
-    ),
-    Relation(
-        "other units",
-        lambda x, chance: replace(x, powers=tuple(map(int, chance.integers(-12, 13, 3)))),
-        within=ROUNDED,
-    ),
+    Relation("record padded", lambda x, chance: replace(x, record=np.pad(x.record, (0, 7)))),
+    Relation("other units", _in_units, within=ROUNDED),
     Relation("as matrices", _matrices),
     Relation("one thread", lambda x, chance: replace(x, workers=1), within=0.0),
     Relation("three threads", lambda x, chance: replace(x, workers=3), within=0.0),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, Protocol, Self
 
@@ -42,6 +42,17 @@ class Relation:
     within: float | None = None
 
 
+def shuffled(subject: Any, chance: Chance) -> Any:
+    """The problem with its fuzzy inputs in another order."""
+    order = map(str, chance.permutation([*subject.fuzzy]))
+    return replace(subject, fuzzy={name: subject.fuzzy[name] for name in order})
+
+
+def one_level(subject: Any, chance: Chance) -> Any:
+    """The problem on one of its levels."""
+    return replace(subject, alpha=(float(chance.choice(subject.alpha)),))
+
+
 def checked(
     subject: Subject, relations: Sequence[Relation], chance: Chance, *, pairs: int = 0
 ) -> Iterator[tuple[str, list[str]]]:
@@ -53,8 +64,7 @@ def checked(
         chance: Source of chance.
         pairs: Number of pairs of relations that are checked as well, drawn at random.
     """
-    plain = subject.stated()
-    both = list(combinations(relations, 2))
+    plain, both = subject.stated(), list(combinations(relations, 2))
     drawn = chance.permutation(len(both))[:pairs]
     for row in [*((x,) for x in relations), *(both[k] for k in drawn)]:
         said: Any = subject
@@ -62,10 +72,10 @@ def checked(
             said = said and relation.said(said, chance)
         if said is None:
             continue
-        name = " and ".join(relation.name for relation in row)
         shares = [relation.within for relation in row]
         within = None if None in shares else max(share or 0.0 for share in shares)
         try:
-            yield name, contradictions(plain, said.stated(), within=within)
+            lines = contradictions(plain, said.stated(), within=within)
         except Exception as error:
-            yield name, [f"{type(error).__name__}: {error}"]
+            lines = [f"{type(error).__name__}: {error}"]
+        yield " and ".join(relation.name for relation in row), lines

@@ -33,46 +33,43 @@ class Stated:
     @classmethod
     def of_dataset(cls, data: xr.Dataset) -> Stated:
         """Statements of the dataset of a result, also between the nodes of an envelope."""
-        ends = np.stack([-data["lower"], data["upper"]])
         axes = ("side", *data["lower"].dims)
-        labels = {name: data[name].values for name in axes[1:]}
+        ends, error = (
+            np.stack([-data["lower"], data["upper"]]),
+            np.stack(2 * [data["error"].values]),
+        )
         guaranteed = (data["nature"] == "guaranteed").values
-        attained_only = (data["nature"] == "attained").values
-        error = np.stack(2 * [data["error"].values])
         inner, outer = (_ends(data, kind, ends.shape) for kind in ("inner", "proved"))
         tables = {
             "bound": (axes, ends),
-            "error": (axes, np.where(attained_only, np.nan, error)),
+            "error": (axes, np.where((data["nature"] == "attained").values, np.nan, error)),
             "attained": (axes, np.where(guaranteed, inner, ends - error)),
             "proved": (axes, np.where(guaranteed, ends, -outer)),
         }
-        made = xr.Dataset(tables, {"side": [-1, 1], **labels})
-        return cls(_with_middles(made, data) if "time" in labels else made)
+        stated = xr.Dataset(tables, {"side": [-1, 1], **{x: data[x].values for x in axes[1:]}})
+        return cls(_with_middles(stated, data) if "time" in axes else stated)
 
     @classmethod
     def of_values(cls, values: Mapping[str, tuple[float, float]]) -> Stated:
         """Statements of single numbers by name, each with its declared error."""
-        numbers = np.array([*values.values()], float)
-        return cls.of_ends({k: (x - e, x + e) for k, (x, e) in values.items()}, numbers[:, 1])
+        stated = cls.of_ends({name: (x - error, x + error) for name, (x, error) in values.items()})
+        errors = xr.DataArray([error for _, error in values.values()], {"output": [*values]})
+        return cls(stated.data.assign(error=stated.data.error.fillna(errors)))
 
     @classmethod
-    def of_ends(
-        cls, ends: Mapping[str, tuple[float, float]], error: np.ndarray | None = None
-    ) -> Stated:
-        """Statements of single numbers by name, each between two ends."""
+    def of_ends(cls, ends: Mapping[str, tuple[float, float]]) -> Stated:
+        """Statements of single numbers by name, each proved to lie between two ends."""
         low, high = np.array([*ends.values()], float).T
-        axes, proved, attained = ("side", "output"), np.stack([-low, high]), np.stack([-high, low])
-        missing = np.full(len(low), np.nan) if error is None else error
-        middle = np.stack([-(low + high) / 2, (low + high) / 2])
-        tables = {"bound": (axes, middle), "error": (axes, np.stack([missing, missing]))}
-        tables |= {"attained": (axes, attained), "proved": (axes, proved)}
+        middle = (low + high) / 2
+        sides = {"bound": (-middle, middle), "attained": (-high, low), "proved": (-low, high)}
+        sides["error"] = (np.full(len(low), np.nan),) * 2
+        tables = {name: (("side", "output"), np.stack(pair)) for name, pair in sides.items()}
         return cls(xr.Dataset(tables, {"side": [-1, 1], "output": [*ends]}))
 
     def scaled(self, factors: Mapping[str, float], time: float = 1.0) -> Stated:
         """The statements with outputs by name, and times, multiplied by factors."""
         names = [str(name) for name in self.data.output.values]
-        by = xr.DataArray([factors[name] for name in names], {"output": names})
-        data = self.data * by
+        data = self.data * xr.DataArray([factors[name] for name in names], {"output": names})
         return Stated(data.assign_coords(time=data.time * time) if "time" in data.dims else data)
 
 
@@ -84,16 +81,17 @@ def _ends(data: xr.Dataset, kind: str, shape: tuple[int, ...]) -> np.ndarray:
     return sign * np.stack([-data[f"{kind}_lower"].values, data[f"{kind}_upper"].values])
 
 
-def _with_middles(made: xr.Dataset, data: xr.Dataset) -> xr.Dataset:
+def _with_middles(stated: xr.Dataset, data: xr.Dataset) -> xr.Dataset:
     """The statements also at the middle of steps: where they are guaranteed by `between`."""
     time = data["time"].values
-    middles = (time[1:] + time[:-1]) / 2
-    there = made.isel(time=slice(1, None)).assign_coords(time=middles) * np.nan
+    before, after = (
+        stated.isel(time=part).assign_coords(time=(time[1:] + time[:-1]) / 2)
+        for part in (slice(None, -1), slice(1, None))
+    )
+    middles = after * np.nan
     if "between" in data:
-        before = made.proved.isel(time=slice(None, -1)).assign_coords(time=middles)
-        after = made.proved.isel(time=slice(1, None)).assign_coords(time=middles)
-        there["proved"] = np.maximum(before, after) + data["between"].values[1:]
-    return xr.concat([made, there], "time").sortby("time")
+        middles["proved"] = np.maximum(before.proved, after.proved) + data["between"].values[1:]
+    return xr.concat([stated, middles], "time").sortby("time")
 
 
 def contradictions(one: Stated, two: Stated, *, within: float | None = None) -> list[str]:
@@ -107,23 +105,20 @@ def contradictions(one: Stated, two: Stated, *, within: float | None = None) -> 
         two: Others.
         within: Share of an output's size within which every number is to be the same; None: no.
     """
-    tables = [_rounded_times(x.data) for x in (one, two)]
-    first, second = xr.align(*tables, join="inner")
+    first, second = xr.align(*(_rounded_times(x.data) for x in (one, two)), join="inner")
     if not first.bound.size:
         raise ValueError("the two results share no output, level and time")
     over = [name for name in first.bound.dims if name != "output"]
     size = np.maximum(np.abs(first.bound), np.abs(second.bound)).max(over)
-    excess = {
-        "attained leaves what is proved": np.maximum(
-            first.attained - second.proved, second.attained - first.proved
-        ),
-        "bounds differ by more than both errors": np.abs(first.bound - second.bound)
-        - (first.error + second.error),
-    }
     allowed = ROUNDING if within is None else within
-    if within is not None:
-        excess = {f"{name} differs": np.abs(first[name] - second[name]) for name in first}
-        excess = {name: gap.where(np.isfinite(gap)) for name, gap in excess.items()}
+    if within is None:
+        attained = first.attained - second.proved, second.attained - first.proved
+        apart = np.abs(first.bound - second.bound) - (first.error + second.error)
+        excess = {"attained leaves what is proved": np.maximum(*attained)}
+        excess["bounds differ by more than both errors"] = apart
+    else:
+        gaps = {f"{name} differs": np.abs(first[name] - second[name]) for name in first}
+        excess = {name: gap.where(np.isfinite(gap)) for name, gap in gaps.items()}
     lines = []
     for what, gap in excess.items():
         share = (gap / size.where(size > 0, 1.0)).max(over)

@@ -2,10 +2,7 @@
 
 import os
 import random
-import signal
-import subprocess
 import time
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -89,18 +86,6 @@ def arrays_of(folder):
     return {path.name: xr.load_dataset(path) for path in sorted(Path(folder).glob("*.nc"))}
 
 
-def kill_after(seconds, words):
-    """Starts a command and kills it with its workers; whether it was still running."""
-    started = subprocess.Popen(words, env=cases.surroundings(cases.PLAIN), start_new_session=True)
-    with suppress(subprocess.TimeoutExpired):
-        started.wait(seconds)
-    was_running = started.poll() is None
-    with suppress(ProcessLookupError):
-        os.killpg(started.pid, signal.SIGKILL)
-    started.wait()
-    return was_running
-
-
 @pytest.mark.slow
 def test_runs_killed_at_random_times_are_taken_up_to_the_bit(tmp_path):
     seed = int(os.environ.get("SEED", random.randrange(10**9)))
@@ -115,10 +100,11 @@ def test_runs_killed_at_random_times_are_taken_up_to_the_bit(tmp_path):
         out, workers = tmp_path / str(trial), draw.choice(["1", "2"])
         other = cases.CaseRun(case, way=way | {"workers": workers})
         words = cases.command(case, (), out, other.way)
+        given = {"env": cases.surroundings(other.way), "start_new_session": True}
         for _ in range(draw.randint(1, 3)):
-            kills += kill_after(draw.uniform(0.1, 1.0) * seconds, words)
+            kills += cases.killed_after(draw.uniform(0.1, 1.0) * seconds, words, given)
         found = other.run(out)
-        assert not [*cases.differences(*map(cases.numbers, (summary, found)))], trial
+        assert not cases.differences(*map(cases.numbers, (summary, found))), trial
         assert [*arrays_of(out)] == [*plain]
         assert all(data.equals(plain[name]) for name, data in arrays_of(out).items()), trial
         if kills >= 12:
@@ -137,9 +123,9 @@ def test_ways_hold_every_pair_of_factors():
 
 def test_summaries_differ_by_a_bit_or_an_order_but_not_by_times():
     one = {"E": [1.0, {"seconds": 2.0}], "command": "a", "x": 1}
-    assert not [*cases.differences(*(cases.numbers(x) for x in (one, one | {"command": "b"})))]
+    assert not cases.differences(*(cases.numbers(x) for x in (one, one | {"command": "b"})))
     for two in (one | {"E": [1.0 + 2**-52, {}]}, {"x": 1, "E": [1.0, {}]}, one | {"x": True}):
-        assert [*cases.differences(*(cases.numbers(x) for x in (one, two)))]
+        assert cases.differences(*(cases.numbers(x) for x in (one, two)))
 
 
 def ends(low, high, inner):
@@ -172,21 +158,16 @@ def test_an_order_of_inputs_that_matters_is_seen():
     inputs = {"x1": (0.0, 0.1, 0.2), "x2": (0.5, 0.6, 1.0)}
     waves = ByPosition(np.array([[1.0, 0.3]]), np.zeros(1), dict.fromkeys(inputs, 1.0))
     subject = functions.Propagation(waves, inputs, "automatic")
-    other = replace(subject, inputs=dict(reversed(inputs.items())))
+    other = replace(subject, fuzzy=dict(reversed(inputs.items())))
     assert contradictions(subject.stated(), other.stated())
 
 
-class InMetres(frames.Frame):
-    """A frame whose tolerance is a length in SI units, whatever the units of the problem."""
-
-    RELATIVE = False
-
-
 def test_a_tolerance_in_metres_is_seen():
-    frame = InMetres(
+    frame = frames.Frame(
         *(np.array([1e7]), np.array([1e4]), (0.5, 1e-3), {"k1": 0.1}, ("q1",)),
         *(np.sin(np.arange(30.0)), 0.02, 20, 0.04),
         tolerance=1e-4,
+        relative=False,
     )
     smaller = replace(frame, powers=(8, 0, 0))
     assert contradictions(frame.stated(), smaller.stated(), within=1e-6)
