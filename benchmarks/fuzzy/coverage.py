@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from alphacut.fuzzy import FuzzyNumber, Triangular, from_data, jointly
+from alphacut.fuzzy import FuzzyNumber, RefusedError, Triangular, from_data, jointly
 from alphacut.fuzzy.arrays import Array
 from benchmarks.rows import write
 
@@ -70,19 +70,37 @@ def held(
     *,
     named: str | None = None,
     make: Callable[..., FuzzyNumber] = from_data,
+    censored: float | None = None,
 ) -> tuple[Array, Array]:
     """Share of samples of n values whose cut holds the truth, less 1 − α.
+
+    Of values above `censored` no more than that is known, and no bounds. A cut that the values do
+    not decide holds everything, and counts; without those the share would be that of some samples.
 
     Returns:
         Two arrays over `ALPHA`: over its standard error, and as it is.
     """
     law, bounds = LAWS[name]
     values = law.rvs(size=(count, n), random_state=rng).astype(float)
-    numbers = [make(row, claim, bounds=bounds, law=named) for row in values]
-    cuts = np.array([[number.cut(alpha) for alpha in ALPHA] for number in numbers])
+    if censored is None:
+        numbers = [make(row, claim, bounds=bounds, law=named) for row in values]
+    else:
+        pairs = np.stack([np.minimum(values, censored), values], -1)
+        pairs[values > censored, 1] = np.inf
+        numbers = [make(row, claim, law=named) for row in pairs]
+    cuts = np.array([[decided_cut(number, alpha) for alpha in ALPHA] for number in numbers])
     truth = truth_of(law, claim, rng, count)[:, None]
     excess = ((cuts[..., 0] <= truth) & (truth <= cuts[..., 1])).mean(0) - (1 - ALPHA)
     return excess / np.sqrt(ALPHA * (1 - ALPHA) / count), excess
+
+
+def decided_cut(number: FuzzyNumber, alpha: float) -> tuple[float, float]:
+    """The cut; all numbers where the values do not decide it."""
+    try:
+        low, high = number.cut(alpha)
+    except RefusedError:
+        return -np.inf, np.inf
+    return low, high
 
 
 def triangle(values: Array, claim: str, **_: object) -> Triangular:

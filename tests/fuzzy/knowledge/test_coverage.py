@@ -37,6 +37,13 @@ def test_coverage_of_a_mean_within_bounds(law):
     assert score.min() > -4
 
 
+@pytest.mark.parametrize("claim", FREE)
+@pytest.mark.parametrize("censored", [2.0, 3.5, 5.0])
+def test_coverage_of_censored_values_counts_what_they_leave_undecided(claim, censored):
+    score, _ = held("normal", claim, 20, 300, np.random.default_rng(5), censored=censored)
+    assert score.min() > -4
+
+
 @settings(deadline=None, max_examples=60)
 @given(st.integers(1, 60), st.sampled_from([None, 0.5, 0.05, 0.9, 0.99]), st.data())
 def test_levels_are_the_exact_probability_outside(n, quantile, data):
