@@ -2,6 +2,7 @@
 
     python -m benchmarks.synthetic_record > cases/building.record.csv
     python -m benchmarks.synthetic_record --suite cases/suite
+    python -m benchmarks.synthetic_record --suite FOLDER 44 12    (records, and their length in s)
     python -m benchmarks.synthetic_record --gust > cases/wind.force.csv
 
 The spectrum is that of Kanai and Tajimi with the high-pass of Clough and Penzien (Dynamics of
@@ -81,8 +82,8 @@ def text(record: SyntheticRecord) -> str:
     )
 
 
-SUITE_SEEDS = range(2001, 2012)
-"""Seeds of the eleven records of `cases/suite.toml`."""
+FIRST_SEED = 2001
+"""Seed of the first record of a suite; the others follow."""
 
 
 def at2_text(record: SyntheticRecord) -> str:
@@ -98,14 +99,14 @@ def at2_text(record: SyntheticRecord) -> str:
     )
 
 
-def write_suite(folder: Path) -> None:
-    """Eleven records of 10 s whose peaks and grounds differ."""
+def write_suite(folder: Path, count: int = 11, duration: float = 10.0) -> None:
+    """Records whose peaks and grounds differ."""
     folder.mkdir(parents=True, exist_ok=True)
-    for seed in SUITE_SEEDS:
+    for seed in range(FIRST_SEED, FIRST_SEED + count):
         rng = np.random.default_rng(seed)
         record = SyntheticRecord(
             peak=2.0 * rng.lognormal(0, 0.3),
-            duration=10.0,
+            duration=duration,
             step=0.02,
             ground=15 * rng.lognormal(0, 0.2),
             seed=seed,
@@ -134,6 +135,7 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--gust"]:
         sys.stdout.write(gust_text())
     elif sys.argv[1:2] == ["--suite"]:
-        write_suite(Path(sys.argv[2]))
+        numbers = zip((int, float), sys.argv[3:], strict=False)
+        write_suite(Path(sys.argv[2]), *(read(word) for read, word in numbers))
     else:
         sys.stdout.write(text(SyntheticRecord()))

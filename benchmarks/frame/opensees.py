@@ -30,6 +30,7 @@ from alphacut.frame import Accelerogram, Exact, LinearFlow, MatrixStructure, env
 from alphacut.frame.dynamics.integrators import INTEGRATORS
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.arrays import Array
+from benchmarks.frame.matrix_case import MatrixCase
 from benchmarks.frame.references.excited import excited
 
 WHEEL = "openseespylinux==3.8.0.0"
@@ -138,6 +139,24 @@ def structure(ops: Any, ground: Accelerogram | None) -> MatrixStructure:
     )
 
 
+def write_case(ops: Any, path: Path) -> None:
+    """Writes the frame as a case with a folder of its matrices."""
+    unknowns = [f"{node}.{'xyr'[direction - 1]}" for node, direction in build(ops, 1.0, 1.0)]
+    quantities = {"columns": "1 ± 5 %", "beams": "1 ± 5 %", "mass": "1 ± 5 %"}
+    title = "Frame of three bays and six storeys from OpenSees"
+    frame = structure(ops, None)
+    sections = """[envelope]
+fuzzy = ["columns", "mass"]
+alpha = [0, 1]
+duration = "8 s"
+step = "0.02 s"
+"""
+    record = 'accelerogram = "building.record.csv"    # a file of yours\n'
+    MatrixCase(title, frame, unknowns, quantities, "x", sections).write(path)
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("direction =", f"{record}direction ="), encoding="utf-8")
+
+
 def motion(ops: Any, ground: Accelerogram, parts: int) -> Array:
     """Roof and first drift by OpenSees with Newmark's scheme at nodes of the record, (T, 2)."""
     build(ops, 1.0, 1.0)
@@ -238,7 +257,12 @@ def main() -> int:
     """Compare and print; fails where the motions differ by more than 1e-6 of the peak."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=int(time.time()), help="of the record")
-    found = compare(parser.parse_args().seed)
+    parser.add_argument("--write", metavar="CASE.toml", help="write the frame as a case, no more")
+    given = parser.parse_args()
+    if given.write:
+        write_case(opensees(), Path(given.write))
+        return 0
+    found = compare(given.seed)
     print(json.dumps(found, indent=2))
     agree = all(float(found[x]) < 1e-6 for x in ("exact_against_extrapolated", "same_scheme"))
     natures = [value for key, value in found.items() if key.endswith(": nature")]

@@ -3,13 +3,16 @@
 Bays and storeys of beam elements with consistent or lumped masses; the feet stand on springs. The
 inputs are the soil's stiffness, Young's modulus of columns and of beams, and the floors' masses.
 
-Run `python -m benchmarks.frame.plane_frame --help`.
+Run `python -m benchmarks.frame.plane_frame --help`; the shipped case comes from
+
+    python -m benchmarks.frame.plane_frame --bays 1 --storeys 2 --write cases/plane-frame.toml
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -17,6 +20,7 @@ from alphacut.frame import DualProof, MatrixStructure, Output, envelope
 from alphacut.frame.structures.loads import Accelerogram
 from alphacut.fuzzy import Interval
 from alphacut.fuzzy.arrays import Array
+from benchmarks.frame.matrix_case import MatrixCase
 from benchmarks.synthetic_record import SyntheticRecord
 
 SPAN, HEIGHT = 6.0, 3.2
@@ -93,19 +97,51 @@ def plane_frame(bays: int, storeys: int, ground: Accelerogram, *, lumped: bool) 
                     add(place(i - 1, j), place(i, j), "Eb")
     for i in range(columns):
         parts["ks"][[place(i, 0) + k for k in range(3)], [place(i, 0) + k for k in range(3)]] = SOIL
-    roof, pattern = np.zeros(n), np.zeros(n)
+    roof, pattern, moment = np.zeros(n), np.zeros(n), np.zeros(n)
     roof[place(0, storeys)], pattern[::3] = 1.0, 1.0
+    ends = [*range(place(0, 0), place(0, 0) + 3), *range(place(0, 1), place(0, 1) + 3)]
+    moment[ends] = turned(element(HEIGHT, *COLUMN)[0], upright=True)[2]
     parameters = {"Ec": 1.0, "Eb": 1.0, "ks": 1.0, "zeta": 0.04}
     parameters |= {f"m{j + 1}": FLOOR for j in range(storeys)}
     return MatrixStructure(
         parameters,
         [(1.0, parts["members"]), *((f"m{j + 1}", mass) for j, mass in enumerate(floors))],
         [(name, parts[name]) for name in ("Ec", "Eb", "ks")],
-        {Output("roof", "m"): roof},
+        {Output("roof", "m"): roof, Output("moment", "N*m"): moment},
         ground=ground,
         pattern=pattern,
         ratios=("zeta",),
+        row_factors={"moment": "Ec"},
     )
+
+
+SECTIONS = """[records]
+files = ["{records}"]
+baseline = "mean"
+
+[envelope]
+fuzzy = ["Ec", "Eb", "ks"]
+alpha = [0, 1]
+duration = "{duration}"
+step = "0.02 s"
+
+[decision]
+limits = ["roof <= {roof}", "moment <= {moment}"]
+
+[fragility]
+limits = ["roof <= {roof}"]
+measure = "PGA"
+"""
+"""Other sections of the case that `--write` makes."""
+
+
+def case_of(frame: MatrixStructure, bays: int, soil: float, **texts: str) -> MatrixCase:
+    """A case of the frame under a suite; `texts` are those of `SECTIONS`."""
+    ends = [f"{node + 1}.{axis}" for node in range(frame.size // 3) for axis in "xyr"]
+    quantities = {"Ec": "1 ± 5 %", "Eb": "1 ± 10 %", "ks": f"1 ± {soil:.0%}", "zeta": "4 %"}
+    quantities |= {name: "60 t" for name in frame.parameters if name[0] == "m"}
+    title = f"Plane frame, bays: {bays}, from the matrices of its members"
+    return MatrixCase(title, frame, ends, quantities, "x", SECTIONS.format(**texts))
 
 
 def main() -> None:
@@ -117,10 +153,16 @@ def main() -> None:
     parser.add_argument("--masses", type=int, default=0, help="floors whose masses vary")
     parser.add_argument("--soil", type=float, default=0.25)
     parser.add_argument("--gap", type=float, default=0.02)
+    parser.add_argument("--write", metavar="CASE.toml", help="write a case in place of a proof")
     given = parser.parse_args()
     record = SyntheticRecord(duration=10.0, step=0.01)
     ground = Accelerogram(record.step, np.asarray(record.acceleration()))
     frame = plane_frame(given.bays, given.storeys, ground, lumped=given.lumped)
+    if given.write:
+        texts = {"records": "suite/record-200[1-3].AT2", "duration": "6 s"}
+        texts |= {"roof": "40 mm", "moment": "350 kN m"}
+        case_of(frame, given.bays, given.soil, **texts).write(Path(given.write))
+        return
     inputs = {name: Interval(1 - w, 1 + w) for name, w in (("Ec", 0.05), ("Eb", 0.1))}
     inputs["ks"] = Interval(1 - given.soil, 1 + given.soil)
     inputs |= {f"m{j + 1}": Interval(0.95 * FLOOR, 1.05 * FLOOR) for j in range(given.masses)}

@@ -110,6 +110,8 @@ class LinearMotion:
         )
         for k, course in enumerate(self.courses):
             acts = times >= course.start - 1e-12 * times[-1]
+            if not acts.any():
+                continue
             since = np.maximum(times[acts] - course.start, 0.0)
             driven, more = state.driven(self.forces[:, k], course, since)
             values[acts] += driven

@@ -138,6 +138,16 @@ def test_exact_steps_and_exact_motions_equal_a_solver(reference):
     assert (rounding <= 1e-9 * size).all()
 
 
+def test_a_force_that_begins_after_the_end_does_nothing():
+    late = replace(FRAME, loads=(*ALL, Force(1, 9e3, History.constant(7.0))))
+    envelope_like = type("Named", (), {"inputs": {"m1": Interval(1.9e3, 2.1e3)}})
+    point = np.array([[2e3]])
+    motions = [structures_at(x, envelope_like, point)[0].outputs(TIMES)[0] for x in (FRAME, late)]
+    np.testing.assert_array_equal(*motions)
+    values = [LinearFlow(x, ("m1",), 3.0, 0.02, Exact()).values(point) for x in (FRAME, late)]
+    np.testing.assert_allclose(*values, rtol=1e-12, atol=1e-12)
+
+
 def test_midpoint_converges_with_order_two(reference):
     errors = []
     for parts in (4, 8):

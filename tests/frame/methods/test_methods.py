@@ -245,7 +245,7 @@ def test_where_neighbouring_motions_part_bounds_are_attained_and_no_more():
         ({"inputs": {"E": Interval(24, 26)}}, "give both in SI units"),
         ({"inputs": {"zeta": Interval(0.01, 1.0)}}, "zeta"),
         ({"model": 5}, "model is int; allowed: a StoreyFrame"),
-        ({"model": replace(FRAME, q0=(), v0=())}, "a start or a record that moves something"),
+        ({"model": replace(FRAME, q0=(), v0=())}, "a record or a force that moves something"),
     ],
 )  # fmt: skip
 def test_what_has_no_meaning_is_refused(changes, message):

@@ -1,0 +1,82 @@
+"""The engineer's desk, cases shortened: a suite, wind on floors, matrices with a member's moment."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FEW = "records.files=['suite/record-200[1-3].AT2']"
+QUICK = {
+    "suite": (FEW, "envelope.duration='6 s'", "envelope.step='0.02 s'", "envelope.alpha=[0, 1]"),
+    "wind": ("envelope.duration='8 s'", "envelope.fuzzy=['E', 'F4']"),
+    "plane-frame": ("envelope.duration='2 s'", "records.files=['suite/record-2001.AT2']"),
+}
+GOLDEN = {
+    "suite": (6.173, 10.549),  # median of Sa(T1) in m/s² at α = 0
+    "wind": {"drift1": 4.4389e-3, "a4": 0.45191, "base_shear": 129.04e3},
+    "plane-frame": 8.1687e-3,
+}
+
+
+def run(case, out, changes, *start):
+    """The summary of a run of a shipped case with changes."""
+    sets = [f"--set={change}" for change in changes]
+    words = ["-m", "alphacut", "run", f"cases/{case}.toml", f"--out={out}", "--no-figures"]
+    env = os.environ | {"OMP_NUM_THREADS": "1"}
+    command = [*start, sys.executable, *(["-m", "mpi4py.futures"] if start else []), *words, *sets]
+    made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=env)
+    assert made.returncode == 0, made.stderr
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def summaries(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("desk")
+    return {case: run(case, folder / case, changes) for case, changes in QUICK.items()}
+
+
+def test_a_suite_has_its_golden_fragility(summaries):
+    answer = summaries["suite"]["fragility"]
+    limit = answer["limits"]["drift1"]
+    assert limit["nature"] == "guaranteed"
+    low, reached, inner, high = (
+        np.array(limit["critical"][x]) for x in ("low", "low_reached", "high_reached", "high")
+    )
+    assert (low <= reached + 1e-12).all()
+    assert (inner <= high).all()
+    assert limit["median"]["lower"][0] == pytest.approx(GOLDEN["suite"][0], rel=0.02)
+    assert limit["median"]["upper"][0] == pytest.approx(GOLDEN["suite"][1], rel=0.05)
+
+
+def test_wind_has_its_golden_peaks(summaries):
+    peaks = summaries["wind"]["envelopes"]["all"]["peak"]
+    for name, value in GOLDEN["wind"].items():
+        assert peaks[name]["nature"] == "guaranteed"
+        assert peaks[name]["reached"][0] <= peaks[name]["upper"][0]
+        assert peaks[name]["upper"][0] == pytest.approx(value, rel=0.03)
+    assert summaries["wind"]["envelopes"]["all"]["motions_tested"] > 0
+
+
+def test_a_frame_from_matrices_answers_all_questions(summaries):
+    summary = summaries["plane-frame"]
+    limits = summary["decision"]["limits"]
+    assert {limits[name]["nature"] for name in ("roof", "moment")} == {"guaranteed"}
+    assert limits["moment"]["unit"] == "N*m"
+    assert limits["roof"]["peak"]["proved"][0] == pytest.approx(GOLDEN["plane-frame"], rel=0.03)
+    assert set(summary["fragility"]["limits"]) == {"roof"}
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
+def test_three_ranks_give_the_bits_of_one_process(summaries, tmp_path):
+    ranks = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "3"]
+    version = subprocess.run(["mpirun", "--version"], capture_output=True, text=True).stdout
+    ranks = ranks if "Open MPI" in version else ["mpirun", "-n", "3"]
+    summary = run("suite", tmp_path / "out", QUICK["suite"], *ranks)
+    assert summary["records"]["records"] == summaries["suite"]["records"]["records"]
+    assert summary["fragility"] == summaries["suite"]["fragility"]
