@@ -150,8 +150,8 @@ def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) 
         "average": AVERAGES[average],
         "plane": {
             name + ("" if name == "nu_xy" else "_GPa"): {
-                end: [cut.constants[k, place] / (1.0 if name == "nu_xy" else GPA) for cut in cuts]
-                for place, end in enumerate(("lower", "upper"))
+                end: [cut.constants[k, side] / (1.0 if name == "nu_xy" else GPA) for cut in cuts]
+                for side, end in enumerate(("lower", "upper"))
             }
             for k, name in enumerate(NAMES)
         },

@@ -220,7 +220,7 @@ class CellCampaign:
         modulus, size = self.modulus, min(2 * self.mesh.size, LARGEST_SIZE)
         usual = SPHERES if self.cell.particles == "spheres" else SeriesModel.accuracy
         tolerance = COARSER * (modulus.tolerance or usual)
-        other = replace(
+        other_campaign = replace(
             self,
             mesh=self.mesh.model_copy(update={"size": size}),
             modulus=modulus.model_copy(update={"tolerance": tolerance}),
@@ -228,7 +228,7 @@ class CellCampaign:
         cuts, error = np.stack(result.bounds("E"), 1), sum(self.errors(result).values())
         levels = result.alpha[[-1, 0]]
         points = [{x: float(np.mean(n.cut(a))) for x, n in result.inputs.items()} for a in levels]
-        for alpha, sample in zip(levels, other.task(points), strict=True):
+        for alpha, sample in zip(levels, other_campaign.task(points), strict=True):
             value = float(np.asarray(sample["E"]))
             slack = value * (error + sample["error:space"] + sample["error:theta"])
             for low, high in cuts[result.alpha <= alpha]:

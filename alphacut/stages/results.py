@@ -96,5 +96,5 @@ def sizes(structure: Structure, frame: StoreyFrame) -> Document:
         "omega_rad_per_s": omega,
         "period_s": 2 * np.pi / omega[0],
         "weight_N": sum(frame.masses) * float(STANDARD_GRAVITY),
-        "heights_m": {x: of.modal for x, of in structure.heights.items() if x in drifts},
+        "heights_m": {x: height.modal for x, height in structure.heights.items() if x in drifts},
     }

@@ -76,8 +76,8 @@ class StiffnessBounds:
         middle = (low[0, 1] + high[0, 1]) / 2
         reach = np.sqrt((high - low)[0, 0] * (high - low)[1, 1]) / 2 + slack * abs(high).max()
         ratios = np.outer([-middle - reach, -middle + reach], [1 / high[0, 0], 1 / low[0, 0]])
-        beyond = slack * abs(ratios).max()
-        poisson = (ratios.min() - beyond, ratios.max() + beyond)
+        margin = slack * abs(ratios).max()
+        poisson = (ratios.min() - margin, ratios.max() + margin)
         return np.array([*moduli[:2], poisson, moduli[2]])
 
     def contains(self, stiffness: Array) -> bool:
@@ -140,5 +140,5 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
 def residual_above(inverse: Array, matrix: Array) -> Array:
     """Bound of the magnitudes of I − inverse·matrix, whatever the order of the sums."""
     size = matrix.shape[-1]
-    rest = np.abs(np.eye(size) - inverse @ matrix)
-    return np.asarray(rest + size * SAFETY * UNIT * (np.abs(inverse) @ np.abs(matrix)))
+    residual = np.abs(np.eye(size) - inverse @ matrix)
+    return np.asarray(residual + size * SAFETY * UNIT * (np.abs(inverse) @ np.abs(matrix)))

@@ -86,10 +86,10 @@ class ImageModel:
                 before, solution = pair, self.solve(pair, solution)
             solutions.append(solution)
         moduli, ratios = (
-            nested([ends(one.bounds, self.average) for one in solutions])
+            nested([ends(solved.bounds, self.average) for solved in solutions])
             for ends in (StiffnessBounds.young, StiffnessBounds.poisson)
         )
-        ends = np.array([one.bounds.constants() for one in solutions])
+        ends = np.array([solved.bounds.constants() for solved in solutions])
         constants = [np.minimum.accumulate(ends[..., 0]), np.maximum.accumulate(ends[..., 1])]
         rows = zip(solutions, moduli, ratios, np.stack(constants, axis=-1), strict=True)
         return [ImageCut(s.bounds, e, nu, c) for s, e, nu, c in rows][::-1]
@@ -109,13 +109,13 @@ class ImageModel:
         for k, point in enumerate(points[: 1 if points[0].same(points[1]) else 2]):
             bounds = judge.solve(point).bounds
             for cut in cuts if k == 0 else cuts[:1]:  # the narrowest one lies in all
-                for name, own, (low, high) in (
+                for name, end, (low, high) in (
                     ("E", cut.modulus, bounds.young(self.average)),
                     ("ν", cut.poisson, bounds.poisson(self.average)),
                 ):
-                    if not (low <= own[1] and own[0] <= high):
+                    if not (low <= end[1] and end[0] <= high):
                         what = f"{name} of an image inside a cut is {low:.9g} … {high:.9g}"
-                        what += f", the cut {own[0]:.9g} … {own[1]:.9g}"
+                        what += f", the cut {end[0]:.9g} … {end[1]:.9g}"
                         cure = "keep the case and report it"
                         raise FailedError(f"the proof is wrong: {what}", cure)
 

@@ -32,8 +32,8 @@ def phase_energies(
     by_stress = _parts(airy_element(aspect), solution.lower, images, phase, count)
     # the compliance S = C⁻¹ has ∂S = −S ∂C S
     stiffness = np.linalg.inv(by_stress.sum(axis=(0, 1)))
-    both = [square_moduli(x) for x in (by_strain, stiffness @ by_stress @ stiffness)]
-    return PhaseEnergies((both[0] + both[1]) / 2, abs(both[0] - both[1]))
+    moduli = [square_moduli(x) for x in (by_strain, stiffness @ by_stress @ stiffness)]
+    return PhaseEnergies((moduli[0] + moduli[1]) / 2, abs(moduli[0] - moduli[1]))
 
 
 def _parts(

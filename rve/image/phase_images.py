@@ -34,9 +34,9 @@ class ModuliImages:
         bulk, shear = (np.sqrt(low * high) for low, high in (self.bulk, self.shear))
         return ModuliImages((bulk, bulk), (shear, shear))
 
-    def same(self, other: ModuliImages) -> bool:
+    def same(self, images: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""
-        pairs = zip((*self.bulk, *self.shear), (*other.bulk, *other.shear), strict=True)
+        pairs = zip((*self.bulk, *self.shear), (*images.bulk, *images.shear), strict=True)
         return all(np.array_equal(a, b) for a, b in pairs)
 
 

@@ -90,13 +90,13 @@ class ConjugateGradient:
                 return fields, number
             image = system.operator.apply(direction)
             length = _ratio(product, inner(direction, image))
-            fields += _each(length) * direction
-            residual -= _each(length) * image
+            fields += _per_load(length) * direction
+            residual -= _per_load(length) * image
             image = system.preconditioner.apply(residual)
             product, before = inner(residual, image), product
             change = _ratio(product, before)
             reach = _radau(reach - length, change, system.least)
-            direction *= _each(change)
+            direction *= _per_load(change)
             direction += image
         lacking = float((reach * product / system.scale).max())
         raise FailedError(
@@ -122,7 +122,7 @@ def _radau(excess: Array, change: Array, least: float) -> Array:
     return np.where(excess > 0, sharper, 1 / least)
 
 
-def _each(factors: Array) -> Array:
+def _per_load(factors: Array) -> Array:
     """Factors of the loads, to multiply fields with."""
     return factors[:, None, None, None]
 

@@ -93,11 +93,11 @@ def airy_element(aspect: float = 1.0) -> Element:
     # value and slope at 0, value and slope at 1
     basis = ((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1))
     value, slope, bend = _tables(basis)
-    places = list(product(range(2), repeat=4))  # y, slope in y, x, slope in x
+    nodes = list(product(range(2), repeat=4))  # y, slope in y, x, slope in x
     first, second = np.kron(bend, value) / aspect**2, np.kron(value, bend)
     mixed = np.asarray(-2 * np.kron(slope, slope) / aspect)
     modes, constants = _stacked(first + second, first - second, mixed)
-    origin, slope_y, slope_x = places.index((0, 0, 0, 0)), places.index((0, 1, 0, 0)), 1
+    origin, slope_y, slope_x = nodes.index((0, 0, 0, 0)), nodes.index((0, 1, 0, 0)), 1
 
     def anchors(y: int, dy: int, x: int, dx: int) -> tuple[int, ...]:
         """Value and slopes at the origin, of which a linear function is made."""
@@ -107,12 +107,12 @@ def airy_element(aspect: float = 1.0) -> Element:
 
     return Element(
         unknowns=4,
-        local=tuple((2 * dy + dx, y, x) for y, dy, x, dx in places),
+        local=tuple((2 * dy + dx, y, x) for y, dy, x, dx in nodes),
         modes=modes,
         bulk_rows=constants[1],
         constants=constants,
         twice_shear=2.0,
-        anchors=tuple(anchors(*place) for place in places),
+        anchors=tuple(anchors(*node) for node in nodes),
         stress=True,
     )
 
@@ -125,7 +125,7 @@ def _tables(basis: Basis) -> list[Array]:
     functions, tables = list(basis), []
     count = len(basis[0])
     for _ in range(3):
-        exact = [[_integral(one, f) for f in functions] for one in LEGENDRE[:count]]
+        exact = [[_integral(polynomial, f) for f in functions] for polynomial in LEGENDRE[:count]]
         scale = np.sqrt(2 * np.arange(float(count)) + 1)
         tables.append(np.array(exact, dtype=float) * scale[:, None])
         functions = [tuple(n * c for n, c in enumerate(f))[1:] for f in functions]
@@ -140,6 +140,6 @@ def _integral(first: tuple[int, ...], second: tuple[int, ...]) -> Fraction:
 
 def _stacked(*parts: Array) -> tuple[Array, tuple[int, int, int]]:
     """Modes of trace, difference and shear without rows that vanish, and the first row of each."""
-    kept = [part[np.abs(part).max(axis=1) > 0] for part in parts]
-    first, second = len(kept[0]), len(kept[0]) + len(kept[1])
-    return np.ascontiguousarray(np.vstack(kept)), (0, first, second)
+    nonzero_rows = [part[np.abs(part).max(axis=1) > 0] for part in parts]
+    first, second = len(nonzero_rows[0]), len(nonzero_rows[0]) + len(nonzero_rows[1])
+    return np.ascontiguousarray(np.vstack(nonzero_rows)), (0, first, second)

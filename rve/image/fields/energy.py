@@ -83,7 +83,7 @@ def energies(
     value = np.empty((len(weights), count, count))
     for k, parts in enumerate(sums):
         entries = np.concatenate(parts).reshape(-1, count**2).T
-        value[k] = np.reshape([math.fsum(one) for one in entries], (count, count)) / pixels
+        value[k] = np.reshape([math.fsum(terms) for terms in entries], (count, count)) / pixels
     summed = SAFETY * (piece + COEFFICIENT + 4) * UNIT
     return Energies(value, np.sqrt(SAFETY * error / pixels), summed)
 

@@ -45,11 +45,11 @@ class Reference:
                 the sum decide in `least` too.
         """
         bulk, shear = float(trace.min()), float(deviator.min())
-        whole = float(np.sqrt((bulk + shear) * (trace.max() + deviator.max())))
+        largest = float(np.sqrt((bulk + shear) * (trace.max() + deviator.max())))
         middle = float(np.sqrt(shear * deviator.max()))
         if stress:
-            middle = whole * shear / (bulk + shear)
-        return cls(whole - middle, middle)
+            middle = largest * shear / (bulk + shear)
+        return cls(largest - middle, middle)
 
     def least(self, trace: Array, deviator: Array) -> float:
         """Energy of fluctuations of an image over that in this material, at least."""
@@ -71,7 +71,7 @@ class FourierPreconditioner:
     shape: tuple[int, int]
 
     @classmethod
-    def of(
+    def of_material(
         cls, element: Element, constant: Reference, shape: tuple[int, int]
     ) -> FourierPreconditioner:
         """The preconditioner for a constant material; uniform fields cause nothing."""

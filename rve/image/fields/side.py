@@ -63,8 +63,8 @@ def solve_side(
             space of fields.
         start: Fields to start from, on the divided pixels.
     """
-    whole, parts = coefficients(element, bulk, shear), np.ones((division, division))
-    trace, deviator = (np.asarray(np.kron(one, parts)) for one in whole)
+    pixel_coefficients, parts = coefficients(element, bulk, shear), np.ones((division, division))
+    trace, deviator = (np.asarray(np.kron(x, parts)) for x in pixel_coefficients)
     begin = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
     fields, iterations = _fields(element, trace, deviator, solver, begin)
     fields = np.asarray(np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1), float)
@@ -79,7 +79,9 @@ def _fields(
     """Fields of the solved loads and the most iterations; large images load by load."""
     modes = element.mean_modes(SOLVED_LOADS)
     constant = Reference.between(trace, deviator, stress=element.stress)
-    preconditioner = FourierPreconditioner.of(element, constant, (len(trace), len(trace[0])))
+    preconditioner = FourierPreconditioner.of_material(
+        element, constant, (len(trace), len(trace[0]))
+    )
     operator = Operator(element, trace, deviator)
     scale, least = least_energy(element, trace, deviator, modes), constant.least(trace, deviator)
     together = len(SOLVED_LOADS) if trace.size <= SMALL else 1

@@ -76,10 +76,10 @@ def _dipoles(
     inward, outward = (radius[:, None] ** power for power in _powers(poles))
     images = couplings(degree, matrix.poisson, shear=shear) * inward[..., None] * outward[:, None]
     least = 2 if shear else 0
-    loads = [(poles.place(1, 2, least), poles.place(3, 2, least), 1.0)]
+    loads = [(poles.index_of(1, 2, least), poles.index_of(3, 2, least), 1.0)]
     if not shear:
         unit = -1 / (2 * (1 - 2 * matrix.poisson))  # solution 3 of degree 0 is −2(1 − 2ν) x
-        loads.insert(0, (poles.place(3, 0, 0), poles.place(1, 0, 0), unit))
+        loads.insert(0, (poles.index_of(3, 0, 0), poles.index_of(1, 0, 0), unit))
     sources, poles_of, units = map(list, zip(*loads, strict=True))
     columns, dipoles = range(len(loads)), np.empty((radius.size, len(inclusions), len(loads)))
     far = np.zeros((poles.n.size, len(loads)))
@@ -101,7 +101,7 @@ def _powers(poles: Multipoles) -> tuple[Array, Array]:
 @lru_cache(maxsize=256)
 def multipoles(degree: int, *, shear: bool) -> Multipoles:
     """Those up to a degree, made once."""
-    return Multipoles.of(degree, shear=shear)
+    return Multipoles.up_to(degree, shear=shear)
 
 
 @lru_cache(maxsize=1024)

@@ -48,15 +48,15 @@ class Multipoles:
     kind: Array
 
     @classmethod
-    def of(cls, highest: int, *, shear: bool) -> Multipoles:
+    def up_to(cls, highest: int, *, shear: bool) -> Multipoles:
         """Those up to degree `highest`: m = 0, 4, … of axial loads, m = 2, 6, … of ε12."""
         first = 2 if shear else 0
         even = [(n, m) for n in range(first, highest + 1, 2) for m in range(first, n + 1, 4)]
         odd = [(n, m) for n in range(3, highest + 1, 2) for m in range(first or 4, n + 1, 4)]
-        rows = [(*p, kind) for kind, of in ((1, even), (2, odd), (3, even)) for p in of]
+        rows = [(*p, kind) for kind, orders in ((1, even), (2, odd), (3, even)) for p in orders]
         return cls(*np.array(rows).T)
 
-    def place(self, kind: int, n: int, m: int) -> int:
+    def index_of(self, kind: int, n: int, m: int) -> int:
         """Index of one multipole."""
         return int(np.flatnonzero((self.kind == kind) & (self.n == n) & (self.m == m))[0])
 
@@ -71,19 +71,19 @@ def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
         shear: Whether the load is ε12; else ε11, ε22 or ε33.
 
     Returns:
-        In the order of `Multipoles.of`, at r = 1, shape (N, N).
+        In the order of `Multipoles.up_to`, at r = 1, shape (N, N).
     """
-    poles = Multipoles.of(highest, shear=shear)
+    poles = Multipoles.up_to(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
     coupling = np.zeros((poles.n.size, poles.n.size))
-    for to, of in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
-        rows, columns = np.flatnonzero(poles.kind == to), np.flatnonzero(poles.kind == of)
+    for to, source in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
+        rows, columns = np.flatnonzero(poles.kind == to), np.flatnonzero(poles.kind == source)
         k, j = poles.n[rows, None], poles.m[rows, None]
         n, m = poles.n[None, columns], poles.m[None, columns]
-        mirror = (-1.0 if of == 2 else 1.0) * (-1.0 if shear else 1.0) * (m > 0)
-        coupling[np.ix_(rows, columns)] = _coupling(to, of, _Pair(n, m, k, j), poisson, sums)
+        mirror = (-1.0 if source == 2 else 1.0) * (-1.0 if shear else 1.0) * (m > 0)
+        coupling[np.ix_(rows, columns)] = _coupling(to, source, _Pair(n, m, k, j), poisson, sums)
         coupling[np.ix_(rows, columns)] += mirror * _coupling(
-            to, of, _Pair(n, -m, k, j), poisson, sums
+            to, source, _Pair(n, -m, k, j), poisson, sums
         )
     return _made_periodic(coupling, poles, poisson, shear=shear)
 
@@ -98,14 +98,14 @@ class _Pair:
     j: Array
 
 
-def _coupling(to: int, of: int, at: _Pair, poisson: float, sums: tuple[Array, Array]) -> Array:
-    """Amplitude of Lamé solution `to` by the images of solution `of`."""
+def _coupling(to: int, source: int, at: _Pair, poisson: float, sums: tuple[Array, Array]) -> Array:
+    """Amplitude of Lamé solution `to` by the images of solution `source`."""
     n, k = at.n, np.maximum(at.k, 1) if to == 1 else at.k
-    if to == of:
+    if to == source:
         same = _scaled(sums[0], at, 0)
         factors = {1: at.k > 0, 2: -n / (k + 1), 3: n * (2 * n - 1) / ((k + 1) * (2 * k + 3))}
         return np.asarray(factors[to] * same)
-    if 2 in (to, of):
+    if 2 in (to, source):
         turned = (n * at.j + k * at.m) * _scaled(sums[0], at, -1)
         if to == 1:
             return np.asarray(-turned / k)
@@ -146,11 +146,11 @@ def _made_periodic(coupling: Array, poles: Multipoles, poisson: float, *, shear:
     """Add the uniform strain that gives the sums of degree −2 no mean strain."""
     m = 2 if shear else 0
     # of solution 3, a polarised ball: less its strain by Eshelby
-    coupling[poles.place(1, 2, m), poles.place(3, 2, m)] -= (
+    coupling[poles.index_of(1, 2, m), poles.index_of(3, 2, m)] -= (
         16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)
     )
     if not shear:  # the periodic 1/r has the Laplacian 4π/V besides its poles: strain 4π/(3V)
-        coupling[poles.place(3, 0, 0), poles.place(1, 0, 0)] -= (
+        coupling[poles.index_of(3, 0, 0), poles.index_of(1, 0, 0)] -= (
             4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
         )
     return coupling

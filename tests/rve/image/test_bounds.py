@@ -320,7 +320,7 @@ def test_no_system_lacks_more_energy_than_its_accuracy(element, seed):
 def system_of(element, trace, deviator):
     """The system of three loads on periodic fields."""
     constant = Reference.between(trace, deviator, stress=element.stress)
-    inverse = FourierPreconditioner.of(element, constant, trace.shape)
+    inverse = FourierPreconditioner.of_material(element, constant, trace.shape)
     operator, modes = Operator(element, trace, deviator), element.mean_modes(SOLVED_LOADS)
     scale = least_energy(element, trace, deviator, modes)
     least = constant.least(trace, deviator)
