@@ -47,7 +47,7 @@ class PlaneMesh:
     @property
     def inside(self) -> Mask:
         """Mask of the triangles in the particle."""
-        return self.phase == PARTICLE
+        return np.asarray(self.phase == PARTICLE)
 
 
 def plane_mesh(
