@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,18 +82,21 @@ class EnvelopeTask:
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
-        result = self.envelope_of(structure, work.tick)
+        result = self.envelope_of(structure, work.tick, work.parts)
         signed = [name for name in self.limited if name != output_of(name)]
         of_envelope = peaks(result, [*map(str, result.outputs), *signed])
         if not has_close(of_envelope, self.limited):
             of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
         return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
 
-    def envelope_of(self, structure: Structure, tick: Progress | None = None) -> frame.Envelope:
-        """The envelope by the method of the case."""
+    def envelope_of(
+        self, structure: Structure, tick: Progress | None = None, parts: Path | None = None
+    ) -> frame.Envelope:
+        """The envelope by the method of the case; a proof keeps its parts in a folder, if any."""
         return frame.envelope(
             **self.arguments(structure),
             relative=not self.tolerance(structure).unit,
+            store=parts,
             interruptible=False,
             progress=tick or False,
         )
@@ -121,6 +125,7 @@ class EnvelopeTask:
                 alpha=self.section.alpha,
                 method=frame.Auto(PEAK_ERROR, peaks=True),
                 relative=True,
+                store=work.parts,
                 interruptible=False,
                 progress=work.tick or False,
             ),

@@ -7,9 +7,10 @@ import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shutil import rmtree
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 
 SAMPLES = "samples.db"
 """Store of the samples of a campaign, beside the results."""
+PARTS = "parts"
+"""Folder of the bounds of parts of boxes while a proof runs, beside the results."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,14 @@ class Work:
         samples: Store of samples; None for none.
         workers: Processes.
         tick: Takes the share done; None to show nothing.
+        parts: Folder from which a proof that was killed goes on; None for none.
     """
 
     folder: Path | None = None
     samples: Path | None = None
     workers: int = 1
     tick: Progress | None = None
+    parts: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -188,10 +193,29 @@ class StageStore:
         self.folder.require_free(f"{stage.name}.json")
         self.folder.require_free(f"{stage.name}.nc")
         samples = self._samples(self.folder) if stage.has_samples else None
-        with TemporaryDirectory() as scratch:
+        with TemporaryDirectory() as scratch, self._parts(self.folder, stage) as parts:
             with showing(self.shown) as tick, self._reported(stage):
-                result = stage.compute(Work(Path(scratch), samples, self.workers, tick))
+                result = stage.compute(Work(Path(scratch), samples, self.workers, tick, parts))
             return self._put(stage, result, Path(scratch))
+
+    @contextmanager
+    def _parts(self, folder: ResultsFolder, stage: Stage) -> Iterator[Path | None]:
+        """Folder of the parts of a proof, which stays where the stage does not end.
+
+        It is named by the stage's key, so that no other code or case takes what is in it, and not
+        used where somebody has put a link in its place.
+        """
+        path = folder.path / PARTS / stage.key[:32]
+        if path.is_symlink() or path.parent.is_symlink():
+            yield None
+            return
+        if self.fresh:
+            rmtree(path, ignore_errors=True)
+        yield path
+        if rank() == 0:
+            rmtree(path, ignore_errors=True)
+            with suppress(OSError):
+                path.parent.rmdir()
 
     def _samples(self, folder: ResultsFolder) -> Path:
         """The store of samples, which the manifest lists before it is made.
