@@ -328,7 +328,7 @@ class Bounds:
         if self.time is None:
             return self.number(output).plot(axes, **line)
         axes, ends = new_axes() if axes is None else axes, self.bounds(output)
-        look = {"color": "tab:blue", "alpha": 0.8 / len(self.alpha), "lw": 0} | line
+        look: dict[str, Any] = {"color": "tab:blue", "alpha": 0.8 / len(self.alpha), "lw": 0} | line
         for lower, upper in zip(*ends, strict=True):
             axes.fill_between(self.time, lower, upper, **look)
         return axes

@@ -103,7 +103,8 @@ def _by_complex_moduli(result: HomogenisedStiffness, losses: Array) -> Array:
     """Loss factors of E, G, K of the series at complex moduli of the phases, shape (3,)."""
     cell, curve = result.cell, result.curve
     assert cell is not None
-    moduli = np.array([phase.bulk_and_shear for phase in cell.phases]) * (1 + 1j * losses)
+    real = [phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)]
+    moduli = np.array(real) * (1 + 1j * losses)
     radii = cell.radius(curve.theta)
     mean = curve.weights @ complex_moduli(radii, *moduli.T, harmonics=result.unknowns)[:, 0]
     young, poisson = result.constants_of(mean)

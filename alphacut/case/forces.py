@@ -71,7 +71,7 @@ def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> 
         raise RefusedError("", name, f"{HISTORY}; {error.allowed}") from None
     series = read_force_history(path)
     size = float(np.abs(series.samples).max()) if series.has_unit else 1.0
-    history = History(series.step, series.samples / size, start, is_static=is_static)
+    history = History(series.step, np.asarray(series.samples / size), start, is_static=is_static)
     return Course(history, "" if series.has_unit else "N", size)
 
 

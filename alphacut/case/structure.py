@@ -79,7 +79,7 @@ class MaterialDamping:
             ]
             for end in (0, 1)
         )
-        return PiecewiseLinear(alpha, lower, upper)
+        return PiecewiseLinear(tuple(alpha), tuple(lower), tuple(upper))
 
 
 def _ratio_of_loss(loss: float) -> float:
@@ -89,11 +89,12 @@ def _ratio_of_loss(loss: float) -> float:
 def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping:
     """A damping ratio, or that of the material."""
     words = value.partition("+") if isinstance(value, str) else ("", "", "")
-    if words[0].strip() != "material":
-        return RATIO.read(value)
-    if not words[1]:
+    of_material = words[0].strip() == "material"
+    if of_material and not words[1]:
         return MaterialDamping()
-    return MaterialDamping(RATIO.read(words[2].strip()))
+    ratio = RATIO.read(words[2].strip() if of_material else value)
+    assert isinstance(ratio, FuzzyNumber)
+    return MaterialDamping(ratio) if of_material else ratio
 
 
 RATIO = Quantity(least=0, below=1, fuzzy=True)

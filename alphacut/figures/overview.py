@@ -56,7 +56,15 @@ def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
     for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
         x, y = level[:, 0], level[:, 1]
         face = np.full(len(corners[mask]), 1.0)
-        axes.tripcolor(x, y, corners[mask], face, cmap=single_colour(colour), ec=INK, lw=0.25)
+        axes.tripcolor(
+            x,
+            y,
+            triangles=corners[mask],
+            facecolors=face,
+            cmap=single_colour(colour),
+            ec=INK,
+            lw=0.25,
+        )
     axes.set_aspect("equal")
     axes.set_xlabel("x$_1$/a")
     axes.set_ylabel("x$_2$/a")
@@ -87,7 +95,7 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
 def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
     """Product domain: faces of the prisms on the cell's sides in front and on the cone."""
     from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     plane, edges = grid.plane.points, boundary_edges(grid)
     cone = layer_faces(levels, edges, grid.plane.arc)

@@ -97,7 +97,7 @@ class DecisionQuestion(Question):
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
         """A row for each limit."""
-        head = ("limited output", "unit", "limit", "verdict", "from α", "nature")
+        head: Row = ("limited output", "unit", "limit", "verdict", "from α", "nature")
         head += ("least possibility", "greatest possibility", "least necessity")
         head += ("greatest necessity", "least margin", "peak at most", "peak reached")
         rows: list[NumberRow] = []

@@ -106,7 +106,7 @@ class FragilityQuestion(Question):
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
         """A row for each limit and level."""
         measure = f"{document['measure']} [{document['unit']}]" if document["unit"] else "scale"
-        head = ("limited output", "unit", "limit", "α", f"least median {measure}")
+        head: Row = ("limited output", "unit", "limit", "α", f"least median {measure}")
         head += (f"greatest median {measure}", "least dispersion", "greatest dispersion", "nature")
         rows: list[NumberRow] = []
         for name, limit in document["limits"].items():

@@ -119,7 +119,7 @@ class ProbabilityQuestion(Question):
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
         """A row for each limit and level."""
-        head = ("limited output", "unit", "limit", "α", "at least", "at most", "nature")
+        head: Row = ("limited output", "unit", "limit", "α", "at least", "at most", "nature")
         head += (
             f"{CONFIDENCE:.0%} interval from",
             f"{CONFIDENCE:.0%} interval to",

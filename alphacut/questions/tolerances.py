@@ -104,7 +104,7 @@ class TolerancesQuestion(Question):
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
         """The scale, then the range of each input."""
-        head = ("quantity", "unit", "from", "to", "from in the case", "to in the case")
+        head: Row = ("quantity", "unit", "from", "to", "from in the case", "to in the case")
         head += ("most plausible", "nature")
         scale = (None, document["kept"], None, 1.0, None, document["nature"])
         rows: list[NumberRow] = [("scale of all ranges", "", *scale)]

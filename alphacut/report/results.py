@@ -65,8 +65,8 @@ def material(summary: Document) -> Table:
             off = "" if error is None else error_text(error, nature)
             rows.append(("loss factor of E", *ends, str(nature), off))
     for name, (low, modal, high) in summary.get("damping", {}).items():
-        ends = (between(*pair, Nature.ATTAINED, 4) for pair in ((modal, modal), (low, high)))
-        rows.append((f"damping ratio {name}", *ends, str(Nature.ATTAINED), ""))
+        shown = [between(*pair, Nature.ATTAINED, 4) for pair in ((modal, modal), (low, high))]
+        rows.append((f"damping ratio {name}", *shown, str(Nature.ATTAINED), ""))
     return filled(MATERIAL, rows)
 
 

@@ -260,7 +260,7 @@ def fibres(result: HomogenisedStiffness) -> Document:
 def stiffness_errors(result: HomogenisedStiffness) -> Array | None:
     """Declared errors of the entries of a plane stiffness, in GPa; None where there are none."""
     errors = result.stiffness_errors if result.errors else None
-    return None if errors is None else errors / GPA
+    return None if errors is None else np.asarray(errors / GPA)
 
 
 def plane_constants(result: HomogenisedStiffness) -> Document:

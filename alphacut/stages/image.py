@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -89,7 +90,7 @@ def compute_cuts(
     }
     constants = np.array([cut.constants for cut in cuts])
     stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
-    variables = {
+    variables: dict[str, Any] = {
         "E": (("alpha", "bound"), np.array([cut.modulus for cut in cuts]), {"units": "Pa"}),
         "stiffness": (("alpha", "bound", "row", "column"), stiffness, {"units": "Pa"}),
         **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(NAMES)},
@@ -100,7 +101,7 @@ def compute_cuts(
         phase, count = study.ranges(None)[0], len(cell.pairs)
         energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
         ends, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
-        cuts_of = dict(zip(CONSTANTS, np.moveaxis(ends, -1, 0), strict=True))
+        cuts_of = {name: ends[..., k] for k, name in enumerate(CONSTANTS)}
         variables |= {f"loss_{name}": (("alpha", "bound"), x) for name, x in cuts_of.items()}
         facts["loss"] = {
             **{name: {"lower": x[:, 0], "upper": x[:, 1]} for name, x in cuts_of.items()},

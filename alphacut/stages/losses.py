@@ -58,7 +58,7 @@ class LossCuts:
         slopes = np.einsum("pxj,pxc->cpj", to_moduli, shares)
         lower, upper = np.moveaxis(self.ends[:, :, None], 1, 0)
         least, most = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
-        return np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([least, most]))
+        return np.asarray(np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([least, most])))
 
 
 def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:

@@ -50,8 +50,8 @@ def _require_material(content: Content) -> None:
 
 def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> CellCampaign:
     """Samples of a cell that is no image, by a solver with options of PETSc."""
-    parts = content.round_cell if content.meshed is None else content.meshed_cell
-    sections = (*parts, content.mesh, content.modulus)
+    radius, cell = content.round_cell if content.meshed is None else content.meshed_cell
+    sections = radius, cell, content.mesh, content.modulus
     return CellCampaign(*sections, petsc or {}, content.stated_fraction)
 
 

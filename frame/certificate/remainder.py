@@ -96,7 +96,7 @@ def _forced(model: ModalModel, growth: Array, number: int) -> MotionPart:
     """The part that a load adds."""
     load, steps = model.loads[number], len(model.time) - 1
     if isinstance(load, Direct):
-        waves = np.zeros((4, len(model.time), model.count))
+        waves: Array = np.zeros((4, len(model.time), model.count))
         waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
         none = np.zeros(len(model.time))
         return MotionPart(load.share, waves, 0 * waves[0], none, load.truncation, load, number)

@@ -64,7 +64,7 @@ class Models:
         """
         centre, used = centred(structure.mass, structure.stiffness)
         excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
-        wanted, doubts = centre.modes, np.zeros(centre.modes)
+        wanted, doubts = centre.modes, np.asarray(np.zeros(centre.modes))
         if allowed is not None:
             wanted, doubts = modes_wanted(structure, centre, excited, excitation, allowed)
         found = subspaces(centre, used, wanted, doubts)

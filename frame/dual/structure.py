@@ -176,7 +176,7 @@ def _pushed(
 
 def _solved(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
     """A⁻¹ b, V = (n, 1), of A₀⁻¹ A and A₀⁻¹ b: what varies in all of A alike is diagonal there."""
-    first = np.linalg.inv(matrix.value)
+    first: Array = np.asarray(np.linalg.inv(matrix.value))
     return solve(first @ matrix, first @ right[:, None])
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import ceil
 from threading import Lock
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -203,7 +203,10 @@ def responses_in_windows(sigma: Array, history: History, time: Array, length: in
 
 
 def _with_sine(
-    walked: Callable[[Array], tuple[Array, Array]], sigma: Array, history: History, time: Array
+    walked: Callable[[np.ndarray[Any, Any]], tuple[Array, Array]],
+    sigma: Array,
+    history: History,
+    time: Array,
 ) -> tuple[Array, Array]:
     """Responses and their rounding from those to the load without its sine.
 

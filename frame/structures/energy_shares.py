@@ -22,7 +22,7 @@ def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Rows) ->
         terms: Places of the terms.
     """
     p = system.parameters
-    mass = sum(float(value_of(factor, p)) * array for factor, array in system.mass)
+    mass = np.sum([float(value_of(factor, p)) * array for factor, array in system.mass], axis=0)
     parts = np.array([float(value_of(factor, p)) * array for factor, array in system.stiffness])
     stiffness, a, b = parts.sum(axis=0), system.massive, system.massless
     shapes = np.zeros((system.size, len(a)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -66,13 +66,15 @@ class Matrices:
         """What a unit of each force adds to the outputs at once, V = (S, m, H); None if nothing."""
         if self.forces is None or self.accelerated is None or not self.accelerated.any():
             return None
-        return self.accelerated @ self.pushes(ground=False)
+        fed: Jet = self.accelerated @ self.pushes(ground=False)
+        return fed
 
 
-def grouped(columns: Jet, forces: Sequence[Force]) -> dict[str, Jet | None]:
-    """Fields `forces`, `static` and `impulse` of `Matrices`.
+def with_forces(matrices: Matrices, columns: Jet, forces: Sequence[Force]) -> Matrices:
+    """Matrices of a structure with `forces`, `static` and `impulse` of some forces.
 
     Args:
+        matrices: Without forces.
         columns: Each force at the amplitude 1 of its history, V = (S, n, number of forces).
         forces: The forces.
     """
@@ -81,11 +83,12 @@ def grouped(columns: Jet, forces: Sequence[Force]) -> dict[str, Jet | None]:
     member = np.array([[key == course.identity for course in courses] for key in keys], float)
     first = [float(course.is_static) * float(course.values(np.zeros(1))[0]) for course in courses]
     still, struck = member @ np.array(first), np.array([key is None for key in keys], float)
-    return {
-        "forces": columns @ member if courses else None,
-        "static": columns @ still[:, None] if still.any() else None,
-        "impulse": columns @ struck[:, None] if struck.any() else None,
-    }
+    return replace(
+        matrices,
+        forces=columns @ member if courses else None,
+        static=columns @ still[:, None] if still.any() else None,
+        impulse=columns @ struck[:, None] if struck.any() else None,
+    )
 
 
 def require_ground(ground: object) -> None:

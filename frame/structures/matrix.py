@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
-from alphacut.frame.structures.linear import Matrices, grouped, require_ground
+from alphacut.frame.structures.linear import Matrices, require_ground, with_forces
 from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
@@ -95,7 +95,7 @@ class MatrixStructure:
         self._require_definite()
         for force in self.loads:
             self._require_factor("a force", force.amplitude)
-            missing = np.flatnonzero(force.at[self.massless])
+            missing = np.flatnonzero(np.asarray(force.at)[self.massless])
             what, allowed = f"on unknowns {self.massless[missing]}", "on unknowns that have mass"
             require(not len(missing), "force", value=what, allowed=allowed)
         own = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
@@ -233,13 +233,13 @@ class MatrixStructure:
             q0, v0, rigid = q0[:, a], v0[:, a], rigid[a]
         if self.ratios:
             damping = damping + modal_damping(mass, stiffness, [lifted(x, p) for x in self.ratios])
-        start = mass, damping, stiffness, q0, v0, rigid[:, None]
+        at_rest = Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
         if not self.loads:
-            return Matrices(*start)
+            return at_rest
         amplitudes = [lifted(force.amplitude, p)[:, None] for force in self.loads]
-        placed = np.transpose([force.at[self.massive] for force in self.loads])
+        placed = np.transpose([np.asarray(force.at)[self.massive] for force in self.loads])
         columns = concatenate(amplitudes, -1)[:, None, :] * placed
-        return Matrices(*start, **grouped(columns, self.loads))
+        return with_forces(at_rest, columns, self.loads)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Jet, concatenate
-from alphacut.frame.structures.linear import Matrices, grouped, require_ground
+from alphacut.frame.structures.linear import Matrices, require_ground, with_forces
 from alphacut.frame.structures.loads import Accelerogram, Force, require_forces
 from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
@@ -269,14 +269,15 @@ class StoreyFrame:
             ratios = [p[name] for name in self.ratios]
             damping = damping + modal_damping(mass, stiffness, ratios)
         q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
-        start = mass, damping, stiffness, q0, v0, np.ones((self.floors, 1))
+        at_rest = Matrices(mass, damping, stiffness, q0, v0, np.ones((self.floors, 1)))
         if not self.loads:
-            return Matrices(*start)
+            return at_rest
         amplitudes = concatenate([p[name][:, None] for name in self.force_names], -1)
-        placed = amplitudes[:, None, :] * np.eye(self.floors)[:, [x.at - 1 for x in self.loads]]
+        floors = [int(force.at) - 1 for force in self.loads]
+        forces = amplitudes[:, None, :] * np.eye(self.floors)[:, floors]
         kinds = [self.quantity(name) for name in self.outputs]
         read = np.array([np.eye(self.floors)[z] * (kind == "a") for kind, z in kinds])
-        return Matrices(*start, **grouped(placed, self.loads), accelerated=read)
+        return replace(with_forces(at_rest, forces, self.loads), accelerated=read)
 
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""

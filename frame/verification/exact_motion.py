@@ -59,7 +59,8 @@ class Course(NamedTuple):
         place = np.where(np.abs(place - np.rint(place)) < 1e-9, np.rint(place), place)
         value = np.interp(place, np.arange(len(self.samples)), self.samples)
         value[(place < 0) | ((place >= len(self.samples) - 1) & (not self.is_held))] = 0.0
-        return value * (np.sin(self.frequency * since + self.phase) if self.frequency else 1.0)
+        sine = np.sin(self.frequency * since + self.phase) if self.frequency else 1.0
+        return np.asarray(value * sine)
 
     def until(self, time: float) -> Array:
         """Samples that reach up to a time after the start, in s, where the last one is held."""
@@ -184,7 +185,7 @@ class _EnergyState:
         substep = interval / parts
         size = float(np.linalg.norm(push)) or 1.0
         load = size * _substep_loads(record, parts, max(1, ceil(last / substep)))
-        flow = self._loaded_flow(substep, push / size)
+        flow = self._loaded_flow(substep, np.asarray(push / size))
         exact = expm(flow)[: len(start)]
         states = _recursion(exact[:, :-2], start, load @ exact[:, -2:].T)
         degree, scaled = _degree(self.norm * substep), np.asarray(times / substep, float)

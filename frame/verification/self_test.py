@@ -87,15 +87,10 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
     courses = tuple(_course(history) for history in courses_of_forces(system))
     motions = []
     for s in range(len(points)):
-        M, K, b, static, impulse = (
+        M, K = matrices.mass.value[s], matrices.stiffness.value[s]
+        b, static, impulse = (
             None if jet is None else jet.value[s]
-            for jet in (
-                matrices.mass,
-                matrices.stiffness,
-                matrices.forces,
-                matrices.static,
-                matrices.impulse,
-            )
+            for jet in (matrices.forces, matrices.static, matrices.impulse)
         )
         q0, v0 = matrices.q0.value[s, :, 0], matrices.v0.value[s, :, 0]
         forces = np.zeros((n, 0)) if b is None else b

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -57,7 +57,7 @@ def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
     arrays = [
         none | {name: data[f"motion_{name}"].values[s] for name in axes} for s in range(len(points))
     ]
-    fixed = {"record": record, "record_step": step, "courses": courses}
+    fixed: dict[str, Any] = {"record": record, "record_step": step, "courses": courses}
     return points, [LinearMotion(**each, **fixed) for each in arrays]
 
 

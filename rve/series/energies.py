@@ -66,5 +66,5 @@ def mean_energies(
             )
         )
         errors = SAFETY * abs(values - judge) + NOISE * values.sum(axis=(0, 1))
-        energies.append(PhaseEnergies(values, errors))
+        energies.append(PhaseEnergies(np.asarray(values), np.asarray(errors)))
     return energies

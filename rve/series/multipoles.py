@@ -192,8 +192,8 @@ def modulus(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
         return mu * (4 + 2 * turn) / (kappa - 1 - turn)
     turn, g = ZETA_PERIOD * r * a[..., 0], _sums().natanzon_period * r * a[..., 0]
     if load == "deviator":
-        return 2 * mu * (1 + g + turn) / (1 + g - kappa * turn)
-    return mu * (1 + g - turn) / (1 + g + kappa * turn)
+        return np.asarray(2 * mu * (1 + g + turn) / (1 + g - kappa * turn))
+    return np.asarray(mu * (1 + g - turn) / (1 + g + kappa * turn))
 
 
 def _swelling_pole(a: Array, radius: Array, contrast: Contrast) -> Array:

@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import (
     STRAIN,
@@ -161,7 +161,7 @@ class SlicesModel:
         ]
 
     def _mean_energies(
-        self, result: HomogenisedStiffness, radii: Array, nodes: Array, values: Array, errors: Array
+        self, result: HomogenisedStiffness, radii: Array, nodes: Rows, values: Array, errors: Array
     ) -> PhaseEnergies:
         """Means of energies at `radii`, (n, phases, 2, 3); the rule's nodes are `nodes` of them."""
         cell, rule = result.cell, ThetaRule(result.curve.theta, result.curve.weights)
@@ -195,7 +195,7 @@ class SlicesModel:
     ) -> Slice | OutlineSlice:
         """One plane cell by what tells its error."""
         size, outline = self.mesh_size, self.outline
-        options = {"mesh_size": size, "outline": outline, "energies": self.energies}
+        options: dict[str, Any] = {"mesh_size": size, "outline": outline, "energies": self.energies}
         if is_round(outline) and interphase is None:
             return solve_slice(radius, matrix, inclusions, **options)
         options |= {"order": self.order, "interphase": interphase}
@@ -344,14 +344,17 @@ def _by_order(
     cells: Mapping[int, PlaneCell], samples: Sequence[Sequence[AnyPhase]], *, energies: bool = False
 ) -> tuple[dict[int, Array], dict[int, Array]]:
     """Stiffness, (m, 3, 3), and energies if wanted, (m, phases, 2, 3), of samples by order."""
-    stiffness, parts = defaultdict(list), defaultdict(list)
+    stiffness: dict[int, list[Array]] = defaultdict(list)
+    parts: dict[int, list[Array]] = defaultdict(list)
     for (order, cell), phases in product(cells.items(), samples):
         stiffness[order].append(cell.stiffness([phase.stiffness for phase in phases]))
         if energies:
             parts[order].append(cell.phase_energies(phases))
-    return tuple(
-        {order: np.array(x) for order, x in results.items()} for results in (stiffness, parts)
-    )
+    return _as_arrays(stiffness), _as_arrays(parts)
+
+
+def _as_arrays(by_order: Mapping[int, list[Array]]) -> dict[int, Array]:
+    return {order: np.array(values) for order, values in by_order.items()}
 
 
 def _cancellation(radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:
