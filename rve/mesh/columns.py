@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +20,10 @@ from alphacut.rve.mesh.prism_grid import PrismGrid
 from alphacut.rve.mesh.triangulation import Ring, Triangulation
 from alphacut.rve.outline import Outline, circle, is_round
 
+if TYPE_CHECKING:
+    from alphacut.rve.fenicsx import MPI
+
+T = TypeVar("T")
 BELOW, ABOVE = [0, 1, 2, 6, 7, 9], [3, 4, 5, 12, 13, 14]
 """Nodes of a prism's triangles in Basix's order: vertices, then edges 01, 02, 12."""
 HALF_WAY = [8, 10, 11]
@@ -32,6 +38,7 @@ def extrude(
     outline: Outline = circle,
     refinement: float = REFINEMENTS[0],
     thickness: float = 0.0,
+    comm: MPI.Intracomm | None = None,
 ) -> PrismGrid:
     """Gmsh's prisms over triangles of about `size`, opposite sides matching.
 
@@ -43,13 +50,29 @@ def extrude(
         outline: Of the particle.
         refinement: Of the edges along an outline that is not round; see `bend_grading`.
         thickness: Of a ring around a round particle in the mesh, 0 for none.
+        comm: Communicator, on whose first rank Gmsh runs; None: on this one.
     """
     sizes = None
     if radius and not is_round(outline):
         sizes = partial(_at_most, size, bend_grading(outline, radius, refinement))
-    prisms = extruded(size, radius, outline, layers, sizes, thickness)
+    make = partial(extruded, size, radius, outline, layers, sizes, thickness)
+    prisms = make() if comm is None else from_first_rank(comm, make)
     grid = grid_of(prisms, radius, outline)
     return replace(grid, plane=replace(grid.plane, ring=_ring(grid, thickness)))
+
+
+def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
+    """What the first rank makes, on all ranks; its error is raised on all."""
+    result: T | Exception | None = None
+    if comm.rank == 0:
+        try:
+            result = make()
+        except Exception as error:  # the other ranks wait for it
+            result = error
+    result = comm.bcast(result)
+    if isinstance(result, Exception):
+        raise result
+    return cast("T", result)
 
 
 def _ring(grid: PrismGrid, thickness: float) -> Ring | None:

@@ -37,8 +37,7 @@ def triangles(
     with model() as gmsh:
         parts = surfaces(size, radius, outline, thickness, sizes)
         phases = [phase for phase, tags in parts.items() for _ in tags]
-        if sizes:
-            grade(gmsh, sizes)
+        grade(gmsh, sizes)
         gmsh.model.mesh.generate(2)
         tags, xyz, _ = gmsh.model.mesh.getNodes()
         number = np.zeros(int(tags.max()) + 1, np.int64)

@@ -373,6 +373,7 @@ def _problem(
     thickness: float,
 ) -> PrismProblem:
     """Mesh, form and numbering: they do not depend on the map, only on these."""
+    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     grid = extrude(
         size=size,
         radius=radius,
@@ -380,6 +381,6 @@ def _problem(
         outline=outline,
         refinement=refinement,
         thickness=thickness,
+        comm=comm,
     )
-    comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     return PrismProblem(grid, comm)

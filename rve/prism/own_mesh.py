@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import cast
 
@@ -13,6 +13,7 @@ import numpy as np
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import AnyPhase, Phase, VoigtPhase
 from alphacut.rve.fenicsx import MPI
+from alphacut.rve.mesh.columns import from_first_rank
 from alphacut.rve.mesh.file import read_grid
 from alphacut.rve.mesh.gmsh_prisms import NAMES
 from alphacut.rve.mesh.prism_grid import FixedCell, LevelFunction, LevelSet, PrismGrid
@@ -121,4 +122,4 @@ def own_mesh_problem(path: Path | str, parallel: bool) -> PrismProblem:
 @lru_cache(maxsize=2)
 def _problem(path: str, _changed: int, parallel: bool) -> PrismProblem:
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
-    return PrismProblem(read_grid(path), comm)
+    return PrismProblem(from_first_rank(comm, partial(read_grid, path)), comm)

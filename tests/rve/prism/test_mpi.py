@@ -70,6 +70,28 @@ def test_any_number_of_ranks_gives_the_same_means_iterations_and_errors(alone, r
         assert many[4] == pytest.approx(one[4], rel=1e-12)
 
 
+WITHOUT_GMSH = """
+import sys
+from mpi4py import MPI
+sys.modules.update({"gmsh": None} if MPI.COMM_WORLD.rank else {})
+from alphacut.fuzzy.refused import FailedError
+from alphacut.rve import Phase, PrismModel
+from alphacut.stochastic import HermiteMap, TruncatedNormal
+
+soft, hard = Phase(20e9), Phase(80e9)
+PrismModel(0.5, 2, parallel=True, estimate=False).solve(HermiteMap(0.4, 0, 0.4, 0), soft, [hard])
+phases = {"matrix": soft, "particle": hard}
+try:
+    PrismModel(mesh="meshes/unlike-sides.msh", parallel=True).solve(TruncatedNormal(-3, 3), phases)
+except FailedError as error:
+    print("refused", flush=True)
+"""
+
+
+def test_gmsh_runs_on_the_first_rank_alone_and_its_refusal_ends_all():
+    assert run(2, "-c", WITHOUT_GMSH).split() == ["refused", "refused"]
+
+
 def test_only_one_rank_prints_and_the_command_shares_a_cell():
     solve = ["-m", "rve", "solve", "cases/paper.toml", "--method", "prism", "--json", "-"]
     one, two = (json.loads(run(n, *solve, "--set", "mesh.size=0.4")) for n in (1, 2))
