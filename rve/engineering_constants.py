@@ -16,7 +16,6 @@ from alphacut.rve.result import HomogenisedStiffness
 
 NAMES = ("E_x", "E_y", "nu_xy", "G_xy")
 PLANE_STRAIN, FREE = "plane strain", "no stress along the fibres"
-DEFINITIONS = (PLANE_STRAIN, FREE)
 MARGIN = 1.1  # of errors to first order in those of the stiffness
 
 
