@@ -33,27 +33,6 @@ class LossFactors:
     errors: dict[str, float]
 
 
-def phase_losses(phase: AnyPhase, loss: float, bulk_loss: float | None = None) -> Array:
-    """Loss factors of K and of G, shape (2,), from that of Young's modulus.
-
-    Without a loss of the bulk modulus ν is real, and all moduli have the same.
-
-    Args:
-        phase: The material.
-        loss: Of Young's modulus, tan δ of a pull.
-        bulk_loss: Of the bulk modulus, where it is another.
-
-    Raises:
-        RefusedError: The shear modulus would have a negative loss, or the phase is not isotropic.
-    """
-    losses = bulk_and_shear_losses(phase, bulk_loss is not None) @ [loss, bulk_loss or 0.0]
-    if losses.min() < 0:
-        most = 3 * loss / (1 - 2 * getattr(phase, "poisson", 0.0))
-        allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
-        raise RefusedError("loss of the bulk modulus", bulk_loss, allowed)
-    return np.asarray(losses)
-
-
 def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
     """Matrix (2, 2) from losses of Young's and of the bulk modulus to those of K and of G.
 
