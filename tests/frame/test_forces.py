@@ -192,7 +192,14 @@ def random_frame(rng):
 SEED = int(np.random.default_rng().integers(2**31))
 
 
-@pytest.mark.parametrize("number", range(10))
+ALWAYS = 3
+"""Random frames that are tested always; thirty in all are with `-m slow`."""
+
+
+@pytest.mark.parametrize(
+    "number",
+    [pytest.param(k, marks=() if k < ALWAYS else pytest.mark.slow) for k in range(30)],
+)
 def test_no_motion_of_a_random_frame_leaves_a_bound(number):
     """The envelope judges itself by exact motions, and raises where one contradicts it."""
     print(f"seed {SEED} {number}")
