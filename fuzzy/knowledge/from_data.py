@@ -17,6 +17,7 @@ from alphacut.fuzzy.sets.claimed import Claim, Claimed
 from alphacut.fuzzy.sets.numbers import Stepwise
 
 CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
+UNDECIDED = "samples whose censored values decide no cut count as containing it"
 
 
 def from_data(
@@ -28,7 +29,9 @@ def from_data(
 ) -> Claimed:
     """Fuzzy number of measured values: P(claimed quantity in its cut at α) >= 1 − α at every α.
 
-    The probability is over repeated samples.
+    The probability is over repeated samples. Censored values may decide no cut at α, in one sample
+    and not in another: without a bound on that side such samples count as ones whose cut contains
+    the quantity, and the claim says so. Of the samples that do decide it fewer may contain it.
 
     For the next value, the median and a quantile this holds for any law, also with ties and steps,
     and any number of values. The values must be drawn independently, or at least exchangeably, from
@@ -87,7 +90,8 @@ def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> t
     low, high = data.bounds
     drawn = f"{data.count} values drawn alike and independently"
     drawn += f" from a {law} law" if law else ""
-    return (drawn, *(() if bounds is None else (f"bounds [{low:g}, {high:g}]",)))
+    bounded = () if bounds is None else (f"bounds [{low:g}, {high:g}]",)
+    return (drawn, *bounded, *((UNDECIDED,) if data.is_censored else ()))
 
 
 def mean_cuts(data: Observations) -> Stepwise:

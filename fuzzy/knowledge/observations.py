@@ -63,6 +63,11 @@ class Observations:
         """True if every value is known exactly."""
         return bool((self.lower == self.upper).all())
 
+    @property
+    def is_censored(self) -> bool:
+        """True if a value has an infinite end, which no bound replaces."""
+        return bool(np.isinf([self.lower, self.upper]).any())
+
     def mapped(self, function: np.ufunc) -> Observations:
         """Observations of a rising function of the values, such as the logarithm."""
         with np.errstate(divide="ignore"):

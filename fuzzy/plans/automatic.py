@@ -11,7 +11,7 @@ from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import attained_bounds, cuts_with_width
-from alphacut.fuzzy.plans.sign_walk import POINTS, SignWalk
+from alphacut.fuzzy.plans.sign_walk import SignWalk
 from alphacut.fuzzy.plans.single_linkage import ROUNDING, VALUE_TOLERANCE, SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
 from alphacut.fuzzy.refused import real
@@ -27,10 +27,10 @@ class Automatic:
 
     Corners are guaranteed to suffice where the knowledge about the model says so. They are
     estimated to suffice where the differences of every input keep their sign at 24 points of the
-    widest cut. Other outputs are searched (Rinnooy Kan, Timmer 1987) until the share of each cut
-    that is not yet covered is small (Boender, Rinnooy Kan 1987): the bounds are then estimated, to
-    1e-5 of the range. They are attained where the budget ends the search, or where a bound lies at
-    a kink or a jump. Of more than 12 outputs none is searched.
+    widest cut (a single input: 17). Other outputs are searched (Rinnooy Kan, Timmer 1987) until the
+    share of each cut that is not yet covered is small (Boender, Rinnooy Kan 1987): the bounds are
+    then estimated, to 1e-5 of the range. They are attained where the budget ends the search, or
+    where a bound lies at a kink or a jump. Of more than 12 outputs none is searched.
 
     Args:
         uncovered: Share of each cut up to which a search goes on, in (0, 1).
@@ -80,6 +80,7 @@ class _Search:
         self.campaign, self.domain, self.outputs, self.method = campaign, domain, outputs, method
         self.cuts = list(cuts_with_width(campaign, domain))
         self.monotone: Mask = np.zeros(len(outputs), bool)
+        self.n_points = 0  # at which each input was changed alone
         self.searched: tuple[str, ...] = ()
         self.linkage: SingleLinkage | None = None
         self.ended = False
@@ -102,6 +103,7 @@ class _Search:
         if not self.domain.interactions:
             walk = SignWalk(self.campaign, widest, self.method.seed)
             self.monotone, first = walk.corners_suffice(), walk.base
+            self.n_points = walk.points
         names = tuple(np.array(self.outputs)[~self.monotone])
         if not names:
             return
@@ -141,7 +143,7 @@ class _Search:
         notes = []
         if self.monotone.any():
             names = _listed(np.array(self.outputs)[self.monotone])
-            which = f"the differences of each input keep their sign at {POINTS} points"
+            which = f"the differences of each input keep their sign at {self.n_points} points"
             notes.append(f"corners alone bound {names}: {which}")
         if self.linkage is not None and self.searched:
             notes.append(self.linkage.summary())

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from math import inf
 
 import numpy as np
 
@@ -22,7 +23,12 @@ _DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
 _LARGE_DIFFERENCE = 1e-4
 _MAX_SLOPE = 0.01  # ranges of the output over the width of a cut: at a kink or jump it is larger
 _FACE = 1e-9  # of the width: a point this close to a face of the cut lies on it
-_STEEPNESS = 4.0  # of the objective's unit: so first steps of L-BFGS-B mostly reach a face at once
+_STEEPNESS = 4.0  # of the objective's unit: so first steps mostly reach a face at once
+_FLAT = 1e-12  # ranges of the output over the width of the cut: no slope
+# ranges of the output at which a descent ends: by its last step, and by its slope
+_LEAST_CHANGE, _LEAST_SLOPE = 5e-10, 2.5e-6
+_LEAST_MODEL_CHANGE = 2.5e-7  # the same of SLSQP, which predicts its last step's change
+_MAX_ITERATIONS = 50  # of a descent
 _MAX_CORNER_INPUTS = 6  # inputs up to which all corners are evaluated, 64 at most
 _FAILED = 1e6  # ranges of the output that stand for a sample without a value
 
@@ -111,34 +117,47 @@ class CutSearch:
         slopes = np.abs(allowed - here) / _LARGE_DIFFERENCE / self.output_range(output)
         return float(slopes.max(initial=0.0))
 
-    def descend(self, start: Array, bound: Bound, rounds: int = 50) -> Optimum:
+    def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
         """Result of a descent by gradients inside the cut; its samples stay in the campaign.
 
         Args:
             start: Allowed point in unit coordinates, shape (moving,).
             bound: What is minimised.
-            rounds: Most iterations.
+            first_step: Longest first step in unit coordinates: a short one does not leave the basin
+                of its start. Without limit it mostly reaches a face at once.
         """
         from scipy.optimize import minimize
 
-        scale = self.output_range(bound.output) / _STEEPNESS
+        span = self.output_range(bound.output)
         first = self.values(start[None], bound)[0]
 
-        def objective(unit: Array) -> tuple[float, Array]:
+        def shares(unit: Array) -> tuple[float, Array]:
+            """Change of value from the start, and gradient, in ranges of the output."""
             steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
             rows = self.campaign(self.points(np.concatenate([unit[None], unit + np.diag(steps)])))
             values = bound.sign * rows.array[:, rows.column(bound.output)]
-            scaled = np.nan_to_num((values - first) / scale, nan=_FAILED)
-            return float(scaled[0]), (scaled[1:] - scaled[0]) / steps
+            changes = np.nan_to_num((values - first) / span, nan=_FAILED)
+            return float(changes[0]), (changes[1:] - changes[0]) / steps
+
+        # both minimisers begin with a step of one gradient
+        factor = min(_STEEPNESS, first_step / max(np.linalg.norm(shares(start)[1]), _FLAT))
+
+        def objective(unit: Array) -> tuple[float, Array]:
+            change, gradient = shares(unit)
+            return factor * change, factor * gradient
 
         cube = [(0.0, 1.0)] * len(start)
-        settings = {"jac": True, "bounds": cube, "options": {"maxiter": rounds}}
+        settings = {"x0": start, "jac": True, "bounds": cube}
         if not self.domain.interactions:
-            end = minimize(objective, start, method="L-BFGS-B", **settings)
-            value, slope = first + scale * float(end.fun), _free_slope(end.x, end.jac / _STEEPNESS)
+            ends = {"ftol": _LEAST_CHANGE * factor, "gtol": _LEAST_SLOPE * factor}
+            options = {"maxiter": _MAX_ITERATIONS, **ends}
+            end = minimize(objective, method="L-BFGS-B", options=options, **settings)
+            value = first + span * float(end.fun) / factor
+            slope = _free_slope(end.x, end.jac / factor)
             return Optimum(self, bound, self.points(end.x[None])[0], value, slope)
         room = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
-        end = minimize(objective, start, method="SLSQP", constraints=[room], **settings)
+        options = {"maxiter": _MAX_ITERATIONS, "ftol": _LEAST_MODEL_CHANGE * factor}
+        end = minimize(objective, method="SLSQP", constraints=[room], options=options, **settings)
         candidates = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
         values = self.values(candidates, bound)
         best = int(values.argmin())

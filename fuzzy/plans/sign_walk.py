@@ -2,9 +2,9 @@
 
 At 24 points of the widest cut each input is changed alone: at 20 along a walk whose coordinates
 form a Latin hypercube, and at the two corners that the signs seen there name, by a small and by a
-large step. Where the differences of every input keep their sign, and no two samples contradict it,
-all corners of the cuts among them, two corners of each cut bound the output. This is evidence, not
-proof.
+large step. A single input takes 15 and no large steps, as all its samples differ in it alone. Where
+the differences of every input keep their sign, and no two samples contradict it, all corners of the
+cuts among them, two corners of each cut bound the output. This is evidence, not proof.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs, contradiction, negligible
 from alphacut.fuzzy.plans.cut import CutSearch, cuts_with_width
 
-POINTS = 24
-"""Points of the widest cut at which each input is changed alone."""
-_WALK = 20  # of them along the walk; the others are the two corners with two steps each
+_WALK = 20  # points along the walk
+_WALK_OF_ONE = 15  # the same of a single input
 _SMALL_STEP = 1e-3  # of the width: sees humps near a corner, the large one sees jumps
 
 
@@ -31,8 +30,9 @@ class SignWalk:
         seed: Seed of the walk.
 
     Attributes:
+        steps: Points along the walk at which each input is changed.
         base: Points of the walk at which all inputs have changed since the last, in unit
-            coordinates, shape (21, moving): uniform samples of the cut.
+            coordinates, shape (steps + 1, moving): uniform samples of the cut.
     """
 
     def __init__(self, campaign: Campaign, cut: CutSearch, seed: int) -> None:
@@ -40,7 +40,13 @@ class SignWalk:
 
         self.campaign, self.cut = campaign, cut
         hypercube = qmc.LatinHypercube(len(cut.moving), rng=np.random.default_rng([seed, 0]))
-        self.base: Array = hypercube.random(_WALK + 1)
+        self.steps = _WALK if len(cut.moving) > 1 else _WALK_OF_ONE
+        self.base: Array = hypercube.random(self.steps + 1)
+
+    @property
+    def points(self) -> int:
+        """Points of the widest cut at which each input is changed alone."""
+        return self.steps + 2 * (2 if len(self.cut.moving) > 1 else 1)
 
     def corners_suffice(self) -> Mask:
         """Outputs that the corners of all cuts bound, as far as is seen, shape (outputs,).
@@ -63,7 +69,8 @@ class SignWalk:
 
         An input without any effect has the sign 1.
         """
-        steps, inputs = _WALK * len(self.cut.moving), len(self.cut.moving)
+        inputs = len(self.cut.moving)
+        steps = self.steps * inputs
         walk = np.empty((steps + 1, inputs))
         for column in range(inputs):
             changes = np.arange(steps + 1) + inputs - 1 - column
@@ -71,7 +78,7 @@ class SignWalk:
         values = self.campaign(self.cut.points(walk)).array
         small = negligible(self.campaign.samples.values.array)
         rises = np.diff(values, axis=0) * np.sign(np.diff(walk, axis=0).sum(axis=1))[:, None]
-        by_input = rises.reshape(_WALK, inputs, -1)
+        by_input = rises.reshape(self.steps, inputs, -1)
         falls = (by_input < -small).any(axis=0)
         mixed = (falls & (by_input > small).any(axis=0)) | np.isnan(by_input).any(axis=0)
         return np.where(mixed, 0, np.where(falls, -1, 1)).astype(np.int8).T
@@ -81,8 +88,10 @@ class SignWalk:
         highest = (signs > 0).astype(float)
         corners = np.stack([highest, 1 - highest])
         steps = np.eye(len(signs)) * (1 - 2 * corners[:, None])  # inwards
-        large = self.base[:2, None] * steps
-        around = corners[:, None] + np.concatenate([_SMALL_STEP * steps, large], axis=1)
+        sizes = _SMALL_STEP * steps
+        if len(signs) > 1:
+            sizes = np.concatenate([sizes, self.base[:2, None] * steps], axis=1)
+        around = corners[:, None] + sizes
         self.campaign(self.cut.points(around.reshape(-1, len(signs))))
         for cut in cuts_with_width(self.campaign, self.cut.domain):
             named = corners[:, np.isin(self.cut.moving, cut.moving)]

@@ -3,11 +3,18 @@
 Each cut has N uniform samples, shared by all bounds. A descent starts from a sample only if none
 within the critical distance r of it is better, with
 
-    r = (4 Γ(1 + d/2) V ln N / N)^(1/d) / √π
+    r = (σ Γ(1 + d/2) V ln N / N)^(1/d) / √π
 
 for d inputs and the share V of the box that the interactions allow. The search of a bound ends by
 the rule of Boender and Rinnooy Kan (1987): with W different optima, the basins not yet seen cover
 W (W + 1) / (N (N − 1)) of the cut, as Bayes' rule tells from a uniform prior.
+
+The rule takes a sample's basin as seen although its descent was left out. A ball of radius r holds
+σ ln N samples, with σ = 4 and N = 100 a fifth of all, and may hide a basin as large beside a better
+one. Therefore σ is 4 only while at most one optimum is no corner of the cut; then it is 2, the
+limit down to which the share of samples that start descents tends to zero with growing N. For the
+same reason a descent should end in the basin of its start. One that does not fall all along the
+straight line from its start to its end is made again with a short first step.
 
 Samples of a cut that lie in a narrower one are uniform there too and count for it. Optima of other
 cuts, and descents from corners, raise W and the bound, but not N.
@@ -28,19 +35,27 @@ from alphacut.fuzzy.sets.boxes import Domain
 
 MIN_SAMPLES = 100
 """Samples N from which the rule of Boender and Rinnooy Kan decides: with fewer its prior does."""
+SIGMA_ONE_HUMP = 4.0
+"""σ while at most one optimum is no corner: descents of one hump stay few."""
+SIGMA_SEVERAL_HUMPS = 2.0
+"""σ from the second such optimum on: a smaller one starts more descents and hides fewer basins."""
+FIRST_STEP = 0.1
+"""First step of a careful descent, of the width of the cut: a longer one passes over humps."""
 VALUE_TOLERANCE = 1e-5
 """Of an output's range in the widest cut: values that differ by less count as one."""
 ROUNDING = 1e-9
 """The same of an output's size."""
 _SAME_PLACE = 0.01  # of the width: optima of one value are the same there without a look between
-_BETWEEN = np.array([0.25, 0.5, 0.75])  # places between two optima of one value
+_BETWEEN = np.array([0.25, 0.5, 0.75])  # points of a line on which a hump is looked for
 _MIN_NEW = 15  # samples that a round adds
 _MAX_DRAWS = 10**6  # points drawn for one round where the interactions allow few
 
 
-def critical_distance(samples: int, inputs: int, volume: float = 1.0) -> float:
+def critical_distance(
+    samples: int, inputs: int, volume: float = 1.0, sigma: float = SIGMA_ONE_HUMP
+) -> float:
     """Distance r in the unit cube within which a better sample makes a descent superfluous."""
-    ball = 4 * gamma(1 + inputs / 2) * volume * log(samples) / samples
+    ball = sigma * gamma(1 + inputs / 2) * volume * log(samples) / samples
     return float(ball ** (1 / inputs) / sqrt(pi))
 
 
@@ -89,6 +104,14 @@ class BoundSearch:
     def is_smooth(self) -> bool:
         """Whether the output is smooth at the best optimum, so that the descent did not stall."""
         return bool(self.optima) and self.best.is_smooth
+
+    def n_humps(self, cut: CutSearch) -> int:
+        """Number of optima that are no corner of the cut."""
+        at_ends = [
+            (optimum.point <= cut.lower + cut.near) | (optimum.point >= cut.upper - cut.near)
+            for optimum in self.optima
+        ]
+        return sum(not ends.all() for ends in at_ends)
 
     def is_estimate(self, uncovered: float) -> bool:
         """Whether the bound is known to a tolerance, as far as the rule tells."""
@@ -206,7 +229,17 @@ class SingleLinkage:
         values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
         best = int(np.nanargmin(values))
         if values[best] < state.best.value - self._near(bound):
-            self._keep(cut.descend(cut.unit(samples.points[inside][best][None])[0], bound))
+            self._descend_from(cut, bound, cut.unit(samples.points[inside][best][None])[0])
+
+    def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
+        """Descend, and again with short steps where the first descent passed over a hump."""
+        optimum = cut.descend(start, bound)
+        self._keep(optimum)
+        step = cut.unit(optimum.point[None])[0] - start
+        if np.abs(step).max() > FIRST_STEP:
+            between = cut.values(start + np.array([0.0, *_BETWEEN])[:, None] * step, bound)
+            if (np.diff([*between, optimum.value]) > self._near(bound)).any():
+                self._keep(cut.descend(start, bound, FIRST_STEP))
 
     def _keep(self, optimum: Optimum) -> None:
         """Add an optimum to all cuts of which it is a new one, or a better value of one."""
@@ -258,18 +291,19 @@ class SingleLinkage:
         if len(rows) < 2:  # the interactions leave next to nothing
             return
         unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
-        names: list[int] = [
-            *map(int, rows),
-            *range(-len(cut.corners), 0),
-        ]  # of corners, which N does not count
-        distance = critical_distance(len(rows), len(cut.moving), self._volumes[cut.level])
+        names = [*map(int, rows), *range(-len(cut.corners), 0)]  # N does not count corners
         for bound in bounds:
             state = self.states[cut.level, bound]
             values = np.append(self._values[bound][rows], cut.values(cut.corners, bound))
-            for start in linkage_starts(unit, values, distance):
-                if names[start] not in state.started:
-                    state.started.add(names[start])
-                    self._keep(cut.descend(unit[start], bound))
+            for sigma in (SIGMA_ONE_HUMP, SIGMA_SEVERAL_HUMPS):
+                if sigma == SIGMA_SEVERAL_HUMPS and state.n_humps(cut) < 2:
+                    continue
+                volume = self._volumes[cut.level]
+                distance = critical_distance(len(rows), len(cut.moving), volume, sigma)
+                for start in linkage_starts(unit, values, distance):
+                    if names[start] not in state.started:
+                        state.started.add(names[start])
+                        self._descend_from(cut, bound, unit[start])
             state.samples = len(rows)
 
     def _rows(self, cut: CutSearch) -> Rows:

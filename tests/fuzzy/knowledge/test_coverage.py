@@ -139,6 +139,27 @@ def test_censored_values_are_intervals_without_an_end():
     assert rounded.cut(2 / 3) == (1.5, 3.5)
 
 
+def test_the_coverage_under_censoring_counts_undecided_samples():
+    """Waiting times censored at 1.2: of the cuts that are decided far fewer contain the next one."""
+    rng, decided, contained = np.random.default_rng(5), [], []
+    for *times, following in rng.exponential(size=(600, 7)):
+        values = [time if time < 1.2 else (1.2, np.inf) for time in times]
+        number = from_data(values, "next value", bounds=(0, None))
+        says = "decide no cut count as containing" in str(number.claim)
+        assert says == (max(times) >= 1.2)
+        decided.append(number.decided <= 0.3)
+        cut = number.cut(0.3) if decided[-1] else (0, np.inf)
+        contained.append(cut[0] <= following <= cut[1])
+        bounded = from_data(values, "next value", bounds=(0, 50))
+        assert bounded.decided == 0
+        assert "decide no cut" not in str(bounded.claim)
+    share, of_decided = np.mean(contained), np.mean(np.array(contained)[decided])
+    print(np.mean(decided), share, of_decided)
+    spread = 4 * np.sqrt(0.7 * 0.3 / 600)
+    assert share > 0.7 - spread
+    assert of_decided < 0.7 - spread
+
+
 @pytest.mark.parametrize("high", [1, 100, 0.3])
 def test_values_at_a_bound_have_a_mean_within_it(high):
     rng = np.random.default_rng(7)
