@@ -17,7 +17,16 @@ from alphacut.fuzzy.plans.single_linkage import (
     uncovered_share,
 )
 from alphacut.fuzzy.sets.boxes import Domain
-from tests.calibration.functions import FAMILIES, named, numbers, true_ends
+from tests.calibration.functions import (
+    FAMILIES,
+    named,
+    numbers,
+    rastrigin,
+    schwefel,
+    sines,
+    true_ends,
+)
+from tests.calibration.test_functions import shortfall, wide
 
 SQUARE = {"x": Interval(0, 1), "y": Interval(0, 1)}
 # least and greatest value over the unit square: a grid of 801² points, polished by L-BFGS-B, and
@@ -75,6 +84,19 @@ def test_symmetric_optima_are_several_and_a_valley_is_one():
     ]
     assert notes[0].startswith("W = 4 ")
     assert notes[1].startswith("W = 2 optima found from N = 100 ")  # corners off the diagonal
+
+
+@pytest.mark.parametrize(
+    ("family", "seed"),
+    [(rastrigin, [3, 3]), (rastrigin, [3, 7]), (schwefel, [3, 18]), (sines, [1, 9])],
+)
+def test_basins_that_a_long_first_step_leaves_are_found(family, seed):
+    """They cover 8, 8, 20 and 27 % of a cut; descents that pass over humps missed them."""
+    rng = np.random.default_rng([*seed, sum(map(ord, family.__name__))])
+    function, inputs = family(rng, n := int(rng.integers(1, 5))), wide(rng, n)
+    result = propagate(named(function), inputs, alpha=(0.0, 0.5), vectorised=True)
+    assert result.nature is Nature.ESTIMATED
+    assert shortfall(function, inputs, result) <= 1
 
 
 @pytest.mark.parametrize("width", [0.05, 0.15])
