@@ -65,6 +65,11 @@ class RefusedError(ValueError):
 
         super().__init__(fitted(printable(value), allowed, line, cure))
 
+    def __reduce__(self) -> tuple[type[RefusedError], tuple[str, str | None, str, str]]:
+        """For pickle, which sends it to other processes: the value as text."""
+        value = None if self.value is None else printable(self.value)
+        return type(self), (self.key, value, self.allowed, self.cure)
+
 
 class FailedError(RuntimeError):
     """A computation that ended without an answer.

@@ -1,5 +1,7 @@
 """What is refused, by key and value; and computations that end without an answer."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -148,3 +150,10 @@ def test_outputs_that_are_no_numbers_fail_with_the_point_and_the_cause(output, a
 def test_a_cut_without_an_allowed_point_is_a_failure():
     with pytest.raises(FailedError, match="fulfils its interactions"):
         run(interactions=[Linear({"x": 1}, -0.5)])
+
+
+def test_errors_pass_between_processes():
+    for error in (RefusedError("size", lambda: 0, "numbers", "take one"), FailedError("no", "try")):
+        copy = pickle.loads(pickle.dumps(error))
+        assert type(copy) is type(error)
+        assert str(copy) == str(error)
