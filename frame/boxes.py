@@ -105,10 +105,10 @@ class Boxes:
 
         Intervals have the same cut at every level, which need be searched once.
         """
-        both = np.concatenate([self.lower, self.upper], 1)
-        new = np.append(True, (np.diff(both, axis=0) != 0).any(1))
-        kept = replace(self, alpha=self.alpha[new], lower=self.lower[new], upper=self.upper[new])
-        return kept, np.cumsum(new) - 1
+        ends = np.concatenate([self.lower, self.upper], 1)
+        new = np.append(True, (np.diff(ends, axis=0) != 0).any(1))
+        boxes = replace(self, alpha=self.alpha[new], lower=self.lower[new], upper=self.upper[new])
+        return boxes, np.cumsum(new) - 1
 
     @property
     def probes(self) -> Array:

@@ -41,8 +41,8 @@ class PartStore:
     def path(self, boxes: Boxes, goal: Goal) -> Path:
         """File of the bounds of a part."""
         digest = hashlib.sha256(self.problem)
-        known = goal.needed, goal.outer, goal.incumbent, np.array(goal.last)
-        for array in (boxes.alpha, boxes.lower, boxes.upper, *known):
+        goal_arrays = goal.needed, goal.outer, goal.incumbent, np.array(goal.last)
+        for array in (boxes.alpha, boxes.lower, boxes.upper, *goal_arrays):
             digest.update(np.ascontiguousarray(array).tobytes())
         return self.folder / f"part-{digest.hexdigest()[:32]}.npz"
 
@@ -57,8 +57,8 @@ class PartStore:
     def write(self, path: Path, found: Found) -> None:
         """Store bounds, all or none of a file."""
         arrays: dict[str, Array] = {"levels": np.array(len(found))}
-        for k, one in enumerate(found):
-            arrays |= {f"{k}.{name}": array for name, array in _packed(one).items()}
+        for k, bounds in enumerate(found):
+            arrays |= {f"{k}.{name}": array for name, array in _arrays_of(bounds).items()}
         self.folder.mkdir(parents=True, exist_ok=True)
         number, name = tempfile.mkstemp(dir=self.folder)
         with os.fdopen(number, "wb") as file:
@@ -66,25 +66,25 @@ class PartStore:
         os.replace(name, path)
 
 
-def _packed(one: PartBounds | UnprovedError) -> dict[str, Array]:
-    if isinstance(one, UnprovedError):
-        along = -1 if one.along is None else one.along
-        return {"refusal": np.array([one.what, one.cure]), "along": np.array(along)}
-    arrays = {field.name: getattr(one, field.name) for field in fields(one)}
+def _arrays_of(bounds: PartBounds | UnprovedError) -> dict[str, Array]:
+    if isinstance(bounds, UnprovedError):
+        along = -1 if bounds.along is None else bounds.along
+        return {"refusal": np.array([bounds.what, bounds.cure]), "along": np.array(along)}
+    arrays = {field.name: getattr(bounds, field.name) for field in fields(bounds)}
     facts = arrays.pop("facts")
     arrays |= {"fact_names": np.array([*facts], str), "facts": np.array([*facts.values()], float)}
     return {name: np.asarray(array) for name, array in arrays.items() if array is not None}
 
 
 def _unpacked(arrays: np.lib.npyio.NpzFile, k: int) -> PartBounds | UnprovedError:
-    own: dict[str, Any] = {
+    fields: dict[str, Any] = {
         name.partition(".")[2]: arrays[name] for name in arrays if name.startswith(f"{k}.")
     }
-    if "refusal" in own:
-        along, (what, cure) = int(own["along"]), map(str, own["refusal"])
+    if "refusal" in fields:
+        along, (what, cure) = int(fields["along"]), map(str, fields["refusal"])
         return UnprovedError(what, cure, None if along < 0 else along)
-    names = own.pop("fact_names").tolist()
-    facts = dict(zip(names, own.pop("facts").tolist(), strict=True))
-    if "least_peaks" in own:
-        own["least_peaks"] = Ends(*own["least_peaks"])
-    return PartBounds(**own, facts=facts)
+    names = fields.pop("fact_names").tolist()
+    facts = dict(zip(names, fields.pop("facts").tolist(), strict=True))
+    if "least_peaks" in fields:
+        fields["least_peaks"] = Ends(*fields["least_peaks"])
+    return PartBounds(**fields, facts=facts)

@@ -30,8 +30,8 @@ from alphacut.frame.structures.storey import StoreyFrame
 from alphacut.frame.verification.self_test import with_motions_tested
 from alphacut.frame.verification.step_error import (
     step_error,
+    with_node_deviation,
     with_step_error,
-    with_stray,
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
@@ -40,7 +40,7 @@ from alphacut.fuzzy.refused import chosen, require
 
 FIRST_STEPS = 3
 """Steps of the motions that show whether they exist."""
-JUDGED = 4
+MAX_INPUTS = 4
 """Most inputs of a follower's envelope that a proof is made beside."""
 OTHER_UNITS = 500
 """From so many times the structure's own value on, or that part of it, units differ."""
@@ -118,8 +118,8 @@ def envelope(
     steps = step_error(flow)
     with showing(progress) as tick:
         bounds = problem.method.run(flow, tick)
-    bounds = _judged(with_step_error(bounds, flow, steps), flow, problem.method)
-    bounds = with_stray(bounds, flow)
+    bounds = _with_proof(with_step_error(bounds, flow, steps), flow, problem.method)
+    bounds = with_node_deviation(bounds, flow)
     if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
         bounds = with_motions_tested(bounds, model)
     return _on_levels(bounds, problem.alpha, problem.rows)
@@ -202,27 +202,27 @@ def require_envelope(
             problem.method.forecast(exact_flow(problem.flow.flow), problem.flow.boxes)
 
 
-def _judged(of: Envelope, over: UnitFlow, way: Method) -> Envelope:
+def _with_proof(followed: Envelope, over: UnitFlow, method: Method) -> Envelope:
     """The envelope of a follower with the proof of the same motion beside it, if it is affordable.
 
     Its error is then the largest distance from the proved bounds and from those that the proof
     attains, between which the true ones lie.
     """
-    if not isinstance(way, GraphFollower | ImprovedFollower):
-        return of
-    if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > JUDGED:
-        return of
+    if not isinstance(method, GraphFollower | ImprovedFollower):
+        return followed
+    if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > MAX_INPUTS:
+        return followed
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
-        proof = Proof(gap=way.tolerance / 4, boxes=1000).run(exact)
+        proof = Proof(gap=method.tolerance / 4, boxes=1000).run(exact)
     except (UnprovedError, ModalError):
-        return of
-    apart = [np.abs(of.upper - ends.upper) for ends in (proof.proved, proof.attained)]
-    apart += [np.abs(of.lower - ends.lower) for ends in (proof.proved, proof.attained)]
-    error = np.max(apart, axis=0)
+        return followed
+    gaps = [np.abs(followed.upper - ends.upper) for ends in (proof.proved, proof.attained)]
+    gaps += [np.abs(followed.lower - ends.lower) for ends in (proof.proved, proof.attained)]
+    error = np.max(gaps, axis=0)
     largest = float((error / over.scale).max())
-    facts = {**of.facts, "gap": proof.facts["gap"], "estimated_error": largest}
-    return replace(of, outer=proof.proved, between=proof.between, error=error, facts=facts)
+    facts = {**followed.facts, "gap": proof.facts["gap"], "estimated_error": largest}
+    return replace(followed, outer=proof.proved, between=proof.between, error=error, facts=facts)
 
 
 def _method(
@@ -247,8 +247,8 @@ def _method(
     chosen("method", method, METHODS)
     for option in options:
         chosen(f"option of {method}", option, [field.name for field in fields(METHODS[method])])
-    made: Method = METHODS[method](**options)
-    return made
+    chosen_method: Method = METHODS[method](**options)
+    return chosen_method
 
 
 def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
@@ -261,8 +261,8 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
             parameters or a corner, or nothing moves it.
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
-        own, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
-        require(own.admits(low, high), key, value=shown, allowed=own.range or "finite")
+        parameter, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
+        require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
         near = abs(system.parameters.get(name, 0.0))
         sizes = abs(low), abs(high)
         alike = near == 0 or (min(sizes) < OTHER_UNITS * near and OTHER_UNITS * max(sizes) > near)
@@ -310,7 +310,7 @@ def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:
     """The envelope on levels `alpha` (A,), each with the bounds of one of its own, `which`."""
     names = ("lower", "upper", "lower_at", "upper_at", "error")
-    own = {name: getattr(bounds, name)[which] for name in names}
+    rows = {name: getattr(bounds, name)[which] for name in names}
     pairs = [x and Ends(x.lower[which], x.upper[which]) for x in (bounds.inner, bounds.outer)]
     least = bounds.least_peaks and Ends(*(x[which] for x in bounds.least_peaks))
-    return replace(bounds, alpha=alpha, inner=pairs[0], outer=pairs[1], least_peaks=least, **own)
+    return replace(bounds, alpha=alpha, inner=pairs[0], outer=pairs[1], least_peaks=least, **rows)

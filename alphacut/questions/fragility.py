@@ -46,7 +46,7 @@ class FragilityQuestion(Question):
         peaks = [x.named(names) for x in motion.suite.peaks.values()]
         measures = [sizes[self.section.measure] for sizes in motion.suite.measures.values()]
         critical = {
-            name: CriticalMeasures.of(peaks, measures, name, limit)
+            name: CriticalMeasures.from_peaks(peaks, measures, name, limit)
             for name, limit in limits.items()
         }
         natures = {name: Nature.weakest(x.nature([name]) for x in peaks) for name in limits}

@@ -77,7 +77,7 @@ class TolerancesQuestion(Question):
         return {
             "limits": limits,
             "peaks": {name: peak_document(motion.peaks, name) for name in limits},
-            "kept": scale.kept,
+            "kept": scale.admissible,
             "clear": scale.clear,
             "passed": scale.passed if math.isfinite(scale.passed) else None,
             "most": self.section.most,

@@ -61,7 +61,7 @@ def enclosed(
         problems that need it.
     """
     tree = Tree(model, lower, upper, optima, gap)
-    frontier, size, used = Frontier.whole(len(lower), tree.numbers), len(tree.numbers), 0
+    frontier, size, used = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers), 0
     while len(frontier) and used + len(frontier) <= budget * size:
         used += len(frontier)
         frontier = tree.examined(frontier, workers)
@@ -101,11 +101,11 @@ class Tree:
     def examined(self, frontier: Frontier, workers: int) -> Frontier:
         """Boxes and items still open after one examination of all boxes of a frontier."""
 
-        def of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
+        def tables_of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
             return self.examine(frontier, *part)
 
         with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(of, frontier.pieces(PIECE)))
+            results = list(pool.map(tables_of, frontier.pieces(PIECE)))
         code, value, _ = (np.concatenate(part) for part in zip(*results, strict=True))
         higher = np.flatnonzero(value > self.best[frontier.problem] + HIGHER)
         if len(higher):
@@ -114,11 +114,11 @@ class Tree:
 
     def proved(self, frontier: Frontier) -> Array:
         """Upper bounds of all problems, where the boxes of a frontier are left open, (N,)."""
-        whole = self.best + self.gap
+        upper = self.best + self.gap
         for part in frontier.pieces(PIECE):
             bound = self.examine(frontier, *part)[2]
-            np.maximum.at(whole, frontier.problem[part[1]], bound)
-        return np.asarray(whole[self.numbers])
+            np.maximum.at(upper, frontier.problem[part[1]], bound)
+        return np.asarray(upper[self.numbers])
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
         """Codes, side × output at the centres and upper bounds of some items; see `kernel`."""
@@ -152,9 +152,9 @@ class Tree:
 
     def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
         """Take over the centres of items, the best last, and refine them."""
-        place = np.zeros(len(self.best), np.int64)
-        place[self.numbers] = np.arange(len(self.numbers))
-        which = place[frontier.problem[items]]
+        count = np.zeros(len(self.best), np.int64)
+        count[self.numbers] = np.arange(len(self.numbers))
+        which = count[frontier.problem[items]]
         centre = frontier.geometry(self.lower, self.upper)[0]
         self.optima.point[which] = centre[frontier.box[items]]
         self.optima.value[which] = value[items]
@@ -164,12 +164,12 @@ class Tree:
 
     def _renew(self, which: Array) -> None:
         """Values, points and jets of the problems at places `which` of the optima."""
-        optima, own = self.optima, self.numbers[which]
+        optima, numbers = self.optima, self.numbers[which]
         point = optima.point[which]
         f, g, H = self.model.at(point, optima.node[which], optima.output[which])
         row, column = np.triu_indices(g.shape[1])
-        self.best[own], self.point[own] = optima.value[which], point
-        self.jets[own] = np.column_stack([f, g, H[:, row, column]])
+        self.best[numbers], self.point[numbers] = optima.value[which], point
+        self.jets[numbers] = np.column_stack([f, g, H[:, row, column]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,17 +180,17 @@ class Frontier:
     `LOWER` or `UPPER`.
 
     Args:
-        place: Intervals of the boxes, shape (B, d).
+        position: Intervals of the boxes, shape (B, d).
         box: Box of each item, rising, shape (I,).
         problem: Number of its problem, rising for each box, shape (I,).
     """
 
-    place: Array
+    position: Array
     box: Array
     problem: Array
 
     @classmethod
-    def whole(cls, d: int, problems: Array) -> Frontier:
+    def of_box(cls, d: int, problems: Array) -> Frontier:
         """The domain for all `problems` (N,)."""
         return cls(np.ones((1, d), np.int64), np.zeros(len(problems), np.int64), problems)
 
@@ -201,13 +201,13 @@ class Frontier:
         self, lower: Array, upper: Array, boxes: slice = slice(None)
     ) -> tuple[Array, Array, Array]:
         """Centres and radii (B, d) in the domain, and which faces are its own (B, 2, d)."""
-        place = self.place[boxes]
-        inner = np.maximum(place, 1)
+        positions = self.position[boxes]
+        inner = np.maximum(positions, 1)
         width = 2.0 ** -np.floor(np.log2(inner + 0.5))  # share of the domain
         begin = inner * width - 1
-        ends = [place == LOWER, place == UPPER]
+        ends = [positions == LOWER, positions == UPPER]
         share = np.select(ends, [0.0, 1.0], begin + width / 2)
-        radius = np.where(place < 0, 0.0, (upper - lower) / 2 * width)
+        radius = np.where(positions < 0, 0.0, (upper - lower) / 2 * width)
         return (
             lower + (upper - lower) * share,
             radius,
@@ -216,42 +216,42 @@ class Frontier:
 
     def pieces(self, most: int) -> Iterator[tuple[slice, slice]]:
         """Boxes and items in parts of about `most` items, box by box."""
-        ends = np.append(np.searchsorted(self.box, np.arange(len(self.place))), len(self))
+        ends = np.append(np.searchsorted(self.box, np.arange(len(self.position))), len(self))
         start = 0
-        while start < len(self.place):
+        while start < len(self.position):
             stop = int(np.searchsorted(ends, ends[start] + most, "right")) - 1
-            stop = min(max(stop, start + 1), len(self.place))
+            stop = min(max(stop, start + 1), len(self.position))
             yield slice(start, stop), slice(int(ends[start]), int(ends[stop]))
             start = stop
 
     def children(self, code: Array) -> Frontier:
         """Boxes and items that the examination's codes (I,) leave open."""
-        d = self.place.shape[1]
+        d = self.position.shape[1]
         split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
         count, box = 2 * d + 3**d, self.box[split]
-        votes = np.bincount(box * d + code[split] - 1, minlength=d * len(self.place))
+        votes = np.bincount(box * d + code[split] - 1, minlength=d * len(self.position))
         halves = box * count + 2 * votes.reshape(-1, d).argmax(1)[box]
         faces = self.box[faced] * count + 2 * d + code[faced] - FACES
         keys = np.concatenate([halves, halves + 1, faces])
         problem = self.problem[np.concatenate([split, split, faced])]
         fresh = np.unique(keys)
-        place, merged = _distinct(self._places(fresh, count))
+        positions, merged = _distinct(self._places(fresh, count))
         most = int(problem.max(initial=0)) + 1
         items = np.unique(merged[np.searchsorted(fresh, keys)] * most + problem)
-        return Frontier(place, *np.divmod(items, most))
+        return Frontier(positions, *np.divmod(items, most))
 
     def _places(self, keys: Array, count: int) -> Array:
         """Intervals of the children with these keys, shape (K, d)."""
-        d = self.place.shape[1]
-        place: Array = self.place[keys // count].copy()
+        d = self.position.shape[1]
+        positions: Array = self.position[keys // count].copy()
         local = keys % count
         rows = np.flatnonzero(local < 2 * d)
         axis, half = np.divmod(local[rows], 2)
-        place[rows, axis] = 2 * place[rows, axis] + half
+        positions[rows, axis] = 2 * positions[rows, axis] + half
         rows = np.flatnonzero(local >= 2 * d)
         ternary = (local[rows, None] - 2 * d) // 3 ** np.arange(d) % 3
-        place[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], place[rows])
-        return np.asarray(place)
+        positions[rows] = np.select([ternary == 1, ternary == 2], [LOWER, UPPER], positions[rows])
+        return np.asarray(positions)
 
 
 def _distinct(rows: Array) -> tuple[Array, Array]:
@@ -283,8 +283,8 @@ def _tables(rate: Array, C: Array, d: int) -> Array:
         x, y = rate[1 + i], rate[1 + j]
         out[:, :, 1, ..., a] = C[1 + i] * y + C[1 + j] * x + C[0] * rate[a]
         out[:, :, 2, ..., a] = C[0] * x * y
-    both = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
-    flat = both.reshape(len(out), -1, *out.shape[-2:])
+    doubled = 2 * np.stack([out.real, -out.imag], 4)  # (B, P, 3, n, 2, m, q)
+    flat = doubled.reshape(len(out), -1, *out.shape[-2:])
     return np.ascontiguousarray(flat.swapaxes(1, 2))
 
 

@@ -87,8 +87,8 @@ def certify(
         lower, upper = model.boxes.unit(level)
         optima = first_optima(model, lower, upper, LEFT * slack)
         if done:  # what the level inside attains is attained here too
-            kept = (inside := done[-1][0]).value > optima.value
-            optima.value[kept], optima.point[kept] = inside.value[kept], inside.point[kept]
+            better = (inside := done[-1][0]).value > optima.value
+            optima.value[better], optima.point[better] = inside.value[better], inside.point[better]
         proved, used = enclosed(
             *(model, lower, upper, optima),
             gap=slack,
@@ -144,9 +144,9 @@ def _between(model: ModalModel) -> Array:
             kink += jump * suprema(together, reach)[0]
         wave[1:] = np.maximum(wave[1:], wave[:-1])
         curve += 2 * (wave * rate**2) @ size
-    stray: Array = h**2 / 8 * curve + h / 4 * kink + at_once
-    stray[0] = 0.0
-    return stray
+    deviation: Array = h**2 / 8 * curve + h / 4 * kink + at_once
+    deviation[0] = 0.0
+    return deviation
 
 
 def _growth(model: ModalModel, margin: Array) -> Array:

@@ -156,21 +156,21 @@ def turned(
     added to `g` and `H`, what is constant is returned.
     """
     share, slope, phase, decay, e, c = modes
-    rest, rates = 0.0, np.empty(4)
+    remainder, rates = 0.0, np.empty(4)
     for k in range(len(phase)):
         re, im = w[2 * k], w[2 * k + 1]
         x = 2 * side * (share[k, o, 0] * re - share[k, o, 1] * im)
         y = 2 * side * (share[k, o, 0] * im + share[k, o, 1] * re)
         S = phase[k] * t
         rates[1], rates[2], rates[3] = decay[k] * t, e[0, k] * t, e[1, k] * t
-        rest += 2 * sqrt(re * re + im * im) * left_out(S, rates, c[:, k, o])
-        rest += abs(y) * (S**3 / 24 + S**5 / 120) + abs(x) * S**6 / 720
+        remainder += 2 * sqrt(re * re + im * im) * left_out(S, rates, c[:, k, o])
+        remainder += abs(y) * (S**3 / 24 + S**5 / 120) + abs(x) * S**6 / 720
         tilt, soft = y * S * S * t / 8, max(x, 0.0) * S * S * t * t / 12
         for i in range(len(g)):
             g[i] += tilt * slope[k, i]
             for j in range(len(g)):
                 H[i, j] += soft * slope[k, i] * slope[k, j]
-    return rest
+    return remainder
 
 
 @compiled
@@ -256,7 +256,7 @@ def examine(
             for item in range(item_start[row], item_start[row + 1]):
                 o, side = column[item] // 2, 2.0 * (column[item] % 2) - 1
                 problem = node * 2 * m + column[item]
-                noise, rest = margin[node, o, 0], margin[node, o, 0]
+                noise, missing = margin[node, o, 0], margin[node, o, 0]
                 if o != before:
                     taylor(waves[row], tables[b, o], J, H)
                     before = o
@@ -266,9 +266,9 @@ def examine(
                         bent[i] += abs(H[i, j]) * r[j]
                         for k in range(d):
                             pull[i] += third[node, o, i, j, k] * r[j] * r[k]
-                    rest += pull[i] * r[i] / 6
+                    missing += pull[i] * r[i] / 6
                 f, target = side * J[0], values[problem] + gap
-                faces, place, inner = 0, 1, False
+                faces, stride, inner = 0, 1, False
                 for i in range(d):
                     g[i] = side * J[1 + i]
                     for j in range(d):
@@ -277,12 +277,12 @@ def examine(
                     if r[i] > 0 and abs(g[i]) > bent[i] + wander:
                         up = 1 if g[i] > 0 else 0
                         if edges[b, up, i]:
-                            faces += place * (1 + up)
+                            faces += stride * (1 + up)
                         else:
                             inner = True  # the neighbour holds higher points
-                    place *= 3
+                    stride *= 3
                 value[item] = f
-                bound[item] = f + separable(g, S, r) + rest
+                bound[item] = f + separable(g, S, r) + missing
                 if inner or bound[item] <= target:
                     continue
                 if turning:
@@ -301,7 +301,7 @@ def examine(
                     continue
                 for i in range(d):
                     low[i], high[i] = -r[i], r[i]
-                if stays_below(g, S, low, high, target - f - rest, work, L):
+                if stays_below(g, S, low, high, target - f - missing, work, L):
                     continue
                 near = True
                 for i in range(d):
@@ -310,16 +310,16 @@ def examine(
                     near &= max(low[i], -high[i]) <= NEAR * r[i] + 1e-12
                     span[i] = max(max(abs(low[i]), abs(high[i])), 1e-9)
                 if near:
-                    own = jets[problem]
-                    unpacked(own, S)
+                    jet = jets[problem]
+                    unpacked(jet, S)
                     for i in range(d):
-                        g[i], bend = side * own[1 + i], 0.0
+                        g[i], bend = side * jet[1 + i], 0.0
                         for j in range(d):
                             S[i, j] *= side
                             for k in range(d):
                                 bend += third[node, o, i, j, k] * span[j] * span[k]
                         S[i, i] += bend / span[i] / 3  # the cubic remainder: Σ bend_i x_i² / 6
-                    room = gap - noise - (side * own[0] - values[problem])
+                    room = gap - noise - (side * jet[0] - values[problem])
                     if stays_below(g, S, low, high, room, work, L):
                         continue
                 most = -1.0

@@ -40,7 +40,7 @@ def proved_error(model: ModalModel) -> Array:
             box is so wide or has so many parameters that the bound cannot be computed.
     """
     reach, m = np.ones(len(model.boxes.names)), len(model.outputs)
-    ratio, growth = RatioDamping.of(model), largest_growth(model.eigenvalue, reach)
+    ratio, growth = RatioDamping.from_model(model), largest_growth(model.eigenvalue, reach)
     states = fit_states(model)
     samples = [
         (part, partial(_defects, model, part, states, ratio)) for part in parts(model, growth)
@@ -50,11 +50,11 @@ def proved_error(model: ModalModel) -> Array:
         _require_affordable(grid, sample)
     structure = _expanded(grid, partial(_structure, model))
     stiffness, mass = LoewnerBounds(structure["stiffness"]), LoewnerBounds(structure["mass"])
-    deviation, own = np.zeros(len(model.time)), np.zeros((len(model.time), m))
+    deviation, output_error = np.zeros(len(model.time)), np.zeros((len(model.time), m))
     for part, sample in samples:
         defect = _expanded(grid, sample)
         if isinstance(part.load, Direct):
-            own += 2 * part.waves[0][:, :1] * np.abs(defect["outputs"][:, 0]).sum(0)
+            output_error += 2 * part.waves[0][:, :1] * np.abs(defect["outputs"][:, 0]).sum(0)
             continue
         deviation += part.push * _size_of_start(defect, stiffness, mass)
         for k in range(model.count):
@@ -62,16 +62,16 @@ def proved_error(model: ModalModel) -> Array:
             if ratio is not None:
                 damped = ratio.missed(defect, k, stiffness, mass)
                 force += damped
-                own += 2 * part.waves[0][:, k : k + 1] * damped / ratio.root_masses
+                output_error += 2 * part.waves[0][:, k : k + 1] * damped / ratio.root_masses
             missed = np.hypot(stiffness.sup(defect["kinematic"][:, k]), force)
             deviation += 2 * missed * part.elapsed[:, k]
         largest = suprema(part.share, reach)[0].reshape(model.count, m)
-        own += (
+        output_error += (
             2
             * part.waves[0]
             @ (np.abs(defect["outputs"]).sum(0) + part.left_out[:, None] * largest)
         )
-    return deviation[:, None] * _reading(structure["rows"], stiffness, mass, ratio) + own
+    return deviation[:, None] * _reading(structure["rows"], stiffness, mass, ratio) + output_error
 
 
 def _reading(
@@ -187,8 +187,8 @@ def _defects(
     matrices, rows = evaluate(bare, model.flow.names, points, derivatives=False)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
     rate = model.eigenvalue(unit)[..., None]
-    place = 0 if part.load is None else 1 + part.number
-    z = states[place](unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
+    column = 0 if part.load is None else 1 + part.number
+    z = states[column](unit).reshape(len(unit), model.count, -1)  # (S, n, 2N)
     shape, speed = np.split(z, 2, axis=-1)
     defects = {
         **_start(system, matrices, part, 2 * shape.real.sum(1), 2 * speed.real.sum(1)),
@@ -197,8 +197,8 @@ def _defects(
         "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
     }
     if ratio is not None:
-        more, own = ratio.defects(unit, points, speed, M, K)
-        defects |= {**own, "dynamic": defects["dynamic"] + more}
-        for place, floor in polynomial_dependence.accelerations(system).items():
-            defects["outputs"][..., place] += more[..., floor] / M[:, None, floor, floor]
+        more, ratio_defect = ratio.defects(unit, points, speed, M, K)
+        defects |= {**ratio_defect, "dynamic": defects["dynamic"] + more}
+        for column, floor in polynomial_dependence.accelerations(system).items():
+            defects["outputs"][..., column] += more[..., floor] / M[:, None, floor, floor]
     return defects

@@ -54,21 +54,21 @@ class LoewnerBounds:
             )
         self.factor, self.lowest, self.highest = factor, 1 - spread, 1 + spread
 
-    def least(self, other: LoewnerBounds) -> float:
+    def least(self, base: LoewnerBounds) -> float:
         """Lower bound over the box of the eigenvalues of A against another matrix B."""
         middle = float(
             np.linalg.eigvalsh(
                 np.linalg.solve(
-                    other.factor, np.linalg.solve(other.factor, self.factor @ self.factor.T).T
+                    base.factor, np.linalg.solve(base.factor, self.factor @ self.factor.T).T
                 )
             )[0]
         )
-        return self.lowest / other.highest * middle
+        return self.lowest / base.highest * middle
 
-    def most(self, other: LoewnerBounds) -> float:
+    def most(self, base: LoewnerBounds) -> float:
         """Upper bound over the box of the eigenvalues of A against another matrix B."""
-        between = np.linalg.solve(other.factor, self.factor)
-        return self.highest / other.lowest * float(np.linalg.norm(between, 2)) ** 2
+        between = np.linalg.solve(base.factor, self.factor)
+        return self.highest / base.lowest * float(np.linalg.norm(between, 2)) ** 2
 
     def sup(self, coefficients: Array) -> float:
         """Bound of √(x* A x) over the box from the coefficients of x, shape (J, N)."""
@@ -101,22 +101,22 @@ class RatioDamping:
     frequency: Polynomial
 
     @classmethod
-    def of(cls, model: ModalModel) -> Self | None:
+    def from_model(cls, model: ModalModel) -> Self | None:
         """Damping of a model by its ratio; None without one."""
         ratio = polynomial_dependence.common_ratio(model.flow.system)
         if ratio is None:
             return None
         value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else ratio
-        own: tuple[float | int, float] = float(value), float(value)
+        input_and_end: tuple[float | int, float] = float(value), float(value)
         if ratio in model.flow.names:
-            place = model.flow.names.index(str(ratio))
-            own = place, float(model.boxes.upper[0, place])
+            index = model.flow.names.index(str(ratio))
+            input_and_end = index, float(model.boxes.upper[0, index])
         unit = fit_points(len(model.boxes.names), model.degree)
         rate = analyse(model.flow, model.boxes, unit, model.chosen).eigenvalue
         real, imaginary = rate.map(np.real), rate.map(np.imag)
         squared = real * real + imaginary * imaginary
         polynomials = (fit(unit, part, model.degree) for part in (squared, squared**0.5))
-        return cls(*own, model, *polynomials)
+        return cls(*input_and_end, model, *polynomials)
 
     def defects(
         self, unit: Array, points: Array, speed: Array, M: Array, K: Array
@@ -135,8 +135,8 @@ class RatioDamping:
         )
         squared, frequency = self.squared(unit), self.frequency(unit)
         force = 2 * (zeta[:, None] * frequency)[..., None] * (speed @ M)
-        own = speed @ K - squared[..., None] * (speed @ M)
-        return force, {"own": own, "root": squared - frequency**2, "speed": speed}
+        residual = speed @ K - squared[..., None] * (speed @ M)
+        return force, {"own": residual, "root": squared - frequency**2, "speed": speed}
 
     def read(self, stiffness: LoewnerBounds, mass: LoewnerBounds) -> Array:
         """Bound of the damping force over a floor's mass, over ‖v‖ in the norm of M, (m,)."""
@@ -148,9 +148,9 @@ class RatioDamping:
         """√m of the floor whose acceleration an output is, least over the box; else ∞, (m,)."""
         system, boxes = self.model.flow.system, self.model.boxes
         roots = np.full(len(self.model.outputs), np.inf)
-        for place, floor in polynomial_dependence.accelerations(system).items():
+        for row, floor in polynomial_dependence.accelerations(system).items():
             name, fuzzy = f"m{floor + 1}", dict(zip(boxes.names, boxes.lower[0], strict=True))
-            roots[place] = np.sqrt(fuzzy.get(name, system.parameters[name]))
+            roots[row] = np.sqrt(fuzzy.get(name, system.parameters[name]))
         return roots
 
     def missed(
@@ -161,8 +161,12 @@ class RatioDamping:
         rounded = float(np.abs(defect["root"][:, mode]).sum()) / (
             root + _least(self.frequency)[mode]
         )
-        own = mass.sup_dual(defect["own"][:, mode]) / (np.sqrt(stiffness.least(mass)) + root)
-        return float(2 * self.largest * (rounded * mass.sup(defect["speed"][:, mode]) + own))
+        speed_error = mass.sup_dual(defect["own"][:, mode]) / (
+            np.sqrt(stiffness.least(mass)) + root
+        )
+        return float(
+            2 * self.largest * (rounded * mass.sup(defect["speed"][:, mode]) + speed_error)
+        )
 
 
 def _least(polynomial: Polynomial) -> Array:

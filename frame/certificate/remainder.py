@@ -134,11 +134,11 @@ def _convolved(kernel: Array, size: Array) -> Array:
 
     count = len(size)
     record = size.reshape((1,) * (kernel.ndim - 2) + (-1, 1))
-    whole = oaconvolve(kernel, record, axes=-2)[..., :count, :]
+    convolution = oaconvolve(kernel, record, axes=-2)[..., :count, :]
     # what rounding of the Fourier transforms may take off, per row
     rounding = ROUNDING * np.sqrt((kernel**2).sum(-2, keepdims=True) * (size**2).sum())
-    start = np.zeros((*whole.shape[:-2], 1, whole.shape[-1]))
-    return np.concatenate([start, np.maximum(whole, 0.0) + rounding], axis=-2)
+    start = np.zeros((*convolution.shape[:-2], 1, convolution.shape[-1]))
+    return np.concatenate([start, np.maximum(convolution, 0.0) + rounding], axis=-2)
 
 
 class Remainder:
@@ -164,10 +164,10 @@ class Remainder:
             share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
             noise = _noise(model, rate[0], part.load)
             for k in range(n):
-                own = [x[..., k, :] for x in share], [x[..., k] for x in rate]
+                of_mode = [x[..., k, :] for x in share], [x[..., k] for x in rate]
                 sizes = []
                 for order in range(4):
-                    bounds = np.stack(leibniz(*own, order))
+                    bounds = np.stack(leibniz(*of_mode, order))
                     waves = 2 * part.waves[: order + 1, :, k]
                     sizes.append(np.tensordot(waves, bounds, (0, 0)))  # (T, d, …, m)
                 third += np.moveaxis(sizes[3], -1, 1)
@@ -221,11 +221,11 @@ def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
     out: list[Array] = [np.zeros((d,) * order + (m,)) for _ in range(order + 1)]
     axes = "ijk"[:order]
     for chosen in range(2**order):
-        own = "".join(a for bit, a in enumerate(axes) if chosen >> bit & 1)
-        others = [a for a in axes if a not in own]
-        for blocks in _partitions(others):
-            factors = [c[len(own)], *(r[len(block)] for block in blocks)]
-            names = ",".join([own + "z", *blocks])
+        first_axes = "".join(a for bit, a in enumerate(axes) if chosen >> bit & 1)
+        second_axes = [a for a in axes if a not in first_axes]
+        for blocks in _partitions(second_axes):
+            factors = [c[len(first_axes)], *(r[len(block)] for block in blocks)]
+            names = ",".join([first_axes + "z", *blocks])
             out[len(blocks)] += np.einsum(f"{names}->{axes}z", *factors)
     return out
 
@@ -234,8 +234,8 @@ def _partitions(items: list[str]) -> list[list[str]]:
     """All ways to divide letters into blocks."""
     if not items:
         return [[]]
-    first, ways = items[0], []
-    for rest in _partitions(items[1:]):
-        ways.append([first, *rest])
-        ways += [[*rest[:k], first + rest[k], *rest[k + 1 :]] for k in range(len(rest))]
-    return ways
+    first, found = items[0], []
+    for part in _partitions(items[1:]):
+        found.append([first, *part])
+        found += [[*part[:k], first + part[k], *part[k + 1 :]] for k in range(len(part))]
+    return found

@@ -36,9 +36,9 @@ def nodes(duration: float, step: float) -> Array:
     """
     real("step", step, positive=True)
     count = round(real("duration", duration) / step)
-    whole = 1 <= count <= MOST_NODES and abs(count * step - duration) <= 1e-9 * duration
+    is_multiple = 1 <= count <= MOST_NODES and abs(count * step - duration) <= 1e-9 * duration
     require(
-        whole,
+        is_multiple,
         "duration",
         value=f"{duration:g} s",
         allowed=f"1 to {MOST_NODES:,} whole steps of {step:g} s",
@@ -204,8 +204,8 @@ class LinearFlow(Flow):
         else:
             step_map = self.integrator.step_map(matrices, h, pushes)
             if loads:
-                both = np.stack([linear_load(x, h, steps) for x in loads], -1)
-                load = both.reshape(steps, -1)
+                loads_of_steps = np.stack([linear_load(x, h, steps) for x in loads], -1)
+                load = loads_of_steps.reshape(steps, -1)
         motion = trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)
         if matrices.feeds is None:
             return motion

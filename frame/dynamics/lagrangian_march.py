@@ -50,13 +50,13 @@ def operation(number: int, x: float, y: float) -> float:
 @compiled
 def evaluate(tape: Tape, arguments: Array, out: Array) -> None:
     """Fills `out` (m,) with the expressions of a tape at arguments (K,)."""
-    code, results, place = tape
+    code, results, slots = tape
     for k in range(len(arguments)):
-        place[k] = arguments[k]
+        slots[k] = arguments[k]
     for k in range(len(code)):
-        place[len(arguments) + k] = operation(code[k, 0], place[code[k, 1]], place[code[k, 2]])
+        slots[len(arguments) + k] = operation(code[k, 0], slots[code[k, 1]], slots[code[k, 2]])
     for k in range(len(results)):
-        out[k] = place[results[k]]
+        out[k] = slots[results[k]]
 
 
 @compiled

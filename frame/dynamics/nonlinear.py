@@ -64,8 +64,8 @@ class LagrangianFlow(Flow):
         import sympy
 
         eq, n = self.system.symbols, self.system.coordinates
-        own = [eq.p[name] for name in self.names]
-        rest = [x for name, x in eq.p.items() if name not in self.names]
+        fuzzy = [eq.p[name] for name in self.names]
+        constants = [x for name, x in eq.p.items() if name not in self.names]
         new, old, momenta = (
             sympy.Matrix(sympy.symbols(f"{x}:{n}", real=True)) for x in ("new", "old", "pi")
         )
@@ -76,28 +76,28 @@ class LagrangianFlow(Flow):
         start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
         seen = [self.system.output(name, velocity) for name in self.outputs]
         return (
-            ([*(momentum - push), *(momentum + push)], [*new, *old, *own], [*rest, h]),
-            (seen, [*eq.q, *momenta, *own], rest),
-            ([*q0, *eq.momentum.subs(start)], own, rest),
+            ([*(momentum - push), *(momentum + push)], [*new, *old, *fuzzy], [*constants, h]),
+            (seen, [*eq.q, *momenta, *fuzzy], constants),
+            ([*q0, *eq.momentum.subs(start)], fuzzy, constants),
         )
 
     @cached_property
     def _newton(self) -> Tape:
         """Momenta before a step and their slopes by the coordinates behind it."""
-        components, active, rest = self._expressions[0]
+        components, active, constants = self._expressions[0]
         n = self.system.coordinates
         slopes = [e.diff(x) for e in components[:n] for x in active[:n]]
-        return tape([*components[:n], *slopes], active, rest)
+        return tape([*components[:n], *slopes], active, constants)
 
     @cached_property
     def _plain(self) -> list[Tape]:
         """Tapes of a step, the outputs and the start."""
-        return [tape(*of) for of in self._expressions]
+        return [tape(*expression) for expression in self._expressions]
 
     @cached_property
     def _deep(self) -> list[Tape]:
         """The same with first and second derivatives by the inputs."""
-        return [with_derivatives(*of) for of in self._expressions]
+        return [with_derivatives(*expression) for expression in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
         # Numba compiles these when they are imported
@@ -105,8 +105,8 @@ class LagrangianFlow(Flow):
 
         d, m = len(self.names) if derivatives else 0, 2 * self.system.coordinates
         step, observation, initial = self._deep if d else self._plain
-        rest = [x for name, x in self.system.parameters.items() if name not in self.names]
-        inputs = np.hstack([points, np.tile(rest, (len(points), 1))])
+        constants = [x for name, x in self.system.parameters.items() if name not in self.names]
+        inputs = np.hstack([points, np.tile(constants, (len(points), 1))])
         inputs = np.ascontiguousarray(inputs, float)
         flat = np.empty((len(inputs), m + m * d + m * d * d))
         evaluated(initial, inputs, flat)

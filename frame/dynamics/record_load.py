@@ -72,11 +72,11 @@ class Segments:
         if self.history.frequency:
             load = load * self.history.wave(self.step[:, None] * step + since)
         load = load * (self.length[:, None] / 2 * weights)
-        begun = np.searchsorted(self.step, np.arange(count))
+        first = np.searchsorted(self.step, np.arange(count))
         out = np.empty((count, order))
         older, old = np.zeros_like(x), np.ones_like(x)
         for i in range(order):
-            out[:, i] = np.add.reduceat((old * load).sum(1), begun)
+            out[:, i] = np.add.reduceat((old * load).sum(1), first)
             older, old = old, (x if i == 0 else 2 * x * old - older)
         return out
 
@@ -85,10 +85,10 @@ def _linear(history: History, begin: Array, end: Array) -> tuple[Array, Array]:
     """One-sided values at the ends of intervals that hold no sample inside, without a sine."""
     a, h = history.samples, history.step
     piece = np.floor(((begin + end) / 2 - history.start) / h).astype(int)
-    within, beyond = (piece >= 0) & (piece < len(a) - 1), piece >= len(a) - 1
+    within, after = (piece >= 0) & (piece < len(a) - 1), piece >= len(a) - 1
     k = np.where(within, piece, 0)
     slope = (a[k + 1] - a[k]) / h
-    outside = np.where(beyond & np.array(history.is_held), a[-1], 0.0)
+    outside = np.where(after & np.array(history.is_held), a[-1], 0.0)
 
     def at(time: Array) -> Array:
         value = a[k] + slope * (time - history.start - k * h)

@@ -74,15 +74,15 @@ class Evidence:
         """Ranges of the measured modes at the joint level α."""
         return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
 
-    def beyond(self, points: Array, modes: list[ModeCut]) -> Array:
+    def violation(self, points: Array, modes: list[ModeCut]) -> Array:
         """Distance of modes at points (S, d) beyond their ranges, in half widths; <= 0 inside."""
         values, vectors = self.chain.modes(points)
         columns = []
         for mode, cut in zip(self.measured, modes, strict=True):
             shape = vectors[:, :, mode.mode - 1]
-            one = shape[:, mode.reference - 1]
+            unit = shape[:, mode.reference - 1]
             columns.append((values[:, mode.mode - 1], cut.low, cut.high))
-            columns += [(shape[:, z - 1] / one, *cut.shape[z]) for z in mode.shape]
+            columns += [(shape[:, z - 1] / unit, *cut.shape[z]) for z in mode.shape]
         measured, low, high = (np.array(part) for part in zip(*columns, strict=True))
         half = np.maximum((high - low) / 2, 1e-12 * np.abs(high))
         return np.asarray(np.maximum(low - measured.T, measured.T - high) / half)
@@ -146,8 +146,8 @@ class Identified:
     @property
     def narrowed(self) -> dict[str, float]:
         """Width of each parameter's lowest cut over that of its prior."""
-        of, level = self.evidence, float(self.alpha[0])
-        widths = np.array([of.cut(of.prior[name], level).width for name in self.names])
+        evidence, level = self.evidence, float(self.alpha[0])
+        widths = np.array([evidence.cut(evidence.prior[name], level).width for name in self.names])
         return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
 
     def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
@@ -161,24 +161,24 @@ class Identified:
             FailedError: No point of the set was met, or one lies outside the box or has a frequency
                 outside the predictions: the proof is wrong.
         """
-        of, level, chance = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
-        nominal, modes = of.chain.nominal, of.modes(level)
-        cuts = np.array([of.cut(prior, level) for prior in of.prior.values()]).T
+        evidence, level, chance = self.evidence, float(self.alpha[row]), np.random.default_rng(seed)
+        nominal, modes = evidence.chain.nominal, evidence.modes(level)
+        cuts = np.array([evidence.cut(prior, level) for prior in evidence.prior.values()]).T
 
-        def place(logs: Array) -> Array:
+        def parameters_of(logs: Array) -> Array:
             return np.asarray(np.clip(nominal * np.exp(logs), *cuts))
 
-        def beyond(logs: Array) -> Array:
-            return of.beyond(place(logs), modes)
+        def violation(logs: Array) -> Array:
+            return evidence.violation(parameters_of(logs), modes)
 
         box = Ends(np.log(self.lower[row] / nominal), np.log(self.upper[row] / nominal))
-        start = inner_point(beyond, box, chance)
+        start = inner_point(violation, box, chance)
         if start is None:
             what = f"no parameters with modes in all measured cuts at α = {level:g} were met"
             raise FailedError(what, "take samples of a lower level, or the box alone")
         leeway = LEEWAY * (box.upper - box.lower)
         wider = Ends(box.lower - leeway, box.upper + leeway)
-        points = place(walk(beyond, start, wider, number, chance))
+        points = parameters_of(walk(violation, start, wider, number, chance))
         self._require_contained(points, row)
         return points
 

@@ -137,9 +137,9 @@ def measured_mode(
         require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
         # the reference scatters, too; the last factor is above the second order's
         share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
-        both = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
+        combined = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
         unbiased = ratios / (1 + square + 3 * square**2)  # the mean of 1/(1 + x), x normal
-        shape[floor] = _mean(unbiased, both, what, "shape_deviation")
+        shape[floor] = _mean(unbiased, combined, what, "shape_deviation")
     return MeasuredMode(mode, number, shape, reference)
 
 

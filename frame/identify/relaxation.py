@@ -29,7 +29,7 @@ Linear = dict[int, float]
 CONSTANT = -1
 PASSES = 6
 """Most passes over all ends."""
-SETTLED = 0.03
+MIN_PROGRESS = 0.03
 """Share of the widths that a further pass must take off to be worth another one."""
 ROUND_OFF = 1e-13
 """Share of the sums' sizes by which bounds are widened for rounding."""
@@ -75,8 +75,8 @@ class LinearProgram:
         return relaxed.least(cost) > 0
 
     def _proved(self, objective: Array, multipliers: Array) -> float:
-        rest = objective - self.rows.T @ multipliers
-        ends = np.where(rest > 0, rest * self.lower, rest * self.upper)
+        reduced_costs = objective - self.rows.T @ multipliers
+        ends = np.where(reduced_costs > 0, reduced_costs * self.lower, reduced_costs * self.upper)
         reach = np.maximum(np.abs(self.lower), np.abs(self.upper))
         size = np.abs(multipliers) @ np.abs(self.right) + np.abs(objective) @ reach
         size += (abs(self.rows).T @ np.abs(multipliers)) @ reach
@@ -200,23 +200,23 @@ def enclosure(
     """
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
     for _ in range(PASSES):
-        held = relaxation(chain, lower, upper, modes, amplitudes)
-        if held is not None and held.shapes:
-            amplitudes |= {key: held.ends(shape) for key, shape in held.shapes.items()}
+        program = relaxation(chain, lower, upper, modes, amplitudes)
+        if program is not None and program.shapes:
+            amplitudes |= {key: program.ends(shape) for key, shape in program.shapes.items()}
             if any(low > high for low, high in amplitudes.values()):
                 return None
-            held = relaxation(chain, lower, upper, modes, amplitudes)
-        if held is None:
+            program = relaxation(chain, lower, upper, modes, amplitudes)
+        if program is None:
             return None
         before, ends = upper - lower, np.stack([lower, upper])
         for at in np.flatnonzero(before > 0):
-            low, high = held.ends(held.parameters[at])
+            low, high = program.ends(program.parameters[at])
             ends[:, at] = max(low, lower[at]), min(high, upper[at])
         lower, upper = ends
         if (lower > upper).any():
             return None
         wide = before > 0
-        if (1 - (upper - lower)[wide] / before[wide]).max(initial=0.0) < SETTLED:
+        if (1 - (upper - lower)[wide] / before[wide]).max(initial=0.0) < MIN_PROGRESS:
             break
     return lower, upper
 
@@ -246,8 +246,8 @@ def relaxation(
         over.require_frequency(cut)
         ends = over.amplitudes(high, cut) if cut.shape else None
         if ends is not None:
-            known = {f: amplitudes.get((cut.mode, f), end) for f, end in ends.items()}
-            shape = {f: over.rows.variable(*known[f]) for f in sorted(known)}
+            amplitude_ends = {f: amplitudes.get((cut.mode, f), end) for f, end in ends.items()}
+            shape = {f: over.rows.variable(*amplitude_ends[f]) for f in sorted(amplitude_ends)}
             shapes |= {(cut.mode, f): shape[f] for f in shape if f not in cut.shape}
             over.require_balance(shape, over.rows.variable(low / high, 1.0), high)
     return Relaxation(over.rows.program(), tuple(over.logs), shapes)
@@ -259,7 +259,7 @@ class _Chains:
     def __init__(self, chain: Chain, lower: Array, upper: Array) -> None:
         self.chain, self.rows = chain, Rows()
         self.logs = [self.rows.variable(*ends) for ends in zip(lower, upper, strict=True)]
-        self.stiffness, self.mass = ([self._exponential(x) for x in of] for of in chain.powers)
+        self.stiffness, self.mass = ([self._exponential(x) for x in rows] for rows in chain.powers)
         self.least, self.most = eigenvalue_ranges(chain, lower, upper)
         low, high = chain.ranges(lower, upper)
         self.low, self.high = np.exp(low), np.exp(high)  # factors of stiffness and mass, (2, n)
@@ -287,9 +287,9 @@ class _Chains:
         for z in range(n):
             inertia = rows.product(share, rows.product(self.mass[z], shape[z + 1]))
             force = scaled(inertia, eigenvalue * chain.mass[z] / unit)
-            held = total(shears[z], shears[z + 1], -1.0) if z + 1 < n else shears[z]
-            rows.at_most(total(held, force, -1.0))
-            rows.at_most(total(force, held, -1.0))
+            net_force = total(shears[z], shears[z + 1], -1.0) if z + 1 < n else shears[z]
+            rows.at_most(total(net_force, force, -1.0))
+            rows.at_most(total(force, net_force, -1.0))
 
     def amplitudes(self, eigenvalue: float, cut: ModeCut) -> dict[int, tuple[float, float]] | None:
         """Ends of all amplitudes; None where those between measured floors cannot be bounded.

@@ -16,30 +16,30 @@ TRIES = 50  # of a step
 STARTS = 10  # of the search
 MARGINS = (1.0, 0.5, 0.1, 1e-2, 1e-4)  # that the search asks for in turn; 1 is the middle
 
-Beyond = Callable[[Array], Array]
+Violation = Callable[[Array], Array]
 """Distance of points (n, d) beyond each range of the set, (n, q), in half widths; <= 0 inside."""
 
 
-def inner_point(beyond: Beyond, box: Ends, chance: np.random.Generator) -> Array | None:
+def inner_point(violation: Violation, box: Ends, chance: np.random.Generator) -> Array | None:
     """A point of the set, shape (d,), from the middle of the box or random starts; None if none."""
     for start in range(STARTS):
         share = chance.random(len(box.lower)) if start else 0.5
         point = box.lower + (box.upper - box.lower) * share
         for margin in MARGINS:
             fitted = least_squares(
-                lambda x, margin=margin: np.maximum(beyond(x[None])[0] + margin, 0.0),
+                lambda x, margin=margin: np.maximum(violation(x[None])[0] + margin, 0.0),
                 point,
                 bounds=(box.lower - 1e-9, box.upper + 1e-9),  # a side may have no width
                 max_nfev=30,
             )
             point = np.clip(fitted.x, *box)
-            if (beyond(point[None]) <= 0).all():
+            if (violation(point[None]) <= 0).all():
                 return np.asarray(point)
     return None
 
 
 def walk(
-    beyond: Beyond, start: Array, box: Ends, number: int, chance: np.random.Generator
+    violation: Violation, start: Array, box: Ends, number: int, chance: np.random.Generator
 ) -> Array:
     """Ends of walks that hit and run from a point of the set: points (number, d) of it.
 
@@ -51,18 +51,18 @@ def walk(
     points, width = np.tile(start, (max(number, WALKS), 1)), box.upper - box.lower
     ends: Array = np.tile([[-1.0], [1.0]], len(points))
     for step in range(STEPS):
-        way = chance.standard_normal(points.shape) * width
+        direction = chance.standard_normal(points.shape) * width
         if step % 2:
-            way = chance.permutation(points) - chance.permutation(points)
-        longest = np.abs(way / np.where(width > 0, width, 1.0)).max(axis=1, keepdims=True)
-        way /= np.where(longest > 0, longest, 1.0)  # now as long as the box
+            direction = chance.permutation(points) - chance.permutation(points)
+        longest = np.abs(direction / np.where(width > 0, width, 1.0)).max(axis=1, keepdims=True)
+        direction /= np.where(longest > 0, longest, 1.0)  # now as long as the box
         (low, high), moved = ends, np.full(len(points), False)
         for _ in range(TRIES):
             share = chance.uniform(low, high)
-            place = points + share[:, None] * way
-            held = ((box.lower <= place) & (place <= box.upper)).all(axis=1)
-            hit = held & (beyond(place) <= 0).all(axis=1) & ~moved
-            points[hit], moved[hit] = place[hit], True
+            candidate = points + share[:, None] * direction
+            is_inside = ((box.lower <= candidate) & (candidate <= box.upper)).all(axis=1)
+            hit = is_inside & (violation(candidate) <= 0).all(axis=1) & ~moved
+            points[hit], moved[hit] = candidate[hit], True
             if moved.all():
                 break
             low, high = np.where(share < 0, share, low), np.where(share < 0, high, share)

@@ -126,17 +126,17 @@ class Auto:
         elif self.tolerance:
             dual = replace(dual, peaks=WIDE)
         works = list[tuple[float, Proof | DualProof]]()
-        for each in (proof, dual) if inputs <= MOST_PARAMETERS else (dual,):
+        for method in (proof, dual) if inputs <= MOST_PARAMETERS else (dual,):
             try:
                 with refusing():
-                    works.append((each.forecast(exact_flow(flow.flow), flow.boxes), each))
+                    works.append((method.forecast(exact_flow(flow.flow), flow.boxes), method))
             except UnprovedError as error:
-                reasons.append(f"{each.name}: {error}")
+                reasons.append(f"{method.name}: {error}")
         if self.tolerance and not self.peaks and len(works) == 2:
             works = [(0.0, proof), works[1]]  # which bounds all nodes alike, not the peaks first
         works.sort(key=lambda pair: pair[0])
-        for _, each in works:
-            yield replace(proof, parts=1) if each is proof and len(works) == 2 else each
+        for _, method in works:
+            yield replace(proof, parts=1) if method is proof and len(works) == 2 else method
         if len(works) == 2 and works[0][1] is proof:
             yield proof
 
@@ -164,7 +164,7 @@ def with_attained(proved: Envelope, searched: Envelope) -> Envelope:
         inner[better], at[better] = found[better], getattr(searched, f"{name}_at")[better]
         ends.append(inner)
         places.append(at)
-    both = replace(
+    combined = replace(
         proved,
         inner=Ends(*ends),
         lower_at=places[0],
@@ -173,8 +173,8 @@ def with_attained(proved: Envelope, searched: Envelope) -> Envelope:
         evaluations=proved.evaluations + searched.evaluations,
         seconds=proved.seconds + searched.seconds,
     )
-    facts = {**both.facts, "gap_of_peaks": _gap(both)}
-    return replace(both, facts=facts, notes=(both.peak_words, *both.notes))
+    facts = {**combined.facts, "gap_of_peaks": _gap(combined)}
+    return replace(combined, facts=facts, notes=(combined.peak_words, *combined.notes))
 
 
 def _gap(proved: Envelope) -> float:

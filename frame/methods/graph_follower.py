@@ -19,7 +19,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import local_maximum
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
-from alphacut.frame.methods.independent import SAFETY, beyond, parted
+from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Nature
@@ -92,19 +92,19 @@ class GraphFollower:
         beyond the bounds. Where neighbouring trajectories part there is none, and the bounds are
         attained, no more.
         """
-        begun = time.perf_counter()
+        start_time = time.perf_counter()
         followed = self.follow(flow, progress)
-        missed, count = beyond(flow, followed.bounds)
-        apart = parted(followed.storage.steepest, followed.bounds[0])
+        missed, count = independent_excess(flow, followed.bounds)
+        is_parted = needs_parting(followed.storage.steepest, followed.bounds[0])
         error = followed.left.max(-1) + SAFETY * missed[:, None]
         return flow.envelope(
             followed.bounds,
             followed.storage.points[followed.best],
-            None if apart else error,
+            None if is_parted else error,
             method=self.name,
-            nature=Nature.ATTAINED if apart else Nature.ESTIMATED,
+            nature=Nature.ATTAINED if is_parted else Nature.ESTIMATED,
             evaluations=len(followed.storage) + count,
-            seconds=time.perf_counter() - begun,
+            seconds=time.perf_counter() - start_time,
             facts={"order": self.order, "gain": self.tolerance},
         )
 
@@ -138,7 +138,7 @@ class GraphFollower:
             points = self._new(out, level, node, promise, target)
             if points:
                 won = storage.add(np.array(points))
-                ahead = tuple(place[won[0] > node] for place in won)
+                ahead = tuple(indices[won[0] > node] for indices in won)
                 self._ask(storage, ahead, box, promise, target)
         limit = self.tolerance * storage.flow.scale[:, None]
         out.left[level] = np.clip(promise - storage.top, 0.0, limit)
@@ -149,10 +149,10 @@ class GraphFollower:
         """Parameters of the new graphs for the bounds of a node."""
         storage, points = out.storage, list[Array]()
         limit = self.tolerance * storage.flow.scale[:, None]
-        for place in np.argwhere(promise[node] > storage.top[node] + limit):
-            point = target[node, *place]
+        for entry in np.argwhere(promise[node] > storage.top[node] + limit):
+            point = target[node, *entry]
             if not storage.holds(point) and all(np.abs(point - x).max() > 1e-9 for x in points):
-                out.new[level, node, *place] = len(storage) + len(points)
+                out.new[level, node, *entry] = len(storage) + len(points)
                 points.append(point)
         return points
 

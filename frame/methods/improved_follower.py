@@ -20,7 +20,7 @@ from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Places, Storage
-from alphacut.frame.methods.independent import SAFETY, beyond, parted
+from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, share
 from alphacut.fuzzy.refused import real
@@ -38,7 +38,7 @@ SPACING = 0.02
 """Distance in unit coordinates between graphs of one batch."""
 SPREAD = 64
 """Graphs on a spread of points per level that start the search."""
-APART = 100_003
+SEED_STEP = 100_003
 """Points of the sequence between those that two seeds spread."""
 
 
@@ -81,21 +81,23 @@ class ImprovedFollower:
         beyond the bounds, and twice what one pass leads beyond the other. Where neighbouring
         trajectories part there is none, and the bounds are attained, no more.
         """
-        begun, other = time.perf_counter(), replace(self, seed=self.seed + 1)
+        start_time, second_pass = time.perf_counter(), replace(self, seed=self.seed + 1)
         first = self.pursue(flow, progress=share(progress, 0.0, 0.5))
-        second = other.pursue(flow, progress=share(progress, 0.5, 1.0))
+        second = second_pass.pursue(flow, progress=share(progress, 0.5, 1.0))
         better = second.bounds > first.bounds
         bounds = np.where(better, second.bounds, first.bounds)
         where = np.where(better[..., None], second.where, first.where)
         limit = self.tolerance * flow.scale[:, None]
-        closed = [np.where(one.left <= limit, one.left, 0.0) for one in (first, second)]
-        open_ = [np.where(one.left > limit, one.left, 0.0) for one in (first, second)]
+        closed = [np.where(x.left <= limit, x.left, 0.0) for x in (first, second)]
+        open_ = [np.where(x.left > limit, x.left, 0.0) for x in (first, second)]
         promised = np.maximum(*closed) + np.maximum(*open_)
-        apart = around(np.abs(second.bounds - first.bounds).max(-1))
-        missed, count = beyond(flow, bounds)
+        gap = around(np.abs(second.bounds - first.bounds).max(-1))
+        missed, count = independent_excess(flow, bounds)
         small = self.tolerance / 2 * flow.scale
-        error = SAFETY * (promised.max(-1) + small + apart + missed[:, None])
-        parts = parted(np.maximum(first.storage.steepest, second.storage.steepest), bounds[0])
+        error = SAFETY * (promised.max(-1) + small + gap + missed[:, None])
+        parts = needs_parting(
+            np.maximum(first.storage.steepest, second.storage.steepest), bounds[0]
+        )
         notes = (f"stopped at the budget of {self.budget} trajectories",)
         return flow.envelope(
             bounds,
@@ -104,7 +106,7 @@ class ImprovedFollower:
             method=self.name,
             nature=Nature.ATTAINED if parts else Nature.ESTIMATED,
             evaluations=len(first.storage) + len(second.storage) + count,
-            seconds=time.perf_counter() - begun,
+            seconds=time.perf_counter() - start_time,
             facts={"gain": self.tolerance, "order": 2},
             notes=notes * bool(np.any(open_)),
         )
@@ -137,7 +139,7 @@ class ImprovedFollower:
         if not (upper > lower).any():
             return modal[: 0 if len(storage) else 1]
         middle, half = (lower + upper) / 2, (upper - lower) / 2
-        skip = 1 + len(storage) + APART * self.seed
+        skip = 1 + len(storage) + SEED_STEP * self.seed
         spread = chebyshev_points(len(lower), SPREAD, skip=skip)
         return np.vstack([modal, middle + half * spread])
 
@@ -188,21 +190,21 @@ class _Level:
             gains = (self.promise - top)[window] / self.storage.flow.scale[:, None]
             for k in np.argsort(-gains, axis=None)[:TRIES]:
                 t, o, side = np.unravel_index(k, gains.shape)
-                place = (window[t], o, side)
+                entry = (window[t], o, side)
                 if gains[t, o, side] <= self.tolerance:
                     break
-                point = np.clip(self.target[place], *self.box)
+                point = np.clip(self.target[entry], *self.box)
                 if self.storage.holds(point, near=1e-7):
-                    self.promise[place] = top[place]  # the model promised too much
-                elif all(np.abs(point - other).max() > SPACING for other in chosen):
+                    self.promise[entry] = top[entry]  # the model promised too much
+                elif all(np.abs(point - neighbour).max() > SPACING for neighbour in chosen):
                     chosen.append(point)
                     break
         return np.array(chosen)[:count].reshape(-1, len(self.box[0]))
 
 
-def around(apart: Array) -> Array:
+def around(gap: Array) -> Array:
     """Largest of values (A, T, m) at the nodes near by, and a tenth of the largest of all."""
     from scipy.ndimage import maximum_filter1d
 
-    near = maximum_filter1d(apart, 2 * (apart.shape[1] // 40) + 1, axis=1)
-    return np.asarray(np.maximum(near, 0.1 * apart.max(1, keepdims=True)))
+    near = maximum_filter1d(gap, 2 * (gap.shape[1] // 40) + 1, axis=1)
+    return np.asarray(np.maximum(near, 0.1 * gap.max(1, keepdims=True)))

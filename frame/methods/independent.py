@@ -12,12 +12,12 @@ SAMPLES = 64
 """Points of a kind on each level."""
 SAFETY = 2.0
 """Factor on what they find beyond the bounds, and on what models still promise."""
-PARTED = 8.0
+MAX_RATIO = 8.0
 """Slope along a half width of the box, as a share of the output's range, from which on neighbouring
 trajectories part."""
 
 
-def beyond(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
+def independent_excess(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
     """How far a sample of each level leaves the bounds (A, T, m, 2), shape (A, m), and its size."""
     missed, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
@@ -40,7 +40,7 @@ def sample(d: int, level: int) -> Array:
     return np.concatenate([inside, np.clip(2 * wide, -1, 1), ends])
 
 
-def parted(steepest: Array, bounds: Array) -> bool:
+def needs_parting(steepest: Array, bounds: Array) -> bool:
     """True if trajectories part: their steepest slopes (m,) beside the range of (T, m, 2)."""
     width = (bounds[..., 0].max(0) + bounds[..., 1].max(0)) / 2
-    return bool((steepest > PARTED * width).any())
+    return bool((steepest > MAX_RATIO * width).any())

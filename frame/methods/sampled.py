@@ -51,7 +51,7 @@ class Sampled:
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of all outputs on all levels."""
-        begun, levels = time.perf_counter(), len(flow.boxes.alpha)
+        start_time, levels = time.perf_counter(), len(flow.boxes.alpha)
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
         at_once = int(np.clip(MOST / (shape[1] * shape[2]), 1, 256))
@@ -69,7 +69,7 @@ class Sampled:
             method=self.name,
             nature=Nature.ATTAINED,
             evaluations=levels * self.samples,
-            seconds=time.perf_counter() - begun,
+            seconds=time.perf_counter() - start_time,
         )
 
 

@@ -106,12 +106,12 @@ class Search:
         Raises:
             ModalError: The structure has no oscillating modes over the box, or is not linear.
         """
-        begun, tolerance = time.perf_counter(), flow.tolerance(self.tolerance)
+        start_time, tolerance = time.perf_counter(), flow.tolerance(self.tolerance)
         if not isinstance(flow.flow, LinearFlow):
             raise ModalError("search: the system is not linear; take the Graph Follower")
         model = fit_modes(flow.flow, flow.boxes, tolerance=SMALL * tolerance, scale=flow.scale)
         rough = _rough(model, flow)
-        exact = ExactResponse.of(model, flow.scale, bent=not rough)
+        exact = ExactResponse.from_model(model, flow.scale, bent=not rough)
         # what leads: polynomials where they are as good as is asked for, or the exact motions
         enough = bool((model.error / flow.scale).max() <= SMALL * tolerance)
         second = fit_modes(
@@ -150,7 +150,7 @@ class Search:
             method=self.name,
             nature=Nature.ATTAINED if rough else Nature.ESTIMATED,
             evaluations=model.analyses,
-            seconds=time.perf_counter() - begun,
+            seconds=time.perf_counter() - start_time,
             facts=facts,
         )
 
@@ -209,17 +209,17 @@ class _IndependentSearch:
             ends = np.ones(len(lower))
             unit = fresh_points(rng, -ends, ends, SAMPLES)
         self.optima = first_optima(_polynomials(self.response), *self.box, unit)
-        every = np.arange(len(self.optima.value))
-        self.grid = every.reshape(len(self.response.time), -1)  # node by node
+        rows = np.arange(len(self.optima.value))
+        self.grid = rows.reshape(len(self.response.time), -1)  # node by node
         if isinstance(self.response, ExactResponse):
             self.optima.value[:] = -np.inf
-            self.optima.offer(self.response, self.optima.point.copy(), every)
-            refine(self.response, self.optima, every, *self.box)
+            self.optima.offer(self.response, self.optima.point.copy(), rows)
+            refine(self.response, self.optima, rows, *self.box)
         if self.narrower is not None:
-            self.optima.offer(self.response, self.narrower.point, every)
+            self.optima.offer(self.response, self.narrower.point, rows)
         self.narrower = self.optima
         if (upper > lower).any():
-            self._follow(np.ones(len(every), bool))
+            self._follow(np.ones(len(rows), bool))
 
     def improve(self, count: int) -> None:
         """Solve some bounds anew from fresh points, and follow what is better.
@@ -273,23 +273,25 @@ def _compared(
         second: Optima of the other one.
         box: Lower and upper ends, and what Newton's method may leave.
     """
-    other = copy.deepcopy(second)
-    _evaluate(response, other, box)
-    better = other.value > first.value
+    improved = copy.deepcopy(second)
+    _evaluate(response, improved, box)
+    better = improved.value > first.value
     best = replace(
         first,
-        point=np.where(better[:, None], other.point, first.point),
-        value=np.maximum(first.value, other.value),
-        left=np.where(better, other.left, first.left),
+        point=np.where(better[:, None], improved.point, first.point),
+        value=np.maximum(first.value, improved.value),
+        left=np.where(better, improved.left, first.left),
     )
-    return best, np.abs(other.value - first.value)
+    return best, np.abs(improved.value - first.value)
 
 
 def _leading(model: ModalModel, flow: UnitFlow, *, enough: bool) -> Response:
     """What the second search works on: its polynomials, or exact motions that they lead."""
     if enough:
         return model.in_units(flow.scale)
-    return ExactResponse.of(model, flow.scale, bent=model.degree > 1 and not _rough(model, flow))
+    return ExactResponse.from_model(
+        model, flow.scale, bent=model.degree > 1 and not _rough(model, flow)
+    )
 
 
 def _rough(model: ModalModel, flow: UnitFlow) -> bool:
@@ -297,11 +299,11 @@ def _rough(model: ModalModel, flow: UnitFlow) -> bool:
     return bool((model.error.max(0) > ROUGH * peak).any())
 
 
-def _polynomials(way: Response) -> ModalModel:
-    return way.model if isinstance(way, ExactResponse) else way
+def _polynomials(response: Response) -> ModalModel:
+    return response.model if isinstance(response, ExactResponse) else response
 
 
-def _exchanged(way: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
+def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
     """Try at each node the fresh points of nodes near by; problems that improved.
 
     Envelopes consist of segments of graphs (the idea of the Graph Follower).
@@ -310,9 +312,9 @@ def _exchanged(way: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
     for shift in SHIFTS:
         count = max(len(grid) - shift, 0)
         for here, there in ((shift, 0), (0, shift)):
-            of = grid[there : there + count].ravel()
-            to = grid[here : here + count].ravel()[fresh[of]]
-            better.append(optima.offer(way, optima.point[of[fresh[of]]], to))
+            neighbours = grid[there : there + count].ravel()
+            to = grid[here : here + count].ravel()[fresh[neighbours]]
+            better.append(optima.offer(response, optima.point[neighbours[fresh[neighbours]]], to))
     return np.asarray(np.unique(np.concatenate(better)))
 
 

@@ -42,7 +42,7 @@ class ExactResponse:
     secant: ClassVar[bool] = True
 
     @classmethod
-    def of(cls, model: ModalModel, scale: Array, *, bent: bool = True) -> ExactResponse:
+    def from_model(cls, model: ModalModel, scale: Array, *, bent: bool = True) -> ExactResponse:
         """Of the structure whose polynomials are `model`, in units of `scale` (m,).
 
         Raises:
@@ -79,24 +79,26 @@ class ExactResponse:
 
     def _sloped(self, unit: Array, node: Rows, output: Rows, order: int) -> tuple[Array, Array]:
         f, g = np.empty(len(unit)), np.empty(unit.shape)
-        for rows, points, own in pieces(unit):
+        for rows, points, indices in pieces(unit):
             modes = analyse(self.model.flow, self.model.boxes, points, order=order)
-            f[rows], slope = self._of(modes, own, node[rows], output[rows])
+            f[rows], slope = self._at_modes(modes, indices, node[rows], output[rows])
             if order:
                 g[rows] = slope
         return f, g
 
-    def _of(self, modes: Modes, own: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
-        """Outputs of modes `own` (N,) with slopes, 2 Re Σ C_k w(λ_k) over start and loads."""
-        rate, slope = modes.eigenvalue.value[own], modes.eigenvalue.first[:, own]
+    def _at_modes(
+        self, modes: Modes, indices: Rows, node: Rows, output: Rows
+    ) -> tuple[Array, Array]:
+        """Outputs of modes `indices` (N,) with slopes, 2 Re Σ C_k w(λ_k) over start and loads."""
+        rate, slope = modes.eigenvalue.value[indices], modes.eigenvalue.first[:, indices]
         t, scale = self.time[node][:, None], self.scale[output]
         wave = np.exp(rate * t)
         parts = [(modes.coefficient, wave, t * wave)]
         for share, load in zip(modes.loads, self.loads, strict=True):
             parts.append((share, *load.response(rate, node)[:2]))
-        f, g = np.zeros(len(own)), np.zeros((len(slope), len(own)))
+        f, g = np.zeros(len(indices)), np.zeros((len(slope), len(indices)))
         for share, w, dw in parts:
-            value, first = share.value[own, :, output], share.first[:, own, :, output]
+            value, first = share.value[indices, :, output], share.first[:, indices, :, output]
             f += 2 * (value * w).real.sum(-1)
             g += 2 * (np.moveaxis(first, 1, 0) * w + value * dw * slope).real.sum(-1)
         return f / scale, (g / scale).T

@@ -69,25 +69,25 @@ def fit_modes(
             tolerance.
     """
     d = len(flow.names)
-    held = _held_out(d)
-    truth, scale = flow.values(boxes.to_physical(held)), np.asarray(scale)
+    tests = _held_out(d)
+    truth, scale = flow.values(boxes.to_physical(tests)), np.asarray(scale)
     allowed = tolerance / 4 * np.broadcast_to(scale, truth.shape[-1:])
     chosen = needed_modes(flow, boxes, allowed, energy=energy)
     best: ModalModel | None = None
-    known, reached = list[Modes](), list[float]()
+    fitted_modes, reached = list[Modes](), list[float]()
     degrees = range(2, 13 if d <= MANY else 3) if degree is None else (degree,)
     for total in degrees:
         points = fit_points(d, total)
-        if len(held) + len(points) > budget or terms(d, total) > MOST_TERMS:
+        if len(tests) + len(points) > budget or terms(d, total) > MOST_TERMS:
             break
-        count = sum(len(some.eigenvalue.value) for some in known)
+        count = sum(len(some.eigenvalue.value) for some in fitted_modes)
         if count < len(points):  # the points of lower degrees are among them
-            known.append(analyse(flow, boxes, points[count:], chosen))
-        model = _fitted(flow, boxes, points, joined(known), total, chosen)
-        error = np.abs(model.values(held) - truth).max(0)
+            fitted_modes.append(analyse(flow, boxes, points[count:], chosen))
+        model = _fitted(flow, boxes, points, joined(fitted_modes), total, chosen)
+        error = np.abs(model.values(tests) - truth).max(0)
         reached.append(float((error / scale).max()))
         if best is None or reached[-1] < (best.error / scale).max():
-            best = replace(model, error=error, analyses=len(held) + len(points))
+            best = replace(model, error=error, analyses=len(tests) + len(points))
         if reached[-1] <= tolerance or hopeless(reached, tolerance, d, budget):
             break
     if best is None:
@@ -97,7 +97,7 @@ def fit_modes(
         )
     if degree is None and (best.error / scale).max() > tolerance:
         require_single(
-            evaluate(flow.system, flow.names, boxes.to_physical(held), derivatives=False)[0],
+            evaluate(flow.system, flow.names, boxes.to_physical(tests), derivatives=False)[0],
             best.chosen,
         )
     return best
@@ -138,15 +138,15 @@ def fit_states(model: ModalModel) -> list[Polynomial]:
         What the initial state puts into them, and what a unit impulse of each load does.
     """
     unit = fit_points(len(model.boxes.names), model.degree)
-    own = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
-    return _shares(unit, own, model.degree)
+    analysed = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
+    return _shares(unit, analysed, model.degree)
 
 
 def _fitted(
-    flow: LinearFlow, boxes: Boxes, points: Array, own: Modes, degree: int, chosen: Array
+    flow: LinearFlow, boxes: Boxes, points: Array, analysed: Modes, degree: int, chosen: Array
 ) -> ModalModel:
-    rate, time = fit(points, own.eigenvalue, degree), flow.time
-    free, *forced = _shares(points, own, degree)
+    rate, time = fit(points, analysed.eigenvalue, degree), flow.time
+    free, *forced = _shares(points, analysed, degree)
     kinds = [(LoadTables, course) for course in histories(flow.system).values()]
     kinds += [(Direct, course) for course in courses_of_forces(flow.system)]
     pairs = zip(kinds, forced, strict=False)  # without what acts at once, where nothing does
@@ -155,10 +155,10 @@ def _fitted(
     return ModalModel(flow, boxes, rate, free, loads, chosen, nothing, 0)
 
 
-def _shares(points: Array, own: Modes, degree: int) -> list[Polynomial]:
+def _shares(points: Array, data: Modes, degree: int) -> list[Polynomial]:
     """Polynomials of what the initial state puts into n modes' m rows, and what each load does."""
     flat = (
-        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (own.coefficient, *own.loads)
+        jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (data.coefficient, *data.loads)
     )
     return [fit(points, jet, degree) for jet in flat]
 
@@ -205,11 +205,11 @@ def analyse(
         size = rows.value.shape[-1]
         rows = rows.like(np.broadcast_to(np.eye(size), (len(unit), size, size)))
     has_ground = flow.system.ground is not None
-    own = modes(matrices, rows, matrices.pushes(ground=has_ground), chosen)
+    found_modes = modes(matrices, rows, matrices.pushes(ground=has_ground), chosen)
     if not states and matrices.feeds is not None:
-        direct = _as_modes(matrices.feeds, own.eigenvalue.value.shape[-1])
-        own = replace(own, loads=(*own.loads, *direct))
-    return own.map(boxes.in_unit) if order else own
+        direct = _as_modes(matrices.feeds, found_modes.eigenvalue.value.shape[-1])
+        found_modes = replace(found_modes, loads=(*found_modes.loads, *direct))
+    return found_modes.map(boxes.in_unit) if order else found_modes
 
 
 def _as_modes(feeds: Jet, count: int) -> list[Jet]:
@@ -261,9 +261,9 @@ def _by_energy(matrices: Matrices, rows: Array, X: Array, state: Array, upper: A
         for part, matrix in ((rows[:, :n], K), (rows[:, n:], M))
     ]
     shapes = X[:, upper]
-    held = [
+    tests = [
         np.einsum("ik,ij,jk->k", part.conj(), matrix, part).real
         for part, matrix in ((shapes[:n], K), (shapes[n:], M))
     ]
-    size = 2 * np.sqrt(np.maximum(held[0] + held[1], 0.0))[:, None] * state[upper]
+    size = 2 * np.sqrt(np.maximum(tests[0] + tests[1], 0.0))[:, None] * state[upper]
     return np.asarray(size * np.sqrt(np.maximum(reading[0] + reading[1], 0.0)))

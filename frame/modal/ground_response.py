@@ -47,18 +47,18 @@ class LoadTable:
     """
 
     def __init__(self, history: History, time: Array, middle: complex, spread: float) -> None:
-        every = max(1, ceil(spread * (time[1] - time[0]) / REACH))
-        if every > max(4, MOST_STEPS // len(time)):
+        stride = max(1, ceil(spread * (time[1] - time[0]) / REACH))
+        if stride > max(4, MOST_STEPS // len(time)):
             raise ModalError(
-                f"modal: under a record phases change by {every * REACH:.3g} rad over the box"
+                f"modal: under a record phases change by {stride * REACH:.3g} rad over the box"
                 f" within a step of {time[1] - time[0]:.4g} s; take a smaller one"
             )
-        time = np.linspace(time[0], time[-1], every * (len(time) - 1) + 1) if every > 1 else time
+        time = np.linspace(time[0], time[-1], stride * (len(time) - 1) + 1) if stride > 1 else time
         h, steps = time[1] - time[0], len(time) - 1
         length = min(steps, max(1, int(REACH / max(spread, 1e-12) / h)))
         phase = max(spread * length * h, LEAST_PHASE)
         order = ceil(2.72 * phase + 18)
-        self.middle, self.scale, self.time, self.every = middle, 1 / (length * h), time, every
+        self.middle, self.scale, self.time, self.every = middle, 1 / (length * h), time, stride
         self.moment = _moments(history, middle, time, length, phase, order)
         self.ends, self.truncation = np.arange(length, steps, length), 2 * left_out(phase, order)
 
@@ -88,8 +88,8 @@ class LoadTables:
     @cached_property
     def tables(self) -> list[LoadTable]:
         """One of each mode."""
-        middle, rest = self.rate.coefficients[0], self.rate.coefficients[1:]
-        pairs = zip(middle.tolist(), np.abs(rest).sum(0).tolist(), strict=True)
+        middle, slopes = self.rate.coefficients[0], self.rate.coefficients[1:]
+        pairs = zip(middle.tolist(), np.abs(slopes).sum(0).tolist(), strict=True)
         return [LoadTable(self.history, self.time, *pair) for pair in pairs]
 
     def in_units(self, scale: Array) -> LoadTables:
@@ -116,7 +116,9 @@ class LoadTables:
     def response(self, rate: Array, node: Array) -> tuple[Array, Array, Array]:
         """R, dR/dλ and d²R/dλ² at one node per point, each shape (N, n), for eigenvalues (N, n)."""
         pairs = zip(self.tables, rate.T, strict=True)
-        R, slope, curve = np.stack([table.response(own, node) for table, own in pairs], -1)
+        R, slope, curve = np.stack(
+            [table.response(frequency, node) for table, frequency in pairs], -1
+        )
         return R, slope, curve
 
 

@@ -112,26 +112,26 @@ class ModalModel:
         """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d)."""
         n, d = self.count, unit.shape[1]
         row, column = np.triu_indices(d)
-        packed = np.zeros((len(unit), 1 + d + len(row)))
+        coefficients = np.zeros((len(unit), 1 + d + len(row)))
         for o in np.unique(output):
             rows = np.flatnonzero(output == o)
             jets = self.of_output[o].jets(unit[rows])
-            for place, wave in enumerate(self.waves(jets[:, 0, :n], node[rows]), 1):
-                share = jets[..., place * n : (place + 1) * n]
-                packed[rows] += composed(jets[..., :n], share, wave, d)
+            for number, wave in enumerate(self.waves(jets[:, 0, :n], node[rows]), 1):
+                share = jets[..., number * n : (number + 1) * n]
+                coefficients[rows] += composed(jets[..., :n], share, wave, d)
         H = np.empty((len(unit), d, d))
-        H[:, row, column] = H[:, column, row] = packed[:, 1 + d :]
-        return packed[:, 0], packed[:, 1 : 1 + d], H
+        H[:, row, column] = H[:, column, row] = coefficients[:, 1 + d :]
+        return coefficients[:, 0], coefficients[:, 1 : 1 + d], H
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
         values, n = np.zeros(len(unit)), self.count
         for o in np.unique(output):
-            every = np.flatnonzero(output == o)
-            for rows in np.array_split(every, -(-len(every) // PIECE)):
+            columns = np.flatnonzero(output == o)
+            for rows in np.array_split(columns, -(-len(columns) // PIECE)):
                 parts = self.of_output[o](unit[rows])
-                for place, wave in enumerate(self.waves(parts[:, :n], node[rows]), 1):
-                    share = parts[:, place * n : (place + 1) * n]
+                for number, wave in enumerate(self.waves(parts[:, :n], node[rows]), 1):
+                    share = parts[:, number * n : (number + 1) * n]
                     values[rows] += 2 * (share * wave[0]).real.sum(1)
         return values
 

@@ -18,7 +18,7 @@ LEAST = 250
 """Problems below which a piece costs more than it saves."""
 USUAL = 6
 """Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
-BEGUN, SURE = 0.4, 0.1
+FIRST_RADIUS, SURE = 0.4, 0.1
 """Trust region's first radius; by how much a gain may miss what was promised of a sound model."""
 WIDTH = 2.0
 """Of the unit box."""
@@ -64,7 +64,7 @@ def _newton(
 
     What the models last promised is kept in `optima.left`.
     """
-    radius: Array = np.full(len(which), BEGUN)
+    radius: Array = np.full(len(which), FIRST_RADIUS)
     f, g, H = _signed(model, optima, optima.point[which], which)
     bend = np.zeros_like(H)  # what gradients have shown H to lack
     for count in range(ITERATIONS):
@@ -77,9 +77,9 @@ def _newton(
         )
         promised = gain(g, H, step)
         optima.left[which] = promised
-        held = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
+        at_edge = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
         # held back, it may promise as much more in the whole box as a parabola does
-        open_ = promised * np.where(held, np.minimum((WIDTH / radius) ** 2, 1e3), 1.0) > small
+        open_ = promised * np.where(at_edge, np.minimum((WIDTH / radius) ** 2, 1e3), 1.0) > small
         if not open_.all():
             which, radius, step, promised, g, H, bend = (
                 x[open_] for x in (which, radius, step, promised, g, H, bend)

@@ -82,13 +82,13 @@ def best_of(
     """
     optima = problems(nodes, values.shape[-1], pool.shape[1])
     columns = values.reshape(len(pool), -1)
-    every = np.arange(len(optima.node))
+    rows = np.arange(len(optima.node))
     if rng is None or few is None:
         best = np.stack([columns.argmin(0), columns.argmax(0)], 1).ravel()
     else:
-        drawn = rng.integers(len(pool), size=(few, len(every)))
-        best = drawn[(optima.side * columns[drawn, every // 2]).argmax(0), every]
-    optima.point[:], optima.value[:] = pool[best], optima.side * columns[best, every // 2]
+        drawn = rng.integers(len(pool), size=(few, len(rows)))
+        best = drawn[(optima.side * columns[drawn, rows // 2]).argmax(0), rows]
+    optima.point[:], optima.value[:] = pool[best], optima.side * columns[best, rows // 2]
     return optima
 
 

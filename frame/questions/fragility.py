@@ -58,7 +58,7 @@ class CriticalMeasures:
         )
 
     @classmethod
-    def of(
+    def from_peaks(
         cls, peaks: Sequence[Peaks], measures: Sequence[float], output: str, limit: float
     ) -> CriticalMeasures:
         """Critical measures from the peaks under each record as it is.
@@ -69,7 +69,7 @@ class CriticalMeasures:
             output: Limited output.
             limit: Limit of its magnitude, in the output's SI unit.
         """
-        ends = [(*one.most(output)[::-1], *one.least(output)[::-1]) for one in peaks]
+        ends = [(*x.most(output)[::-1], *x.least(output)[::-1]) for x in peaks]
         size = np.asarray(measures)[:, None] * limit
         with np.errstate(divide="ignore"):
             low, reached, inner, high = (

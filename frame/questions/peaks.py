@@ -77,11 +77,11 @@ class Peaks:
         Each cut holds the highest one, none of whose motions peaks above its greatest.
         """
         k = self.outputs.index(output)
-        known = self.natures[k] is not Nature.ATTAINED
+        is_proved = self.natures[k] is not Nature.ATTAINED
         below = self.lower[:, k] - self.error[:, k]
         if not self._is_signed(output):
             below = np.maximum(below, 0.0)
-        below = np.where(known, below, -np.inf if self._is_signed(output) else 0.0)
+        below = np.where(is_proved, below, -np.inf if self._is_signed(output) else 0.0)
         above = np.minimum(self.most(output).upper[-1:], self.least_reached[:, k])
         return Ends(np.maximum(below, self.least_proved[:, k]), above)
 
@@ -200,22 +200,22 @@ def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:
     columns = [_column(x, output) for x in (first, second) if output in x.outputs]
     if len(columns) == 1:
         return columns[0]
-    one, two = columns
-    if one.natures == two.natures == (Nature.GUARANTEED,):
-        lower, upper = np.maximum(one.lower, two.lower), np.minimum(one.upper, two.upper)
-        better = replace(one, lower=lower, upper=upper)
-    elif one.natures == two.natures == (Nature.ATTAINED,):
-        lower, upper = np.minimum(one.lower, two.lower), np.maximum(one.upper, two.upper)
-        better = replace(one, lower=lower, upper=upper, error=np.maximum(one.error, two.error))
-    elif one.natures == two.natures:
-        better = min(one, two, key=lambda column: column.error.max())
+    left, right = columns
+    if left.natures == right.natures == (Nature.GUARANTEED,):
+        lower, upper = np.maximum(left.lower, right.lower), np.minimum(left.upper, right.upper)
+        better = replace(left, lower=lower, upper=upper)
+    elif left.natures == right.natures == (Nature.ATTAINED,):
+        lower, upper = np.minimum(left.lower, right.lower), np.maximum(left.upper, right.upper)
+        better = replace(left, lower=lower, upper=upper, error=np.maximum(left.error, right.error))
+    elif left.natures == right.natures:
+        better = min(left, right, key=lambda column: column.error.max())
     else:
-        better = max(one, two, key=lambda column: list(Nature).index(column.natures[0]))
+        better = max(left, right, key=lambda column: list(Nature).index(column.natures[0]))
     return replace(
         better,
-        reached=np.maximum(one.reached, two.reached),
-        least_proved=np.maximum(one.least_proved, two.least_proved),
-        least_reached=np.minimum(one.least_reached, two.least_reached),
+        reached=np.maximum(left.reached, right.reached),
+        least_proved=np.maximum(left.least_proved, right.least_proved),
+        least_reached=np.minimum(left.least_reached, right.least_reached),
     )
 
 
@@ -301,33 +301,33 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
         RefusedError: There is no limit, one is not positive, or it names no output.
     """
     require_limits(limits, peaks.outputs)
-    each = {name: _one(peaks, name, float(limit)) for name, limit in limits.items()}
-    if len(each) > 1:
-        each[ANY] = _any(each, limits)
-    return each
+    answers = {name: _passing_of(peaks, name, float(limit)) for name, limit in limits.items()}
+    if len(answers) > 1:
+        answers[ANY] = _any(answers, limits)
+    return answers
 
 
-def _one(peaks: Peaks, output: str, limit: float) -> Passing:
+def _passing_of(peaks: Peaks, output: str, limit: float) -> Passing:
     most, least, alpha = peaks.most(output), peaks.least(output), peaks.alpha
     possible = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
     keeps = np.broadcast_to(least.upper <= limit, alpha.shape)
-    kept = _highest(alpha, keeps), _excluded(alpha, least.lower > limit)
+    levels_within = _highest(alpha, keeps), _excluded(alpha, least.lower > limit)
     margin = limit - np.stack([most.upper, least.lower], axis=1)
-    necessary, nature = (1 - kept[1], 1 - kept[0]), peaks.nature([output])
+    necessary, nature = (1 - levels_within[1], 1 - levels_within[0]), peaks.nature([output])
     return Passing(possible, necessary, margin, float(alpha[0]), nature)
 
 
-def _any(each: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
+def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
     """Degrees to which any limit is exceeded: as possible as the most possible of them."""
-    every = list(each.values())
-    possible = tuple(max(one.possibility[k] for one in every) for k in (0, 1))
-    least = max(one.necessity[0] for one in every)
-    surely_kept = all(one.possibility[1] < 1 for one in every)  # by all motions of the highest cut
+    passings = list(answers.values())
+    possible = tuple(max(x.possibility[k] for x in passings) for k in (0, 1))
+    least = max(x.necessity[0] for x in passings)
+    surely_kept = all(x.possibility[1] < 1 for x in passings)  # by all motions of the highest cut
     sizes = {name: max(abs(limit), 1e-300) for name, limit in limits.items()}
-    margin = np.min([one.margin / sizes[name] for name, one in each.items()], axis=0)
-    nature = Nature.weakest(one.nature for one in every)
+    margin = np.min([x.margin / sizes[name] for name, x in answers.items()], axis=0)
+    nature = Nature.weakest(x.nature for x in passings)
     necessary = least, 0.0 if surely_kept else 1.0
-    return Passing((possible[0], possible[1]), necessary, margin, every[0].lowest, nature)
+    return Passing((possible[0], possible[1]), necessary, margin, passings[0].lowest, nature)
 
 
 def _highest(alpha: Array, holds: Mask) -> float:

@@ -22,7 +22,7 @@ from alphacut.frame.dynamics.nonlinear import flow_of
 from alphacut.frame.questions.peaks import ANY, require_limits, within_steps
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
-from alphacut.frame.verification.step_error import MARGIN, stray
+from alphacut.frame.verification.step_error import MARGIN, node_deviation
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
@@ -101,8 +101,10 @@ def probabilities(
             output, or a random parameter does not give `samples` finite values.
     """
     require_limits(limits, model.outputs)
-    both = sorted(set(fuzzy) & set(random))
-    require(not both, "random", value=", ".join(both), allowed="inputs that are not fuzzy as well")
+    shared = sorted(set(fuzzy) & set(random))
+    require(
+        not shared, "random", value=", ".join(shared), allowed="inputs that are not fuzzy as well"
+    )
     drawn = [np.asarray(draw(rng, samples), float) for draw in random.values()]
     for name, values in zip(random, drawn, strict=True):
         finite = values.shape == (samples,) and bool(np.isfinite(values).all())
@@ -117,7 +119,7 @@ def probabilities(
     points = np.concatenate(tried)
     looked_at = tried[0][:: -(-len(tried[0]) // LOOKED_AT)]
     few = np.array([[*point, *draw] for point in looked_at for draw in draws[:LOOKED_AT]])
-    between = stray(flow, few)
+    between = node_deviation(flow, few)
     off = MARGIN * np.maximum.accumulate(flow.deviations(few)[1].max(0), axis=0)
     columns, sizes = [list(model.outputs).index(x) for x in limits], np.array([*limits.values()])
     shares = []  # peaks over their limits: at least, at most, at most within steps
@@ -127,9 +129,9 @@ def probabilities(
         shares.append([x.max(1)[:, columns] / sizes for x in three])
         if progress:
             progress(count / len(points))
-    every = np.moveaxis(np.array(shares), 1, 0)  # (three, points, draws, limits)
+    by_point = np.moveaxis(np.array(shares), 1, 0)  # (three, points, draws, limits)
     level = np.repeat(np.arange(len(tried)), [len(some) for some in tried])
-    events = [*np.moveaxis(every, -1, 0)] + ([every.max(-1)] if len(limits) > 1 else [])
+    events = [*np.moveaxis(by_point, -1, 0)] + ([by_point.max(-1)] if len(limits) > 1 else [])
     return {
         name: _probability(event, level, scale, spreads=bool(random))
         for name, event, scale in zip((*limits, ANY), events, (*sizes, 1.0), strict=False)

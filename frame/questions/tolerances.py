@@ -31,18 +31,18 @@ class Tolerances:
     """Scales of the supports: 1 are those of the inputs.
 
     Args:
-        kept: Largest scale tried at which exceeding a limit is excluded; None where it is at
+        admissible: Largest scale tried at which exceeding a limit is excluded; None where it is at
             none, not even at scale 0.
         clear: Largest scale tried at which no motion that was looked at exceeds a limit; None
             where it is at none.
         passed: Least scale tried at which a motion that is known exceeds a limit; infinite
             where none was met.
-        supports: Supports at the scale `kept`, by input, in SI units.
-        nature: Weakest nature of the envelopes that `kept` rests on.
+        supports: Supports at the scale `admissible`, by input, in SI units.
+        nature: Weakest nature of the envelopes that `admissible` rests on.
         envelopes: Number of envelopes computed.
     """
 
-    kept: float | None
+    admissible: float | None
     clear: float | None
     passed: float
     supports: Mapping[str, tuple[float, float]]
@@ -52,12 +52,12 @@ class Tolerances:
 
 def scaled(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
     """Supports at a scale about the modal values, as intervals."""
-    both = {name: (number.modal, number.support) for name, number in inputs.items()}
+    middles = {name: (number.modal, number.support) for name, number in inputs.items()}
     return {
         name: Interval(modal - scale * (modal - low), modal + scale * (high - modal))
         if scale > 0 and high > low
         else Crisp(modal)
-        for name, (modal, (low, high)) in both.items()
+        for name, (modal, (low, high)) in middles.items()
     }
 
 
@@ -113,41 +113,43 @@ def tolerances(
         if scale in tried:
             return tried[scale]
         numbers = scaled(inputs, scale)
-        tried[scale] = _judged(peaks(bounds(numbers)), limits)
+        tried[scale] = _step_of(peaks(bounds(numbers)), limits)
         if progress:
             progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
     near = precision * most
     if at_one is not None and most >= 1:
-        tried[1.0] = _judged(at_one, limits)
-    low = next((scale for scale in (most, *tried, 0.0) if step_at(scale).kept), 0.0)
-    if low < most and tried[low].kept:
+        tried[1.0] = _step_of(at_one, limits)
+    low = next((scale for scale in (most, *tried, 0.0) if step_at(scale).within), 0.0)
+    if low < most and tried[low].within:
         high = min(scale for scale in tried if scale > low)
-        low = _halved(lambda scale: step_at(scale).kept, low, high, near)
-    passed = min((scale for scale, one in tried.items() if one.passed), default=np.inf)
+        low = _halved(lambda scale: step_at(scale).within, low, high, near)
+    passed = min((scale for scale, trial in tried.items() if trial.passed), default=np.inf)
     clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and passed < np.inf:
         clear = _halved(lambda scale: not step_at(scale).passed, clear, passed, near)
-        passed = min(scale for scale, one in tried.items() if one.passed)
+        passed = min(scale for scale, trial in tried.items() if trial.passed)
     supports = {name: number.support for name, number in scaled(inputs, low).items()}
     best = tried[low]
-    return Tolerances(low if best.kept else None, clear, passed, supports, best.nature, len(tried))
+    return Tolerances(
+        low if best.within else None, clear, passed, supports, best.nature, len(tried)
+    )
 
 
 class _Step(NamedTuple):
     """State of one scale: passing is excluded, passing is known, worth of both."""
 
-    kept: bool
+    within: bool
     passed: bool
     nature: Nature
 
 
-def _judged(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
+def _step_of(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
     ends = [(peaks.most(name), limit) for name, limit in limits.items()]
-    kept = all(most.upper[0] <= limit for most, limit in ends)
+    within = all(most.upper[0] <= limit for most, limit in ends)
     passed = any(most.lower[0] > limit for most, limit in ends)
-    return _Step(kept, passed, peaks.nature(limits))
+    return _Step(within, passed, peaks.nature(limits))
 
 
 def _halved(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:

@@ -216,14 +216,17 @@ def _with_sine(
     if not rate:
         return walked(sigma)
     angle = rate * (time - history.start) + history.phase
-    (later, one), (sooner, other) = walked(sigma - 1j * rate), walked(sigma + 1j * rate)
+    (later, later_change), (sooner, sooner_change) = (
+        walked(sigma - 1j * rate),
+        walked(sigma + 1j * rate),
+    )
     turn = np.exp(1j * angle)
     response = (turn * later - turn.conj() * sooner) / 2j
     size = np.abs(later[0]) + np.abs(sooner[0])
     grown = np.exp(np.maximum(sigma.real * time, 0.0)) * history.extremes[0] * time**2
     of_exponent = (np.abs(sigma) + rate) * grown
     rounding = UNIT_ROUNDOFF * ((8 + np.abs(angle)) * size + of_exponent)
-    return response, (one + other) / 2 + rounding
+    return response, (later_change + sooner_change) / 2 + rounding
 
 
 @njit(cache=True, parallel=True)
@@ -241,10 +244,10 @@ def _walk_to_named(
 ) -> None:
     """Walks each σ (S, n) to the node of its row and writes `out` (…, S, n) and `error`."""
     for s in prange(len(sigma)):
-        here, own = slice(node[s], node[s] + 1), walk.phase[node[s]]
+        here, phase = slice(node[s], node[s] + 1), walk.phase[node[s]]
         nodes = walk.interval[here], np.zeros(1, np.int64), walk.doubt[here]
         for k in range(sigma.shape[1]):
-            parts = _parts(sigma[s, k], walk.phases[own : own + 1])
+            parts = _parts(sigma[s, k], walk.phases[phase : phase + 1])
             end = out[:, s : s + 1, k], error[s : s + 1, k]
             _walk_along(sigma[s, k], walk, orders, nodes, parts, (0, 0j), *end)
 
@@ -330,10 +333,12 @@ def _walk_along(
             a = walk.first[i] + slope * x
             moved = w * r0
             value = moved + a * P[0] - slope * P[1]
-            own = rounding[j, 2] * wrong + rounding[j, 0] * (abs(moved.real) + abs(moved.imag))
-            own += rounding[j, 1] * (abs(a) + abs(slope) * x / 2)
-            own += doubt[node] * (rate * (abs(value.real) + abs(value.imag)) + abs(a))
-            out[0, node], error[node] = value, own
+            step_rounding = rounding[j, 2] * wrong + rounding[j, 0] * (
+                abs(moved.real) + abs(moved.imag)
+            )
+            step_rounding += rounding[j, 1] * (abs(a) + abs(slope) * x / 2)
+            step_rounding += doubt[node] * (rate * (abs(value.real) + abs(value.imag)) + abs(a))
+            out[0, node], error[node] = value, step_rounding
             if len(orders) > 0:
                 out[1, node] = w * (r1 + x * r0) + a * P[1] - slope * P[2]
             if len(orders) > 1:

@@ -55,10 +55,12 @@ class Course(NamedTuple):
     def values(self, times: Array) -> Array:
         """The force at times, after jumps, shape (T,)."""
         since = times - self.start
-        place = since / self.step
-        place = np.where(np.abs(place - np.rint(place)) < 1e-9, np.rint(place), place)
-        value = np.interp(place, np.arange(len(self.samples)), self.samples)
-        value[(place < 0) | ((place >= len(self.samples) - 1) & (not self.is_held))] = 0.0
+        position = since / self.step
+        position = np.where(
+            np.abs(position - np.rint(position)) < 1e-9, np.rint(position), position
+        )
+        value = np.interp(position, np.arange(len(self.samples)), self.samples)
+        value[(position < 0) | ((position >= len(self.samples) - 1) & (not self.is_held))] = 0.0
         sine = np.sin(self.frequency * since + self.phase) if self.frequency else 1.0
         return np.asarray(value * sine)
 
@@ -105,7 +107,7 @@ class LinearMotion:
         ω², as the inputs themselves are rounded, so that the slowest mode ω_1 turns by up to
         n ε ω² min(t², t/ω_1) / 2 rad more or less.
         """
-        state = _EnergyState.of(self)
+        state = _EnergyState.from_motion(self)
         values, rounding = state.moved(
             state.start, state.ground, self.record, self.record_step, times
         )
@@ -149,7 +151,7 @@ class _EnergyState:
     norm: float
 
     @classmethod
-    def of(cls, motion: LinearMotion) -> _EnergyState:
+    def from_motion(cls, motion: LinearMotion) -> _EnergyState:
         """The state of a motion."""
         n, lower = len(motion.mass), cholesky(motion.mass, lower=True)
 
@@ -280,9 +282,9 @@ def _taylor(flow: Array, degree: int, rows: Array, states: Array, times: Array) 
         series.append(series[-1] @ flow / i)
     terms, out = np.concatenate(series), []
     for some in np.array_split(times, -(-len(times) // AT_ONCE)):
-        place = np.minimum(some.astype(int), len(states) - 1)
-        within = (some - place)[:, None]
-        coefficient = (states[place] @ terms.T).reshape(len(some), degree + 1, len(rows))
+        piece = np.minimum(some.astype(int), len(states) - 1)
+        within = (some - piece)[:, None]
+        coefficient = (states[piece] @ terms.T).reshape(len(some), degree + 1, len(rows))
         value: Array = coefficient[:, degree]
         for i in reversed(range(degree)):  # Horner's scheme
             value = value * within + coefficient[:, i]

@@ -182,10 +182,10 @@ class Trial:
 
     def _named(self, level: int) -> Iterator[Array]:
         """Inputs that the envelope names at the peaks of a level."""
-        of = self.envelope
-        for o in range(len(of.outputs)):
-            yield of.upper_at[level, of.upper[level, :, o].argmax(), o]
-            yield of.lower_at[level, of.lower[level, :, o].argmin(), o]
+        envelope = self.envelope
+        for o in range(len(envelope.outputs)):
+            yield envelope.upper_at[level, envelope.upper[level, :, o].argmax(), o]
+            yield envelope.lower_at[level, envelope.lower[level, :, o].argmin(), o]
 
     def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
         """Refuse an envelope that the exact motion at one of some inputs (S, n) contradicts.
@@ -228,14 +228,14 @@ class _Check:
     @cached_property
     def between(self) -> Array:
         """What the envelope proves between nodes, (T, m); infinite where it proves nothing."""
-        of = self.envelope
-        return np.full(of.lower.shape[1:], np.inf) if of.between is None else of.between
+        bounds = self.envelope
+        return np.full(bounds.lower.shape[1:], np.inf) if bounds.between is None else bounds.between
 
     @property
     def least(self) -> Array:
         """Distance of attained bounds from the motion that rounding explains, shape (m,)."""
-        of = self.envelope
-        return np.asarray(ROUND_OFF * np.maximum(-of.lower, of.upper).max((0, 1)))
+        envelope = self.envelope
+        return np.asarray(ROUND_OFF * np.maximum(-envelope.lower, envelope.upper).max((0, 1)))
 
     @cached_property
     def slack(self) -> Array:
@@ -250,24 +250,24 @@ class _Check:
             (-1.0, self.envelope.proved.lower[level], "below the proved lower bound"),
         ):
             most = sign * _within_steps(sign * bound, self.between)
-            beyond = sign * (self.values - most) - self.rounding
-            self._require(beyond, most, f"{words} of α = {self._alpha(level)},")
+            excess = sign * (self.values - most) - self.rounding
+            self._require(excess, most, f"{words} of α = {self._alpha(level)},")
 
     def require_attained(self, level: int) -> None:
         """Refuse attained bounds that the motion at the inputs they name does not equal."""
-        of = self.envelope
-        if of.inner is None:
+        envelope = self.envelope
+        if envelope.inner is None:
             return
         rounding = self.rounding[::QUARTERS]
         for sign, at, inner, side in (
-            (1.0, of.upper_at[level], of.inner.upper[level], "upper"),
-            (-1.0, of.lower_at[level], of.inner.lower[level], "lower"),
+            (1.0, envelope.upper_at[level], envelope.inner.upper[level], "upper"),
+            (-1.0, envelope.lower_at[level], envelope.inner.lower[level], "lower"),
         ):
             more = sign * (self.values[::QUARTERS] - inner)
-            beyond = np.maximum(-more - self.least, more - self.slack) - rounding
-            beyond = np.where((at == self.point).all(-1), beyond, -np.inf)
+            excess = np.maximum(-more - self.least, more - self.slack) - rounding
+            excess = np.where((at == self.point).all(-1), excess, -np.inf)
             words = f"other than the attained {side} bound of α = {self._alpha(level)},"
-            self._require(beyond, inner, words, QUARTERS)
+            self._require(excess, inner, words, QUARTERS)
 
     def require_straight(self) -> None:
         """Refuse a motion that strays farther from straight lines between nodes than is proved."""
@@ -276,40 +276,40 @@ class _Check:
         line = np.concatenate([inside.reshape(-1, ends.shape[1]), ends[-1:]])
         allowed = self.between[1:] + np.maximum(self.slack[1:], self.slack[:-1])
         allowed = np.append(np.repeat(allowed, QUARTERS, axis=0), allowed[-1:], axis=0)
-        beyond = np.abs(self.values - line) - allowed - 2 * self.rounding
-        self._require(beyond, line, "farther than `between` from the straight line at")
+        excess = np.abs(self.values - line) - allowed - 2 * self.rounding
+        self._require(excess, line, "farther than `between` from the straight line at")
 
     def _alpha(self, level: int) -> str:
         return f"{self.envelope.alpha[level]:g}"
 
-    def _require(self, beyond: Array, bound: Array, words: str, stride: int = 1) -> None:
+    def _require(self, excess: Array, bound: Array, words: str, stride: int = 1) -> None:
         """Refuse numbers (…, m) above zero, or that are none, at every `stride`-th time.
 
         Raises:
             ContradictionError: There is one; the largest is named.
         """
-        if bool((beyond <= 0).all()):
+        if bool((excess <= 0).all()):
             return
-        worst = np.where(np.isnan(beyond), np.inf, beyond)
+        worst = np.where(np.isnan(excess), np.inf, excess)
         j, o = np.unravel_index(int(worst.argmax()), worst.shape)
-        of, value = self.envelope, self.values[j * stride, o]
-        unit = Output(of.outputs[o]).unit
-        inputs = zip(of.inputs, self.point, strict=True)
+        env, value = self.envelope, self.values[j * stride, o]
+        unit = Output(env.outputs[o]).unit
+        inputs = zip(env.inputs, self.point, strict=True)
         at = ", ".join(f"{name} = {float(x)!r}" for name, x in inputs)
         what = (
-            f"{of.outputs[o]} at t = {self.trial.times[j * stride]:g} s is {value:.9g} {unit} at"
-            f" {at}: {words} {bound[j, o]:.9g}, by {beyond[j, o]:.3g} more than rounding and what"
+            f"{env.outputs[o]} at t = {self.trial.times[j * stride]:g} s is {value:.9g} {unit} at"
+            f" {at}: {words} {bound[j, o]:.9g}, by {excess[j, o]:.3g} more than rounding and what"
             " is declared explain"
         )
         raise ContradictionError(what, self._table())
 
     def _table(self) -> dict[str, Array]:
         """Time, motion and attained bounds of the lowest level at the nodes, by column."""
-        of, table = self.envelope, {"time [s]": self.envelope.time}
-        for o, name in enumerate(of.named):
+        envelope, table = self.envelope, {"time [s]": self.envelope.time}
+        for o, name in enumerate(envelope.named):
             table[f"motion of {name}"] = self.values[::QUARTERS, o]
-            table[f"attained lower bound of {name}"] = of.attained.lower[0, :, o]
-            table[f"attained upper bound of {name}"] = of.attained.upper[0, :, o]
+            table[f"attained lower bound of {name}"] = envelope.attained.lower[0, :, o]
+            table[f"attained upper bound of {name}"] = envelope.attained.upper[0, :, o]
         return table
 
 

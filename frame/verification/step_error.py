@@ -53,26 +53,26 @@ def step_error(flow: UnitFlow) -> Array:
     return MARGIN * so_far
 
 
-def with_step_error(of: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
+def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     """The envelope with the time-stepping error in its errors.
 
     Args:
-        of: The envelope of the scheme's trajectories.
+        bounds: The envelope of the scheme's trajectories.
         flow: These trajectories.
         steps: From `step_error`, shape (T, m).
     """
     if not flow.flow.exact:
-        steps = np.maximum(steps, _at_bounds(of, flow.flow))
+        steps = np.maximum(steps, _at_bounds(bounds, flow.flow))
     alike = [unit == flow.units[flow.reference] for unit in flow.units]
-    error, basis = of.error + steps, of.basis
+    error, basis = bounds.error + steps, bounds.basis
     if steps.any():
         basis = (*basis, f"{flow.flow.method} steps of {flow.time[1]:g} s")
-    facts = {"step_error": float(steps[:, alike].max()), **of.facts}
+    facts = {"step_error": float(steps[:, alike].max()), **bounds.facts}
     facts["estimated_error"] = float((error / flow.scale).max())
-    return replace(of, error=error, basis=basis, facts=facts)
+    return replace(bounds, error=error, basis=basis, facts=facts)
 
 
-def _at_bounds(of: Envelope, flow: Flow) -> Array:
+def _at_bounds(bounds: Envelope, flow: Flow) -> Array:
     """Errors of a scheme from some points at which bounds are reached, (T, m).
 
     A structure may resonate between the corners, and the scheme at other parameters than the truth;
@@ -82,18 +82,18 @@ def _at_bounds(of: Envelope, flow: Flow) -> Array:
     Raises:
         StepError: The step is too coarse there.
     """
-    at, d = np.stack([of.lower_at, of.upper_at]), len(of.inputs)
-    peaks = np.abs([of.lower, of.upper]).argmax(2)[:, :, None, :, None]
+    at, d = np.stack([bounds.lower_at, bounds.upper_at]), len(bounds.inputs)
+    peaks = np.abs([bounds.lower, bounds.upper]).argmax(2)[:, :, None, :, None]
     highest = np.unique(np.take_along_axis(at, peaks, 2).reshape(-1, d), axis=0)
-    others = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
-    points = np.unique(np.vstack([highest, others[:OPTIMA]]), axis=0)
+    further_points = np.random.default_rng(0).permutation(np.unique(at.reshape(-1, d), axis=0))
+    points = np.unique(np.vstack([highest, further_points[:OPTIMA]]), axis=0)
     error = flow.deviations(points)[1].max(0)
     if isinstance(flow, LagrangianFlow):
-        error = np.maximum(error, _from_reference(of, flow, highest[:REFERENCES]))
+        error = np.maximum(error, _from_reference(bounds, flow, highest[:REFERENCES]))
     return np.asarray(MARGIN * np.maximum.accumulate(error, axis=0))
 
 
-def _from_reference(of: Envelope, flow: LagrangianFlow, points: Array) -> Array:
+def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Array:
     """Largest distance of trajectories at points (S, d) from reference motions, (T, m).
 
     Raises:
@@ -102,7 +102,9 @@ def _from_reference(of: Envelope, flow: LagrangianFlow, points: Array) -> Array:
     reference, parameters = ReferenceMotion(flow.system), flow.system.parameters
     truth = np.stack(
         [
-            reference.outputs({**parameters, **dict(zip(flow.names, point, strict=True))}, of.time)
+            reference.outputs(
+                {**parameters, **dict(zip(flow.names, point, strict=True))}, bounds.time
+            )
             for point in points
         ]
     )
@@ -128,17 +130,17 @@ def _enough(flow: LagrangianFlow, point: Array, truth: Array) -> str:
     return f"no step down to {fine.step:g} s would do; take a shorter duration or narrower inputs"
 
 
-def with_stray(of: Envelope, flow: UnitFlow) -> Envelope:
+def with_node_deviation(bounds: Envelope, flow: UnitFlow) -> Envelope:
     """The envelope with an estimate of what lies between its nodes; a proof is left as it is."""
-    if of.between is not None:
-        return of
+    if bounds.between is not None:
+        return bounds
     corners = flow.boxes.probes
-    between = stray(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
-    facts = {**of.facts, "between_nodes": float((between / flow.scale).max())}
-    return replace(of, between=between, facts=facts)
+    between = node_deviation(flow.flow, np.vstack([corners, (corners + flow.boxes.modal) / 2]))
+    facts = {**bounds.facts, "between_nodes": float((between / flow.scale).max())}
+    return replace(bounds, between=between, facts=facts)
 
 
-def stray(flow: Flow, points: Array) -> Array:
+def node_deviation(flow: Flow, points: Array) -> Array:
     """Estimate of how far outputs stray from straight lines between nodes, shape (T, m).
 
     Row j is that of the step that ends at node j, 0 for the first node.

@@ -58,7 +58,7 @@ def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
         none | {name: data[f"motion_{name}"].values[s] for name in axes} for s in range(len(points))
     ]
     fixed: dict[str, Any] = {"record": record, "record_step": step, "courses": courses}
-    return points, [LinearMotion(**each, **fixed) for each in arrays]
+    return points, [LinearMotion(**arrays_of_motion, **fixed) for arrays_of_motion in arrays]
 
 
 def _stored_courses(courses: Sequence[Course]) -> dict[str, tuple[tuple[str, ...], Array]]:
@@ -80,6 +80,6 @@ def _courses(data: xarray.Dataset) -> tuple[Course, ...]:
     ends = np.cumsum(numbers[:, 0]).astype(int)[:-1]
     samples = np.split(data["course_samples"].values, ends)
     return tuple(
-        Course(x, step, start, bool(held), frequency, phase)
-        for x, (_, step, start, held, frequency, phase) in zip(samples, numbers, strict=True)
+        Course(x, step, start, bool(is_held), frequency, phase)
+        for x, (_, step, start, is_held, frequency, phase) in zip(samples, numbers, strict=True)
     )

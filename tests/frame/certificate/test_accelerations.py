@@ -51,7 +51,7 @@ def test_the_damping_force_over_a_mass_is_bounded_closely() -> None:
     frame = StoreyFrame((1e4, 8e3), stiffness=(1e6, 6e5), damping_ratio=0.04, outputs=("a1", "a2"))
     cuts = boxes(box, (0.0,))
     model = fit_modes(LinearFlow(frame, cuts.names, 1.0, 0.05, Exact()), cuts)
-    ratio = RatioDamping.of(model)
+    ratio = RatioDamping.from_model(model)
     assert ratio is not None
     grid = _grid(model)
     parts = _expanded(grid, lambda unit: _structure(model, unit))

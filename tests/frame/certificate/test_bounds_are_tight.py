@@ -140,7 +140,7 @@ def test_boxes_given_up_within_the_gap_are_in_the_bound() -> None:
 
 def least_closed(tree: Tree) -> np.ndarray:
     """Of each problem the least target below which its whole box is closed, shape (N,)."""
-    frontier = Frontier.whole(len(tree.lower), tree.numbers)
+    frontier = Frontier.of_box(len(tree.lower), tree.numbers)
     low, high = (np.full(len(tree.best), end) for end in (-2.5, 2.5))
     for _ in range(30):
         target = (low + high) / 2

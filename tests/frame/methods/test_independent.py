@@ -6,7 +6,7 @@ import pytest
 from alphacut.frame import GraphFollower, ImprovedFollower, LagrangianFlow, envelope, pendulum
 from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.methods import graph_follower, improved_follower
-from alphacut.frame.methods.independent import beyond
+from alphacut.frame.methods.independent import independent_excess
 from alphacut.fuzzy import Interval, Nature
 
 METHODS = {graph_follower: GraphFollower(), improved_follower: ImprovedFollower()}
@@ -14,7 +14,9 @@ METHODS = {graph_follower: GraphFollower(), improved_follower: ImprovedFollower(
 
 @pytest.mark.parametrize("module", METHODS)
 def test_what_an_independent_sample_reaches_beyond_the_bounds_counts_twice(monkeypatch, module):
-    monkeypatch.setattr(module, "beyond", lambda flow, bounds: (np.full((1, 2), 30.0), 5))
+    monkeypatch.setattr(
+        module, "independent_excess", lambda flow, bounds: (np.full((1, 2), 30.0), 5)
+    )
     inputs, motion = {"l": Interval(0.99, 1.01)}, {"duration": 0.5, "step": 0.05, "alpha": (0,)}
     error = envelope(pendulum(), inputs, method=METHODS[module], **motion).error
     assert error == pytest.approx(60, abs=2)
@@ -26,9 +28,9 @@ def test_bounds_that_are_too_narrow_are_left_by_as_much():
     ends = flow.values(np.linspace(*flow.boxes.unit(0), 200))
     bounds = np.stack([-ends.min(0), ends.max(0)], axis=-1)[None]
     size = 0.1 * np.ptp(ends, axis=(0, 1))
-    missed, _ = beyond(flow, bounds - size[:, None])
+    missed, _ = independent_excess(flow, bounds - size[:, None])
     assert missed[0] == pytest.approx(size, rel=1e-2)
-    assert beyond(flow, bounds + size[:, None])[0].max() == 0
+    assert independent_excess(flow, bounds + size[:, None])[0].max() == 0
 
 
 @pytest.mark.parametrize(("start", "nature"), [(2.9, Nature.ESTIMATED), (3.14, Nature.ATTAINED)])

@@ -10,7 +10,7 @@ from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import ANY, Peaks, passing, peaks
 from alphacut.frame.questions.probability import _interval, probabilities
-from alphacut.frame.questions.tolerances import _judged, scaled, tolerances
+from alphacut.frame.questions.tolerances import _step_of, scaled, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
@@ -116,13 +116,15 @@ def test_the_scale_of_tolerances_is_kept_and_a_greater_one_passed():
         ONE, inputs, {"q1": limit}, duration=6, step=0.01, most=3, precision=0.003, error=2e-4
     )
     assert answer.nature is Nature.GUARANTEED
-    assert answer.kept <= answer.clear < answer.passed
-    assert answer.kept <= 1.4 <= answer.passed
-    assert answer.passed - answer.kept <= 0.03
+    assert answer.admissible <= answer.clear < answer.passed
+    assert answer.admissible <= 1.4 <= answer.passed
+    assert answer.passed - answer.admissible <= 0.03
     assert answer.supports["m1"] == pytest.approx(
-        (1000 - 100 * answer.kept, 1000 + 100 * answer.kept)
+        (1000 - 100 * answer.admissible, 1000 + 100 * answer.admissible)
     )
-    assert motions(ONE, scaled(inputs, answer.kept), 500, duration=6, step=0.01).max() <= limit
+    assert (
+        motions(ONE, scaled(inputs, answer.admissible), 500, duration=6, step=0.01).max() <= limit
+    )
 
 
 @pytest.mark.parametrize(("limit", "kept", "passed"), [(1e-3, None, 0.0), (9.0, 2.0, np.inf)])
@@ -130,7 +132,7 @@ def test_tolerances_at_their_ends(limit, kept, passed):
     answer = tolerances(
         ONE, {"m1": Triangular(900, 1000, 1100)}, {"q1": limit}, duration=2, step=0.01
     )
-    assert (answer.kept, answer.passed) == (kept, passed)
+    assert (answer.admissible, answer.passed) == (kept, passed)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +144,7 @@ def test_a_limit_between_what_is_reached_and_what_is_excluded_is_neither(limit, 
     found = Peaks(
         np.zeros(1), ("q1",), 0 * one, 1.9 * one, 0.1 * one, one, 0 * one, np.inf * one, name
     )
-    assert _judged(found, {"q1": limit})[:2] == (kept, passed)
+    assert _step_of(found, {"q1": limit})[:2] == (kept, passed)
 
 
 def speed(rng, count):
