@@ -26,7 +26,7 @@ HISTORY = (
 
 
 @dataclass(frozen=True)
-class Course:
+class ForceCourse:
     """Course of a force, and what its amplitudes are.
 
     Args:
@@ -40,7 +40,7 @@ class Course:
     size: float = 1.0
 
 
-def _course(value: object, info: ValidationInfo) -> Course:
+def _course(value: object, info: ValidationInfo) -> ForceCourse:
     """The course of a text such as "harmonic, 1.5 Hz, from 2 s"."""
     kind, *words = (word.strip() for word in str(value).split(","))
     static = [word for word in words if word == "static"]
@@ -54,17 +54,17 @@ def _course(value: object, info: ValidationInfo) -> Course:
         if kind == "harmonic":
             phase = quantity.number(numbers[1], "rad") if numbers[1:] else 0.0
             wave = History.harmonic(quantity.number(numbers[0], "1/s"), phase, start)
-            return Course(wave)
+            return ForceCourse(wave)
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
     if kind == "impulse":
-        return Course(None, "N*s")
+        return ForceCourse(None, "N*s")
     if kind == "step":
-        return Course(History.constant(start, is_static=bool(static)))
+        return ForceCourse(History.constant(start, is_static=bool(static)))
     return _of_file(kind, start, bool(static), info)
 
 
-def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> Course:
+def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceCourse:
     try:
         path = case_file(name, info)
     except RefusedError as error:
@@ -72,7 +72,7 @@ def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> 
     series = read_force_history(path)
     size = float(np.abs(series.samples).max()) if series.has_unit else 1.0
     history = History(series.step, np.asarray(series.samples / size), start, is_static=is_static)
-    return Course(history, "" if series.has_unit else "N", size)
+    return ForceCourse(history, "" if series.has_unit else "N", size)
 
 
 def _amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
@@ -96,7 +96,7 @@ class ForceSection(Section):
     unknowns, and their parameters are F1, F2 … in their order.
     """
 
-    history: Annotated[Course, text(_course)] = Field(
+    history: Annotated[ForceCourse, text(_course)] = Field(
         description="step, harmonic with frequency and phase, impulse, or a file; then its start"
     )
     amplitude: dict[str, Amplitude] = Field(
