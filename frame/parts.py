@@ -101,8 +101,8 @@ class _Tick:
         self.left = sum(part.work for part in waiting)
         self.done = [0.0] * len(batch)
 
-    def __call__(self, place: int, share: float) -> None:
-        self.done[place] = max(share, self.done[place])
+    def __call__(self, position: int, share: float) -> None:
+        self.done[position] = max(share, self.done[position])
         if self.progress is not None:
             pairs = zip(self.work, self.done, strict=True)
             left = self.left + sum(work * (1 - OWN_WORK * done) for work, done in pairs)
@@ -144,8 +144,8 @@ class Queue:
         self.refusals, self.refusal = 0, UnprovedError("nothing was tried")
         self.workers = self.proof.workers or os.cpu_count() or 1
         self.gap = self.proof.peak_gap(self.scale, self.peak)
-        whole = Part(self.boxes, [*range(shape[0])], np.ones(shape, bool), np.full(shape, np.inf))
-        self.open = [whole]
+        root = Part(self.boxes, [*range(shape[0])], np.ones(shape, bool), np.full(shape, np.inf))
+        self.open = [root]
         self.gap_shares = dict[Key, Array]()
         self.spent, self.begun = dict[Key, int](), dict[Key, float]()
         self.abandoned = set[Key]()
@@ -166,16 +166,16 @@ class Queue:
             while batch := self._next():
                 tick = _Tick(progress, self.open, batch)
                 goals = [
-                    self._goal(part, self.workers // len(batch), partial(tick, place))
-                    for place, part in enumerate(batch)
+                    self._goal(part, self.workers // len(batch), partial(tick, number))
+                    for number, part in enumerate(batch)
                 ]
                 found = list(pool.map(self._bounds, batch, goals))
                 for part, levels in zip(batch, found, strict=True):
                     self._settle(part, levels)
         except KeyboardInterrupt:
             self.open += batch
-            known = (np.isfinite(part.outer[part.needed]).all() for part in self.open)
-            if not interruptible or not all(known):
+            are_bounded = (np.isfinite(part.outer[part.needed]).all() for part in self.open)
+            if not interruptible or not all(are_bounded):
                 raise
             self.facts["interrupted"] = 1.0
             for part in self.open:
@@ -195,12 +195,12 @@ class Queue:
 
     def _drop_abandoned(self, part: Part) -> None:
         for k, level in enumerate(part.levels):
-            for own, output, side in self.abandoned:
-                if own == level and part.needed[k, :, output, side].any():
-                    place = (slice(None), output, side)
+            for abandoned_level, output, side in self.abandoned:
+                if abandoned_level == level and part.needed[k, :, output, side].any():
+                    entry = (slice(None), output, side)
                     mask = np.zeros_like(part.needed[k])
                     # a part that was refused before has no bounds to leave it with
-                    mask[place] = part.needed[k][place] & np.isfinite(part.outer[k][place])
+                    mask[entry] = part.needed[k][entry] & np.isfinite(part.outer[k][entry])
                     self._close(level, mask, part.outer[k])
                     part.needed[k] &= ~mask
 
@@ -215,9 +215,9 @@ class Queue:
 
     def _goal(self, part: Part, workers: int, tick: Progress) -> Goal:
         incumbent = np.stack([self._incumbent(level) for level in part.levels])
-        known = part.needed, part.outer, incumbent
+        arrays = part.needed, part.outer, incumbent
         last = self.refusals >= self.proof.parts - 1
-        return Goal(self.scale, self.peak, *known, max(workers, 1), last, tick)
+        return Goal(self.scale, self.peak, *arrays, max(workers, 1), last, tick)
 
     def _bounds(self, part: Part, goal: Goal) -> Sequence[PartBounds | UnprovedError]:
         path = None if self.store is None else self.store.path(part.boxes, goal)
@@ -238,23 +238,23 @@ class Queue:
         self.facts["parts"] += 1
         LOG.debug("part %d is bounded, %d are open", self.facts["parts"], len(self.open))
         for k, level in enumerate(part.levels):
-            if isinstance(own := found[k], PartBounds):
+            if isinstance(bounds := found[k], PartBounds):
                 part.outer[k] = np.where(
-                    part.needed[k], np.minimum(part.outer[k], own.outer), part.outer[k]
+                    part.needed[k], np.minimum(part.outer[k], bounds.outer), part.outer[k]
                 )
-                self._take(level, own)
+                self._take(level, bounds)
         votes, children = np.zeros(len(self.boxes.names)), list[Part]()
         wide = np.zeros_like(part.needed)
         for k, level in enumerate(part.levels):
-            if isinstance(own := found[k], PartBounds):
-                wide[k] = self._split(part, k, level, own, votes, children)
+            if isinstance(bounds := found[k], PartBounds):
+                wide[k] = self._split(part, k, level, bounds, votes, children)
             else:
                 wide[k] = part.needed[k]
-                self._refused(own, votes)
+                self._refused(bounds, votes)
         levels = [k for k in range(len(part.levels)) if wide[k].any()]
         if levels:
-            rest = part.restricted(levels, wide[levels])
-            children += rest.bisected(self._axis(rest.boxes, votes))
+            open_part = part.restricted(levels, wide[levels])
+            children += open_part.bisected(self._axis(open_part.boxes, votes))
         for child in children:
             child.work = (1 - OWN_WORK) * part.work / len(children)
         self._put(children)
@@ -266,19 +266,19 @@ class Queue:
         if refusal.along is not None:
             votes[refusal.along] += 1.0
 
-    def _take(self, level: int, own: PartBounds) -> None:
-        better = own.inner > self.inner[level]
-        self.inner[level][better], self.at[level][better] = own.inner[better], own.at[better]
-        self.between = np.maximum(self.between, own.between)
-        if own.attained_error is not None:
-            self.attained_error = np.maximum(self.attained_error, own.attained_error)
-        if own.least_peaks is not None:
+    def _take(self, level: int, bounds: PartBounds) -> None:
+        better = bounds.inner > self.inner[level]
+        self.inner[level][better], self.at[level][better] = bounds.inner[better], bounds.at[better]
+        self.between = np.maximum(self.between, bounds.between)
+        if bounds.attained_error is not None:
+            self.attained_error = np.maximum(self.attained_error, bounds.attained_error)
+        if bounds.least_peaks is not None:
             reached = self.least_reached[level]
-            self.least_reached[level] = np.minimum(reached, own.least_peaks.upper)
-        for name, value in own.facts.items():
-            known = self.facts.get(name)
-            if known is not None:
-                value = known + value if name in ADDED else max(known, value)
+            self.least_reached[level] = np.minimum(reached, bounds.least_peaks.upper)
+        for name, value in bounds.facts.items():
+            earlier = self.facts.get(name)
+            if earlier is not None:
+                value = earlier + value if name in ADDED else max(earlier, value)
             self.facts[name] = value
 
     def _split(
@@ -286,7 +286,7 @@ class Queue:
         part: Part,
         k: int,
         level: int,
-        own: PartBounds,
+        bounds: PartBounds,
         votes: Array,
         children: list[Part],
     ) -> Mask:
@@ -298,37 +298,39 @@ class Queue:
         needed, outer = part.needed[k], part.outer[k]
         top, worthless = self._incumbent(level) + self.gap[:, None], False
         above = needed & (outer > top)
-        if own.pruned is not None:
-            self._close(level, above, own.pruned)
+        if bounds.pruned is not None:
+            self._close(level, above, bounds.pruned)
         for output, side in _peaks(above):
             key = (level, output, side)
             peak = float(outer[:, output, side].max())
-            self.gap_shares[key] = own.shares[output, side]
-            if self._is_hopeless(key, peak, own.shares[output, side]):
+            self.gap_shares[key] = bounds.shares[output, side]
+            if self._is_hopeless(key, peak, bounds.shares[output, side]):
                 self.abandoned.add(key)
                 above[:, output, side] = False
             elif peak > top[output, side] + WIDE * self.peak[output]:
-                votes += own.shares[output, side]
+                votes += bounds.shares[output, side]
                 worthless = True
         if worthless:
             return np.asarray(needed)
         if needed.all():  # parts of this one are asked for their largest peaks alone
-            least = 0.0 if own.least_peaks is None else own.least_peaks.lower
+            least = 0.0 if bounds.least_peaks is None else bounds.least_peaks.lower
             self.least_peaks[level] = np.minimum(self.least_peaks[level], least)
         self._close(level, needed & ~above, outer)
         for output, side in _peaks(above):
-            votes += own.shares[output, side]
-            ends = None if own.remaining is None else own.remaining[:, output, side]
+            votes += bounds.shares[output, side]
+            ends = None if bounds.remaining is None else bounds.remaining[:, output, side]
             if ends is None or not self._narrowed(part.boxes.on_levels([k]), ends):
                 continue
             mask = np.zeros_like(above)
             mask[:, output, side] = above[:, output, side]
             above = above & ~mask
-            rest = part.restricted([k], mask[None])
-            rest.boxes, pruned = rest.boxes.within(*ends), rest.boxes.radius
-            share = 1 - rest.boxes.radius / np.where(pruned > 0, pruned, 1.0)
-            whole = [rest] if share[pruned > 0].sum() >= NARROWED else []
-            children += whole or rest.bisected(self._axis(rest.boxes, own.shares[output, side]))
+            open_part = part.restricted([k], mask[None])
+            open_part.boxes, pruned = open_part.boxes.within(*ends), open_part.boxes.radius
+            share = 1 - open_part.boxes.radius / np.where(pruned > 0, pruned, 1.0)
+            unpruned = [open_part] if share[pruned > 0].sum() >= NARROWED else []
+            children += unpruned or open_part.bisected(
+                self._axis(open_part.boxes, bounds.shares[output, side])
+            )
         return np.asarray(above)
 
     @staticmethod
@@ -338,18 +340,18 @@ class Queue:
     def _is_hopeless(self, key: Key, peak: float, shares: Array) -> bool:
         """True where a gap falls too slowly, or too many inputs share it."""
         level, output, side = key
-        others = [
+        rest_of_queue = [
             float(part.outer[k, :, output, side][part.needed[k, :, output, side]].max(initial=0))
             for part in self.open
-            for k, own in enumerate(part.levels)
-            if own == level
+            for k, own_level in enumerate(part.levels)
+            if own_level == level
         ]
         top, most = self._incumbent(level)[output, side], self.proof.parts
-        gap = max([peak, *(bound for bound in others if np.isfinite(bound))]) - top
+        gap = max([peak, *(bound for bound in rest_of_queue if np.isfinite(bound))]) - top
         count = self.spent[key] = self.spent.get(key, 0) + 1
-        begun = self.begun.setdefault(key, gap)
-        even = (begun - self.gap[output]) * count / most
-        if count >= GRACE and gap > begun - MIN_PROGRESS * even:
+        first_gap = self.begun.setdefault(key, gap)
+        even = (first_gap - self.gap[output]) * count / most
+        if count >= GRACE and gap > first_gap - MIN_PROGRESS * even:
             return True
         after = gap * 2.0 ** (-FALL * halvings(shares, most))
         return count > most or (gap > WIDE * self.peak[output] and after > 2 * self.gap[output])
@@ -363,8 +365,8 @@ class Queue:
         if key not in self.gap_shares or gaps[key] * self.peak[key[1]] <= self.gap[key[1]]:
             return
         shares = self.gap_shares[key]
-        first = [place for place in np.argsort(-shares)[:NAMED] if shares[place] > 0]
-        words = ", ".join(f"{self.boxes.names[place]} {shares[place]:.0%}" for place in first)
+        first = [axis for axis in np.argsort(-shares)[:NAMED] if shares[axis] > 0]
+        words = ", ".join(f"{self.boxes.names[axis]} {shares[axis]:.0%}" for axis in first)
         if first:
             name = self.boxes.names[first[0]]
             yield (
@@ -408,7 +410,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         UnprovedError: The system is not linear, its motion not the exact one, or bounds are not
             proved.
     """
-    begun, linear, cuts = time.perf_counter(), exact_flow(flow.flow), flow.boxes
+    start_time, linear, cuts = time.perf_counter(), exact_flow(flow.flow), flow.boxes
     with refusing():
         proof.forecast(linear, cuts)
     store = None if flow.store is None else PartStore(flow.store, _problem(proof, flow))
@@ -451,7 +453,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
         least_peaks=least_peaks,
         attained_error=queue.attained_error if queue.attained_error.any() else None,
         evaluations=int(facts.pop("evaluations", inner.size)),
-        seconds=time.perf_counter() - begun,
+        seconds=time.perf_counter() - start_time,
         facts=facts,
         notes=(*queue.notes(outer, inner),),
     )
@@ -474,6 +476,6 @@ def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None
     wrong = ~(inner <= outer)
     if wrong.any():
         output = outputs[int(np.argwhere(wrong)[0, 2])]
-        beyond = np.nanmax(np.where(wrong, inner - outer, np.nan))
-        what = f"attained bounds of {output} lie outside the proved ones by {beyond:.3g}"
+        excess = np.nanmax(np.where(wrong, inner - outer, np.nan))
+        what = f"attained bounds of {output} lie outside the proved ones by {excess:.3g}"
         raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")

@@ -38,9 +38,9 @@ class Jet:
     def constant(cls, value: ArrayLike, directions: int, bends: int | None = None) -> Jet:
         """A jet without dependence on any of `directions` parameters; `bends` is 0 or the same."""
         array = np.asarray(value, float)
-        both = (directions if bends is None else bends,) * 2
+        counts = (directions if bends is None else bends,) * 2
         first = np.zeros((directions, *array.shape))
-        return cls(array, first, np.zeros((*both, *array.shape)))
+        return cls(array, first, np.zeros((*counts, *array.shape)))
 
     def like(self, value: ArrayLike) -> Jet:
         """A constant with as many derivatives as this jet."""

@@ -53,8 +53,8 @@ def places(lists: Rows, d: int) -> Rows:
 def product_places(d: int, m: int, q: int) -> Rows:
     """Places of the products of all monomials of degree m with all of degree q, shape (M, Q)."""
     a, b = monomials(d, m), monomials(d, q)
-    both = np.concatenate([np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))], axis=1)
-    return places(np.sort(both, axis=1), d).reshape(len(a), len(b))
+    pairs = np.concatenate([np.repeat(a, len(b), axis=0), np.tile(b, (len(a), 1))], axis=1)
+    return places(np.sort(pairs, axis=1), d).reshape(len(a), len(b))
 
 
 @cache

@@ -79,8 +79,8 @@ def product(real: Array, coefficients: Array) -> Array:
     if not np.iscomplexobj(coefficients):
         return real @ coefficients
     flat = np.ascontiguousarray(coefficients).view(float)
-    both: Array = (real @ flat).view(complex)
-    return both
+    values: Array = (real @ flat).view(complex)
+    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,17 +123,17 @@ class Polynomial:
     def jets(self, u: Array) -> Array:
         """Values, gradients and Hessians (upper triangle) at (S, d), shape (S, q, K)."""
         B, parts = basis(u, self.index), [self.coefficients, *self._packed]
-        both = np.hstack([product(B[:, : len(part)], part) for part in parts])
-        return both.reshape(len(u), -1, self.coefficients.shape[1])
+        tables = np.hstack([product(B[:, : len(part)], part) for part in parts])
+        return tables.reshape(len(u), -1, self.coefficients.shape[1])
 
     @cached_property
     def _packed(self) -> list[Array]:
         """Coefficients of all first and all second derivatives side by side, without zero rows."""
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
-        every = (self.slope, self.curve[np.triu_indices(d)])
+        derivatives = (self.slope, self.curve[np.triu_indices(d)])
         counts = (terms(d, max(degree - k, 0)) for k in (1, 2))
-        both = zip(every, counts, strict=True)
-        return [x[:, :n].swapaxes(0, 1).reshape(n, -1) for x, n in both]
+        arrays_and_counts = zip(derivatives, counts, strict=True)
+        return [x[:, :n].swapaxes(0, 1).reshape(n, -1) for x, n in arrays_and_counts]
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:
@@ -174,13 +174,13 @@ class LowerGrid:
     @cached_property
     def index(self) -> Index:
         """Exponents of the terms, shape (S, d)."""
-        rows, spent = np.zeros((1, 0), np.int64), np.zeros(1, np.int64)
+        rows, total_degree = np.zeros((1, 0), np.int64), np.zeros(1, np.int64)
         for degree in self.degrees:
-            count = degree + 1 + self.excess - spent
+            count = degree + 1 + self.excess - total_degree
             which = np.repeat(np.arange(len(rows)), count)
-            own = np.concatenate([np.arange(most) for most in count])
-            rows = np.column_stack([rows[which], own])
-            spent = spent[which] + np.maximum(own - degree, 0)
+            degrees = np.concatenate([np.arange(most) for most in count])
+            rows = np.column_stack([rows[which], degrees])
+            total_degree = total_degree[which] + np.maximum(degrees - degree, 0)
         return rows
 
     @property
@@ -209,29 +209,31 @@ class LowerGrid:
 
     def _along(self, axis: int, factor: Array) -> csr_array:
         """A triangular matrix along one axis, on all terms."""
-        own = self.index[:, axis]
+        degrees = self.index[:, axis]
         weights = len(factor) ** np.arange(len(self.degrees))
         order = np.argsort(keys := self.index @ weights)
         rows, columns = [], []
-        for drop in range(int(own.max()) + 1):
-            high = np.flatnonzero(own >= drop)
+        for drop in range(int(degrees.max()) + 1):
+            high = np.flatnonzero(degrees >= drop)
             low = order[np.searchsorted(keys[order], keys[high] - drop * weights[axis])]
             rows.append(high)
             columns.append(low)
         high, low = np.concatenate(rows), np.concatenate(columns)
         down = bool(factor[-1, 0])  # a lower triangle takes from the terms below
-        to, of = (high, low) if down else (low, high)
-        return csr_array((factor[own[to], own[of]], (to, of)), shape=(len(own),) * 2)
+        to, source = (high, low) if down else (low, high)
+        return csr_array(
+            (factor[degrees[to], degrees[source]], (to, source)), shape=(len(degrees),) * 2
+        )
 
 
 @lru_cache
 def leja(count: int) -> Array:
     """Leja points on [−1, 1], each as far from those before it as it can be, shape (count,)."""
     places = np.cos(np.linspace(0, np.pi, 4001))
-    points, apart = [0.0], np.abs(places)
+    points, distances = [0.0], np.abs(places)
     while len(points) < count:
-        points.append(float(places[apart.argmax()]))
-        apart = apart * np.abs(places - points[-1])
+        points.append(float(places[distances.argmax()]))
+        distances = distances * np.abs(places - points[-1])
     return np.array(points)
 
 

@@ -93,8 +93,8 @@ class _Writer:
 
     def _apply(self, name: str, x: int, y: int | None = None) -> int:
         """Place of an operation's result, which is one that was made before where there is one."""
-        known = {"Add": "add", "Mul": "multiply"}.get(name, name)
-        row = (OPERATIONS.index(known), x, x if y is None else y)
+        instruction = {"Add": "add", "Mul": "multiply"}.get(name, name)
+        row = (OPERATIONS.index(instruction), x, x if y is None else y)
         if row not in self.made:
             self.code.append(row)
             self.made[row] = self.arguments + len(self.code) - 1

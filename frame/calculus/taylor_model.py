@@ -146,8 +146,8 @@ class TaylorModel:
 
     def cut(self, order: int) -> TaylorModel:
         """The same to a lower order, with the sizes of what is dropped in the rest."""
-        rest = self.rest + sum(self.sizes()[order + 1 :])
-        return TaylorModel(self.parts[: order + 1], np.asarray(rest), self.inputs, order)
+        remainder = self.rest + sum(self.sizes()[order + 1 :])
+        return TaylorModel(self.parts[: order + 1], np.asarray(remainder), self.inputs, order)
 
     def to_order(self, order: int) -> TaylorModel:
         """The same, whose products are kept to another order."""
@@ -270,18 +270,18 @@ class TaylorModel:
         self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
     ) -> TaylorModel:
         """A linear map by numbers, sums of `terms`, under which the rest is not negative."""
-        rest = np.asarray(bilinear(self.rest, np.abs(factor))) * (1 + gamma(terms + 2))
+        remainder = np.asarray(bilinear(self.rest, np.abs(factor))) * (1 + gamma(terms + 2))
         rounding = gamma(terms) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
-        return TaylorModel(parts, rest + rounding, self.inputs, self.order)
+        return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
 
 
 def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
     """Joins Taylor models along a negative `axis` of V."""
     degrees = range(max(len(x.parts) for x in models))
     parts = tuple(np.concatenate([x.part(k) for x in models], axis) for k in degrees)
-    rest = np.concatenate([x.rest for x in models], axis)
-    return TaylorModel(parts, rest, models[0].inputs, max(x.order for x in models))
+    remainder = np.concatenate([x.rest for x in models], axis)
+    return TaylorModel(parts, remainder, models[0].inputs, max(x.order for x in models))
 
 
 def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
@@ -334,11 +334,11 @@ def solve(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
         matrix, right, order = matrix.cut(0), right.cut(0), 0
     first, parts = np.linalg.inv(matrix.value), list[Array]()
     for degree in range(order + 1):
-        known = right.part(degree)
+        right_side = right.part(degree)
         for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
             pair = (k, degree - k)
-            known = known - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
-        parts.append(first @ known)
+            right_side = right_side - convolve(matrix.parts[k], parts[degree - k], pair, d, matmul)
+        parts.append(first @ right_side)
     found = TaylorModel(tuple(parts), np.zeros(right.shape), d, order)
     return found.loosened(inverse_bound(matrix) @ (matrix @ found - right).size())
 
@@ -363,9 +363,9 @@ def _product(
     """
     d, order, ndim = a.inputs, max(a.order, b.order), max(a.rest.ndim, b.rest.ndim)
     s, t = a.sizes(), b.sizes()
-    rest = bilinear(a.rest, np.asarray(sum(t)) + b.rest) + bilinear(np.asarray(sum(s)), b.rest)
+    remainder = bilinear(a.rest, np.asarray(sum(t)) + b.rest) + bilinear(np.asarray(sum(s)), b.rest)
     degrees = range(min(order, len(s) + len(t) - 2) + 1)
-    parts = [np.zeros((count(d, k), *rest.shape)) for k in degrees]
+    parts = [np.zeros((count(d, k), *remainder.shape)) for k in degrees]
     inner = a.shape[-1] if bilinear == matmul else 1
     for i, x in enumerate(a.parts):
         for j, y in enumerate(b.parts):
@@ -373,6 +373,6 @@ def _product(
             if i + j <= order:
                 parts[i + j] += convolve(_padded(x, ndim), _padded(y, ndim), (i, j), d, bilinear)
                 share = gamma(inner * comb(i + j, i) + i + j + 1)
-            rest = rest + share * bilinear(s[i], t[j])
-    rest = rest * (1 + gamma(inner + (order + 1) ** 2))
-    return TaylorModel(tuple(parts), np.asarray(rest), d, order)
+            remainder = remainder + share * bilinear(s[i], t[j])
+    remainder = remainder * (1 + gamma(inner + (order + 1) ** 2))
+    return TaylorModel(tuple(parts), np.asarray(remainder), d, order)

@@ -248,19 +248,21 @@ def _error(
     """Bound of the rounding of Σ r c e, shape (N,)."""
     (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))
     e, n = np.abs(wave.value), wave.value.shape[-1]
-    own = (r * c * wave.error + (r_error * c + r * c_error) * e).sum(-1)
-    own += gamma(n + 6) * (r * c * e).sum(-1)
+    error = (r * c * wave.error + (r_error * c + r * c_error) * e).sum(-1)
+    error += gamma(n + 6) * (r * c * e).sum(-1)
     squared, anywhere = modal.squared[point], wave.slope_anywhere
-    apart = np.abs(squared[:, :, None] - squared[:, None])
+    gaps = np.abs(squared[:, :, None] - squared[:, None])
     least = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
     cap = least + np.maximum(anywhere[:, :, None], anywhere[:, None])
     diagonal = np.eye(n, dtype=bool)
-    divided = np.minimum((e[:, :, None] + e[:, None]) / np.where(apart > 0, apart, 1e-300), cap)
-    divided = np.where(diagonal, wave.slope[:, None], divided)
-    couplings = modal.stiffness_error[point] * divided
-    own += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
-    own += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)
-    return np.asarray(own)
+    difference_quotient = np.minimum(
+        (e[:, :, None] + e[:, None]) / np.where(gaps > 0, gaps, 1e-300), cap
+    )
+    difference_quotient = np.where(diagonal, wave.slope[:, None], difference_quotient)
+    couplings = modal.stiffness_error[point] * difference_quotient
+    error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)
+    error += np.einsum("sj,sjk,sk->s", r * e, modal.mass_error[point], c, optimize=True)
+    return np.asarray(error)
 
 
 @dataclass(frozen=True, eq=False)

@@ -131,8 +131,8 @@ def subspace_series(
     """
     mass, stiffness, d = centre.mass, centre.stiffness, centre.mass.inputs
     middle = centre.squared[block]
-    apart = np.stack([centre.apart(x) for x in middle])
-    apart[:, block] = np.inf
+    gaps = np.stack([centre.apart(x) for x in middle])
+    gaps[:, block] = np.inf
     if lower is None:
         unit = np.eye(len(centre.basis))[block][None]
         lower = [np.diag(middle)[None]], [unit], [unit]
@@ -152,7 +152,7 @@ def subspace_series(
         for a in range(1, m):
             right += convolve(rate[a], moved[m - a], (a, m - a), d, matmul)
         rate.append(-right[:, :, block])
-        shape.append(right / apart)
+        shape.append(right / gaps)
         weight = np.arange(len(centre.basis)) < centre.modes
         moved.append(of_mass + shape[m] * weight)
     return rate, shape, moved
@@ -204,7 +204,7 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Bl
     L = TaylorModel(tuple(rate), np.zeros(rotation.shape), **order)
     x = TaylorModel(tuple(shape), np.zeros(shape[0].shape[1:]), **order)
     rounding = _rounding(x, mass, 0)
-    Mx = TaylorModel(tuple(moved), _beyond(mass, x.sizes(), N) + rounding, **order)
+    Mx = TaylorModel(tuple(moved), _higher_terms(mass, x.sizes(), N) + rounding, **order)
     pencils = [
         Pencil.of([part[:, j, j] for part in rate], mass, stiffness) for j in range(len(block))
     ]
@@ -238,13 +238,13 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Bl
     return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ data.heavy), norm)
 
 
-def _beyond(mass: TaylorModel, x: list[Array], N: int) -> Array:
+def _higher_terms(mass: TaylorModel, x: list[Array], N: int) -> Array:
     """Bound of what M x̃ has above degree N, shape (p, n)."""
     sizes = mass.sizes()
-    beyond = np.asarray(sum(x) @ mass.rest)
+    higher = np.asarray(sum(x) @ mass.rest)
     for b in range(1, len(sizes)):
-        beyond = beyond + sum(x[max(N + 1 - b, 0) :], np.zeros_like(x[0])) @ sizes[b]
-    return beyond
+        higher = higher + sum(x[max(N + 1 - b, 0) :], np.zeros_like(x[0])) @ sizes[b]
+    return higher
 
 
 def _terms(n: int, p: int, degree: int) -> int:
@@ -355,6 +355,6 @@ class _Unknowns:
         for j, system in enumerate(systems):
             new_Y[j, o] = system.solved(right[j, o])
         W = Y @ self.side.T
-        own = self.missed @ self.size.T + Y @ self.missed.T + self.difference * W
-        own = own + W @ F.T + F @ W + 2 * E @ W
-        return new_Y, own @ self.inverse_norm
+        within = self.missed @ self.size.T + Y @ self.missed.T + self.difference * W
+        within = within + W @ F.T + F @ W + 2 * E @ W
+        return new_Y, within @ self.inverse_norm

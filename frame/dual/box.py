@@ -93,13 +93,13 @@ class Box:
 
     def attained_with_error(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array]:
         """Values of outputs at nodes for unit coordinates (S, d) and their rounding, each (S,)."""
-        points, place = np.unique(unit, axis=0, return_inverse=True)
+        points, index = np.unique(unit, axis=0, return_inverse=True)
         found, count = np.empty((2, len(unit))), self._points_at_once
         for first in range(0, len(points), count):
             modal = self._modal(points[first : first + count])
-            inside = np.flatnonzero((place >= first) & (place < first + count))
+            inside = np.flatnonzero((index >= first) & (index < first + count))
             for some in np.array_split(inside, -(-len(inside) // count)):
-                motions = self._motions(modal, place[some] - first, node[some], output[some])
+                motions = self._motions(modal, index[some] - first, node[some], output[some])
                 found[:, some] = motions
         return found[0], found[1]
 
@@ -147,7 +147,7 @@ class Box:
     def _stray(self, modal: Modal) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
         total, m = self._shape
-        stray, outputs = np.zeros((total, m)), np.arange(m)
+        deviation, outputs = np.zeros((total, m)), np.arange(m)
         read = np.abs(modal.read(np.zeros(m, int), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
@@ -155,17 +155,19 @@ class Box:
             for source, share in modal.share.items():
                 for o in outputs:
                     wave = oscillator.waves(source, int(modal.order[o]))
-                    stray[:, o] += read[o, k] * abs(share[0, k]) * wave.stray
-        return stray
+                    deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.stray
+        return deviation
 
 
 def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array) -> Classical:
     """The structure over a box of its inputs."""
     active, centre, radius = np.flatnonzero(high > low), (low + high) / 2, (high - low) / 2
     inputs, d = TaylorModel.variables(centre[active], radius[active]), len(active)
-    own = {name: float(x) for name, x in zip(names, centre, strict=True)}
-    p = {name: TaylorModel.constant(x, d) for name, x in {**system.parameters, **own}.items()}
-    p |= {names[int(i)]: inputs[place] for place, i in enumerate(active)}
+    parameters = {name: float(x) for name, x in zip(names, centre, strict=True)}
+    p = {
+        name: TaylorModel.constant(x, d) for name, x in {**system.parameters, **parameters}.items()
+    }
+    p |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
     return classical(system, p)
 
 

@@ -98,16 +98,16 @@ def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
     massive = np.asarray(mass.size().any(1))
     M, K, n = mass.value, stiffness.value, len(massive)
     a, b = np.flatnonzero(massive), np.flatnonzero(~massive)
-    own, turn = np.linalg.eigh(K[np.ix_(b, b)])
-    _require_stiff(own, K)
-    follow = -(turn / own) @ turn.T @ K[np.ix_(b, a)]
+    values, turn = np.linalg.eigh(K[np.ix_(b, b)])
+    _require_stiff(values, K)
+    follow = -(turn / values) @ turn.T @ K[np.ix_(b, a)]
     light = np.linalg.inv(np.linalg.cholesky(M[np.ix_(a, a)]))
     squared, turned = np.linalg.eigh(light @ (K[np.ix_(a, a)] + K[np.ix_(a, b)] @ follow) @ light.T)
     _require_stiff(squared, squared)
     basis: Array = np.zeros((n, n))
     basis[a, : len(a)] = light.T @ turned
     basis[b, : len(a)] = follow @ light.T @ turned
-    basis[b, len(a) :] = turn * np.sqrt(squared[-1] / own)
+    basis[b, len(a) :] = turn * np.sqrt(squared[-1] / values)
     used = np.union1d(mass.present(), stiffness.present())
     used = used if len(used) else np.arange(1)
     heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
@@ -119,8 +119,8 @@ def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
 def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
     """The same with a diagonal in the middle, which it has but for rounding, put into the rest."""
     middle = np.diag(diagonal)
-    rest = matrix.rest + np.abs(matrix.value - middle)
-    return TaylorModel((middle[None], *matrix.parts[1:]), rest, matrix.inputs, matrix.order)
+    remainder = matrix.rest + np.abs(matrix.value - middle)
+    return TaylorModel((middle[None], *matrix.parts[1:]), remainder, matrix.inputs, matrix.order)
 
 
 def _require_stiff(values: Array, like: Array) -> None:

@@ -53,7 +53,7 @@ class Coupling:
         """
         loads, time, sources = excitation
         table = Oscillators(self._grid(float(time[-1])), loads, time)
-        added, stray = (np.zeros((len(time), len(orders))) for _ in range(2))
+        added, deviation = (np.zeros((len(time), len(orders))) for _ in range(2))
         for order in np.unique(orders):
             o = np.flatnonzero(orders == order)
             for s, source in enumerate(sources):
@@ -61,8 +61,8 @@ class Coupling:
                 half = np.ptp(wave.value, axis=(1, 2)) / 2 + wave.error
                 by_slope = np.outer(self._slope(wave, source), self.slope[s, o])
                 added[:, o] += np.minimum(by_slope, 2 * np.outer(half, self.size[s, o]))
-                stray[:, o] += np.outer(wave.stray, self.size[s, o])
-        return added, stray
+                deviation[:, o] += np.outer(wave.stray, self.size[s, o])
+        return added, deviation
 
     def _grid(self, duration: float) -> Grid:
         """Points over the block's ranges."""

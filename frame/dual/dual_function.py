@@ -238,7 +238,7 @@ def most_of_mode(
 
 
 @loops
-def cancelled(mu: Array, data: Data) -> float:
+def remainder_bound(mu: Array, data: Data) -> float:
     """Bound of Σ μ (cubic part) over the box, less what D(μ) has expected of it."""
     total, expected = np.zeros(data.cubic.shape[1]), 0.0
     for z in range(len(mu)):
@@ -297,14 +297,14 @@ def minimise(
             mu[:], direction[:] = best, 0.0
             if drop < 0.1 * (target - aim):
                 break
-        elif not deflected(mu, gradient, direction, value - least + drop):
+        elif not deflect(mu, gradient, direction, value - least + drop):
             break
     mu[:] = best
-    return least + cancelled(mu, data)
+    return least + remainder_bound(mu, data)
 
 
 @loops
-def deflected(mu: Array, gradient: Array, direction: Array, gain: float) -> bool:
+def deflect(mu: Array, gradient: Array, direction: Array, gain: float) -> bool:
     """Move μ against the gradient and what is left of the last direction.
 
     Returns:
@@ -314,10 +314,10 @@ def deflected(mu: Array, gradient: Array, direction: Array, gain: float) -> bool
     for z in range(len(mu)):
         along += gradient[z] * direction[z]
         length += direction[z] ** 2
-    kept = -1.5 * along / length if along < 0 and length > 0 else 0.0
+    weight = -1.5 * along / length if along < 0 and length > 0 else 0.0
     length = 0.0
     for z in range(len(mu)):
-        direction[z] = gradient[z] + kept * direction[z]
+        direction[z] = gradient[z] + weight * direction[z]
         length += direction[z] ** 2
     if length < 1e-24:
         return False

@@ -214,8 +214,8 @@ def _ends(x: TaylorModel) -> Ends:
     return float(low), float(high)
 
 
-def _overlap(one: Ends, other: Ends) -> Ends:
-    return max(one[0], other[0]), min(one[1], other[1])
+def _overlap(first: Ends, second: Ends) -> Ends:
+    return max(first[0], second[0]), min(first[1], second[1])
 
 
 def _places(points: Array, ends: Ends) -> tuple[int, int]:

@@ -39,11 +39,11 @@ def least_peak(level: Level, output: int) -> tuple[float, Array]:
     motion = np.einsum("ks,kstp->ktp", data.share, data.table)  # of each mode at its points
     lead = int(np.abs(motion).max((1, 2)).argmax())
     middle = [_middle(data.ends[k], int(data.points[0])) for k in range(len(motion))]
-    others = sum(motion[k][:, middle[k]] for k in range(len(motion)) if k != lead)
+    other_modes = sum(motion[k][:, middle[k]] for k in range(len(motion)) if k != lead)
     lowest = np.inf
     at: Array = np.zeros(data.linear.shape[1])
     for cell in _cells(data.ends[lead]):
-        expected = motion[lead][:, _middle(cell, int(data.points[0]))] + others
+        expected = motion[lead][:, _middle(cell, int(data.points[0]))] + other_modes
         value, u = _largest_least(sides, cell, lead, expected)
         if value < lowest:
             lowest, at = value, u

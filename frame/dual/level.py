@@ -67,11 +67,11 @@ def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -
     points, different = _points(single, float(time[-1])), sorted(map(int, set(orders)))
     grids = [spanned(mode.omega_range, mode.quotient_range, points) for mode in single]
     modes = [_responses(grid, loads, time, sources, different) for grid in grids]
-    made = [{o: np.stack([mode[o][i] for mode in modes]) for o in different} for i in range(3)]
+    stacked = [{o: np.stack([mode[o][i] for mode in modes]) for o in different} for i in range(3)]
     count = roundings(len(single), len(sources), single[0].omega.inputs)
-    of_sums = {o: 2 * gamma(count) * np.abs(made[0][o]).max(-1) for o in different}
-    error = {o: made[1][o] + of_sums[o] for o in different}
-    return Tables(made[0], error, made[2], grids, time)
+    of_sums = {o: 2 * gamma(count) * np.abs(stacked[0][o]).max(-1) for o in different}
+    error = {o: stacked[1][o] + of_sums[o] for o in different}
+    return Tables(stacked[0], error, stacked[2], grids, time)
 
 
 def _responses(
@@ -83,13 +83,13 @@ def _responses(
 ) -> dict[int, tuple[Array, Array, Array]]:
     """Responses over a grid (sources, T, Q W), their error and stray (sources, T), by order."""
     oscillators = Oscillators(grid, loads, time)
-    made = {}
+    responses = {}
     for order in orders:
         waves = [oscillators.waves(source, order) for source in sources]
         value = np.stack([wave.value.reshape(len(time), -1) for wave in waves])
         error = np.stack([wave.error for wave in waves])
-        made[order] = value, error, np.stack([wave.stray for wave in waves])
-    return made
+        responses[order] = value, error, np.stack([wave.stray for wave in waves])
+    return responses
 
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
@@ -193,15 +193,15 @@ class Level:
 
     def stray(self) -> Array:
         """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
-        made = self.tables
+        tables = self.tables
         columns = []
         for o in range(len(self.structure.order)):
             order = int(self.structure.order[o])
-            total: Array = np.zeros(len(made.time))
+            total: Array = np.zeros(len(tables.time))
             for k, mode in enumerate(self.single):
-                total = total + mode.share.size()[:, o] @ made.stray[order][k]
-            for rest in self.models.rests:
-                total = total + rest.stray[:, o]
+                total = total + mode.share.size()[:, o] @ tables.stray[order][k]
+            for truncated in self.models.rests:
+                total = total + truncated.stray[:, o]
             columns.append(total + self.models.strays[:, o])
         return np.stack(columns, -1)
 
@@ -267,11 +267,11 @@ class Problem:
         self.out[0, nodes] = np.minimum(self.out[0, nodes], out[0])
 
 
-def _ends(every: Sequence[Sequence[TaylorModel]]) -> tuple[Array, Array]:
+def _ends(models_of_modes: Sequence[Sequence[TaylorModel]]) -> tuple[Array, Array]:
     """Centres and radii of variables, one row a mode."""
     return (
-        np.array([[float(x.value) for x in row] for row in every]),
-        np.array([[_spread(x) for x in row] for row in every]),
+        np.array([[float(x.value) for x in row] for row in models_of_modes]),
+        np.array([[_spread(x) for x in row] for row in models_of_modes]),
     )
 
 
@@ -295,37 +295,41 @@ def _tables(level: Level, o: int) -> list[Array]:
 
 def _models(level: Level, o: int) -> list[Array]:
     """The next fields of `Data`: scaled models of all variables."""
-    every = [
+    models = [
         x
         for mode in level.single
         for x in (mode.omega, mode.decay, *(mode.share[s, o] for s in range(len(level.sources))))
     ]
-    linear, quadratic, cubic, rest = _stacked([_scaled(x, _spread(x)) for x in every])
+    linear, quadratic, cubic, remainder = _stacked([_scaled(x, _spread(x)) for x in models])
     size = np.asarray(np.abs(cubic).sum(1))
     # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
     of_sums = 8 * gamma(roundings(len(level.single), len(level.sources), linear.shape[1]))
-    return [linear, quadratic, cubic, size, rest + of_sums + EXPECTED * size]
+    return [linear, quadratic, cubic, size, remainder + of_sums + EXPECTED * size]
 
 
 def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
     """The last fields of `Data`, of modes known by sums, and all constants at all nodes, (2, T)."""
-    made, order = level.tables, int(level.structure.order[o])
-    constant: Array = np.zeros((2, len(made.time)))
+    tables, order = level.tables, int(level.structure.order[o])
+    constant: Array = np.zeros((2, len(tables.time)))
     constant[1] = level.models.added[:, o]
     for k, mode in enumerate(level.single):
-        constant[1] += mode.share.size()[:, o] @ made.error[order][k]
+        constant[1] += mode.share.size()[:, o] @ tables.error[order][k]
     d, sources = level.structure.rayleigh.inputs, range(len(level.sources))
     if not level.models.rests:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
     waves, rows = list[Array](), list[tuple[Array, ...]]()
-    for rest in level.models.rests:
-        middle, half = rest.middle[:, o], rest.half[:, o]
+    for truncated in level.models.rests:
+        middle, half = truncated.middle[:, o], truncated.half[:, o]
         waves += [middle, side * half]
-        rows += [_scaled(model[s, o], 1.0) for model in (rest.share, rest.doubt) for s in sources]
-        constant[0] += side * rest.share.value[:, o] @ middle
-        constant[1] += rest.doubt.value[:, o] @ half
-    wave, (linear, quadratic, cubic, beyond) = np.concatenate(waves), _stacked(rows)
-    constant[1] += (beyond + np.abs(cubic).sum(1)) @ np.abs(wave)
+        rows += [
+            _scaled(model[s, o], 1.0)
+            for model in (truncated.share, truncated.doubt)
+            for s in sources
+        ]
+        constant[0] += side * truncated.share.value[:, o] @ middle
+        constant[1] += truncated.doubt.value[:, o] @ half
+    wave, (linear, quadratic, cubic, remainder) = np.concatenate(waves), _stacked(rows)
+    constant[1] += (remainder + np.abs(cubic).sum(1)) @ np.abs(wave)
     size = np.abs(linear).sum(1) + np.abs(quadratic).sum(1)
     constant[1] += gamma(roundings(len(level.single), len(sources), d)) * (size @ np.abs(wave))
     constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
@@ -345,9 +349,9 @@ def _scaled(x: TaylorModel, radius: float) -> tuple[Array, ...]:
     # pairs by rows, as the kernel has them
     lists = monomials(x.inputs, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
-    rest = np.asarray(x.rest + gamma(8) * x.size())
+    remainder = np.asarray(x.rest + gamma(8) * x.size())
     linear, quadratic, cubic = x.part(1), x.part(2)[order], x.part(3)
-    return tuple(np.asarray(y / radius) for y in (linear, quadratic, cubic, rest))
+    return tuple(np.asarray(y / radius) for y in (linear, quadratic, cubic, remainder))
 
 
 def _blocks(nodes: Rows) -> list[Rows]:

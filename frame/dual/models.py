@@ -39,12 +39,12 @@ class Models:
     def within(self, low: Array, high: Array) -> Models:
         """The same over a part of the box, low ≤ u ≤ high."""
         models = [x for mode in self.single for x in mode.models]
-        models += [x for rest in self.rests for x in (rest.share, rest.doubt)]
+        models += [x for truncated in self.rests for x in (truncated.share, truncated.doubt)]
         moved = all_within(models, low, high)
         count = 4 * len(self.single)
         single = [mode.on_part(moved[4 * k : 4 * k + 4]) for k, mode in enumerate(self.single)]
         pairs = zip(self.rests, moved[count::2], moved[count + 1 :: 2], strict=True)
-        rests = [replace(rest, share=share, doubt=doubt) for rest, share, doubt in pairs]
+        rests = [replace(truncated, share=share, doubt=doubt) for truncated, share, doubt in pairs]
         return replace(self, single=single, rests=rests)
 
     @classmethod
@@ -78,8 +78,8 @@ class Models:
         models = cls([], [], nothing, nothing, found.along)
         for of_block in shares:
             models = models.with_block(structure, of_block, found, excitation, allowed)
-        rest = rest_of_modes(structure, found, shares, (rows, excited), excitation)
-        return models if rest is None else replace(models, rests=[*models.rests, rest])
+        truncated = rest_of_modes(structure, found, shares, (rows, excited), excitation)
+        return models if truncated is None else replace(models, rests=[*models.rests, truncated])
 
     def with_block(
         self,
@@ -96,10 +96,10 @@ class Models:
         coupling = coupling_of(structure, of_block, found)
         added, strays = coupling.bounds(structure.order, excitation)
         ends = coupling.omega_range, coupling.quotient_range
-        rest = rest_of_block(structure, found, of_block, ends, excitation)
+        truncated = rest_of_block(structure, found, of_block, ends, excitation)
         scale = np.maximum(added.max(0) if allowed is None else allowed, 1e-300)
-        if (rest.width / scale).max() < (added.max(0) / scale).max():
-            return replace(self, rests=[*self.rests, rest])
+        if (truncated.width / scale).max() < (added.max(0) / scale).max():
+            return replace(self, rests=[*self.rests, truncated])
         added, strays = self.added + added, self.strays + strays
         return replace(self, single=self.single + more, added=added, strays=strays)
 

@@ -41,10 +41,10 @@ def _linear_norm(terms: Array, enough: float = 0.0) -> float:
     if in_sum <= enough:
         return in_sum
     terms = terms[np.argsort(-np.linalg.norm(terms, axis=(1, 2)))]
-    first, others = terms[:CORNERS], terms[CORNERS:]
+    first, further_terms = terms[:CORNERS], terms[CORNERS:]
     signs = 1 - 2 * (np.arange(2 ** (len(first) - 1))[:, None] >> np.arange(len(first)) & 1)
     at_corners = np.abs(np.linalg.eigvalsh(np.tensordot(signs, first, 1))).max()
-    return float(at_corners) + _norm_of_terms(others, np.zeros(len(others), bool))
+    return float(at_corners) + _norm_of_terms(further_terms, np.zeros(len(further_terms), bool))
 
 
 def _norm_of_terms(terms: Array, squares: Mask) -> float:
@@ -143,10 +143,10 @@ class Comparison:
     least: float
 
     @classmethod
-    def of(cls, pencil: Pencil, apart: Array, o: Rows) -> Comparison:
-        """Bounds over the box; `apart` are the T_jj in its middle, o all but the block."""
+    def of(cls, pencil: Pencil, gaps: Array, o: Rows) -> Comparison:
+        """Bounds over the box; `gaps` are the T_jj in its middle, o all but the block."""
         total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
-        distance, above = np.abs(apart[o]), apart[o] > 0
+        distance, above = np.abs(gaps[o]), gaps[o] > 0
         blocks = ((above, 1.0), (~above, -1.0))
         least = 1 - max(pencil.loss(o[some], distance[some], sign) for some, sign in blocks)
         diagonal, off = distance - np.diag(total), total - np.diag(np.diag(total))

@@ -142,12 +142,12 @@ class DualProof:
         box = Box(flow.system, boxes.names, flow.time, low, high)
         if (high > low).any():
             return _Bounding(self, flow, box, goal, k).bounds()
-        value, error, stray = box.centre_motion()
-        both, margin = np.stack([-value, value], -1), error[..., None]
-        at = np.broadcast_to(low, (*both.shape, len(low))).copy()
-        shares = np.zeros((*both.shape[1:], len(low)))
+        value, error, deviation = box.centre_motion()
+        sides, margin = np.stack([-value, value], -1), error[..., None]
+        at = np.broadcast_to(low, (*sides.shape, len(low))).copy()
+        shares = np.zeros((*sides.shape[1:], len(low)))
         least = Ends((np.abs(value) - error).max(0), (np.abs(value) + error).max(0))
-        found = PartBounds(both + margin, both - margin, at, stray, shares, 2 * error)
+        found = PartBounds(sides + margin, sides - margin, at, deviation, shares, 2 * error)
         return replace(found, least_peaks=least)
 
 
@@ -243,16 +243,16 @@ class _Bounding:
         enough = self.proof.peaks * self.goal.peak[:, None]
         above = self.needed & (self.outer > self.top + enough)
         with ThreadPoolExecutor(self.goal.workers) as pool:
-            for job in [pool.submit(improve, *place) for place in np.argwhere(above.any(0))]:
+            for job in [pool.submit(improve, *peak) for peak in np.argwhere(above.any(0))]:
                 job.result()
 
     def _problem(self, o: int, s: int) -> tuple[Problem, Rows]:
         """Bounds of one output and side, and the places of those that are above what suffices."""
         enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.top[o, s])
         problem = Problem.of(self.level, o, s, enough, top)
-        known = self.outer[self.nodes, o, s]
-        problem.out[0] = known
-        above = self.needed[self.nodes, o, s] & (known > top + enough)
+        bounds = self.outer[self.nodes, o, s]
+        problem.out[0] = bounds
+        above = self.needed[self.nodes, o, s] & (bounds > top + enough)
         return problem, np.flatnonzero(above)
 
     def _bound(self, o: int, s: int) -> None:

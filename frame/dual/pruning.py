@@ -23,14 +23,14 @@ STEPS = 40
 
 
 def prune_ends(
-    level: Level, problem: Problem, place: tuple[int, int], above: Rows, best: Array
+    level: Level, problem: Problem, bound_index: tuple[int, int], above: Rows, best: Array
 ) -> tuple[Array, Array, Array]:
     """Prune the ends of a box that hold no higher peak of one output and side.
 
     Args:
         level: Models over the box.
         problem: Bounds over the box.
-        place: Output and side.
+        bound_index: Output and side.
         above: Places of the nodes that may hold one, shape (J,).
         best: Coordinates away from which ends lie, shape (d,).
 
@@ -46,7 +46,7 @@ def prune_ends(
             for share in ENDS if high[i] - low[i] == 2.0 else ():
                 piece = low.copy(), high.copy()
                 piece[1 - away][i] = end = (1 - 2 * share) * (1 if away else -1)
-                bounds = _over_piece(level, problem, place, above, piece, slabs)
+                bounds = _over_piece(level, problem, bound_index, above, piece, slabs)
                 if bounds.max() > problem.attained + problem.enough:
                     break
                 pruned = np.maximum(pruned, bounds)
@@ -57,13 +57,13 @@ def prune_ends(
 def _over_piece(
     level: Level,
     problem: Problem,
-    place: tuple[int, int],
+    bound_index: tuple[int, int],
     above: Rows,
     piece: tuple[Array, Array],
     slabs: int,
 ) -> Array:
     """Bounds over a piece of the box at nodes (J,), until one lies above the peak."""
-    inside = Problem.of(level.within(*piece), *place, problem.enough, problem.attained)
+    inside = Problem.of(level.within(*piece), *bound_index, problem.enough, problem.attained)
     inside.out[0] = problem.out[0]
     for node in above[np.argsort(-problem.out[0, above])]:
         inside.run(np.array([node]), slabs, STEPS, 1.0, 0.0)
@@ -85,7 +85,7 @@ def remainder(problem: Problem, node: int) -> tuple[float, Array]:
     upper = np.zeros((len(slope), d, d))
     upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)
     size = (np.abs(data.linear) + upper.sum(1) + upper.sum(2)) ** 2
-    each = np.abs(slope) * data.rest
-    shares = (each / np.maximum(size.sum(1), 1e-300)) @ size
-    least = float(problem.constant[1, node] + each.sum())
+    by_input = np.abs(slope) * data.rest
+    shares = (by_input / np.maximum(size.sum(1), 1e-300)) @ size
+    least = float(problem.constant[1, node] + by_input.sum())
     return least, np.asarray(shares / max(float(shares.sum()), 1e-300))

@@ -60,10 +60,10 @@ def response_ranges(
         piece = _Piece(ends, quotient, loads, time)
         for order, ranges in found.items():
             for s, source in enumerate(sources):
-                for k, (low, high, stray) in enumerate(piece.bounds(source, order)):
+                for k, (low, high, deviation) in enumerate(piece.bounds(source, order)):
                     ranges.low[k, s] = np.minimum(ranges.low[k, s], low)
                     ranges.high[k, s] = np.maximum(ranges.high[k, s], high)
-                    ranges.stray[k, s] = np.maximum(ranges.stray[k, s], stray)
+                    ranges.stray[k, s] = np.maximum(ranges.stray[k, s], deviation)
     return found
 
 
@@ -106,13 +106,13 @@ class _Piece:
         fast = self.omega[1] * np.sqrt(1 + self.quotient[1] ** 2)
         for power in POWERS:
             factor = fast ** (2 * power)
-            low, high, stray = -factor * size, factor * size, 2 * factor * between
+            low, high, deviation = -factor * size, factor * size, 2 * factor * between
             if source in self.loads and self.table is not None:
                 wave = self.table.waves(source, order)
                 least, most = _of_cells(wave.value, wave.error, self._squared() ** power)
                 low, high = np.maximum(low, least), np.minimum(high, most)
-                stray = np.minimum(stray, factor * wave.stray)
-            yield low, high, stray
+                deviation = np.minimum(deviation, factor * wave.stray)
+            yield low, high, deviation
 
     def _squared(self) -> Array:
         """λ at the table's points, shape (Q, W)."""

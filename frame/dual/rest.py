@@ -73,12 +73,12 @@ class _Sums:
     outputs: tuple[TaylorModel, TaylorModel]
     sources: tuple[TaylorModel, TaylorModel]
 
-    def less(self, other: _Sums) -> _Sums:
+    def less(self, subtracted: _Sums) -> _Sums:
         """What another's leave."""
         return _Sums(
-            (self.shares[0] - other.shares[0], self.shares[1] - other.shares[1]),
-            (self.outputs[0] - other.outputs[0], self.outputs[1] - other.outputs[1]),
-            (self.sources[0] - other.sources[0], self.sources[1] - other.sources[1]),
+            (self.shares[0] - subtracted.shares[0], self.shares[1] - subtracted.shares[1]),
+            (self.outputs[0] - subtracted.outputs[0], self.outputs[1] - subtracted.outputs[1]),
+            (self.sources[0] - subtracted.sources[0], self.sources[1] - subtracted.sources[1]),
         )
 
 
@@ -98,14 +98,14 @@ def rest_of_modes(
         coordinates: Outputs, V = (m, n), and sources, (sources, n), in the coordinates of `found`.
         excitation: The loads, the nodes and the names of the sources.
     """
-    others = found.others
-    if not len(others):
+    other_modes = found.others
+    if not len(other_modes):
         return None
     sums = _of_all(found, *coordinates, max(x.block.norm.order for x in shares))
     for of_block in shares:
         sums = sums.less(_of_block(of_block))
-    low, high = float(found.low[others].min()), float(found.high[others].max())
-    ends = damped_range(structure, low, high, others)
+    low, high = float(found.low[other_modes].min()), float(found.high[other_modes].max())
+    ends = damped_range(structure, low, high, other_modes)
     return _known_by(sums, ends, structure, found, excitation)
 
 
@@ -191,19 +191,21 @@ def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Ar
     """
     middle, parts = np.diag(matrix.value), list[Array]()
     for degree in range(matrix.order + 1):
-        known = rows.part(degree)
+        right_side = rows.part(degree)
         for k in range(1, min(degree, len(matrix.parts) - 1) + 1):
             pair = (degree - k, k)
-            known = known - convolve(parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul)
-        parts.append(known / middle)
+            right_side = right_side - convolve(
+                parts[degree - k], matrix.parts[k], pair, rows.inputs, matmul
+            )
+        parts.append(right_side / middle)
     found = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
     missed = rows.rest + found.size() @ matrix.rest
     for degree, size in enumerate(rows.sizes()):
         missed = missed + gamma(_terms(matrix, degree)) * size
     for i, size in enumerate(found.sizes()):
         for k, factor in enumerate(matrix.sizes()):
-            beyond = i + k > matrix.order
-            missed = missed + (1.0 if beyond else gamma(_terms(matrix, i + k))) * (size @ factor)
+            is_higher = i + k > matrix.order
+            missed = missed + (1.0 if is_higher else gamma(_terms(matrix, i + k))) * (size @ factor)
     return found, missed * (1 + gamma(matrix.order**2 + 4 * len(middle)))
 
 
@@ -255,7 +257,7 @@ def _least(
 ) -> Rest:
     """The bound of each source and output whose doubt is least at its largest."""
     of_outputs = [ranges[int(order)] for order in structure.order]
-    low, high, stray = (  # (powers, sources, m, T)
+    low, high, deviation = (  # (powers, sources, m, T)
         np.stack(arrays, 2)
         for arrays in zip(*((x.low, x.high, x.stray) for x in of_outputs), strict=True)
     )
@@ -267,5 +269,5 @@ def _least(
     for k, pair in enumerate(bounds):
         share, doubt = share + pair[0] * (best == k), doubt + pair[1] * (best == k)
     s, o = np.indices(best.shape)
-    strays = (doubts[..., None] * stray).min(0).sum(0)
+    strays = (doubts[..., None] * deviation).min(0).sum(0)
     return Rest(share, doubt, middle[best, s, o], half[best, s, o], strays.T)

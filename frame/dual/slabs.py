@@ -61,17 +61,17 @@ class Slabs(NamedTuple):
 @loops
 def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
     """The output's model at inputs u, side × its value, and its gradient."""
-    both, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
-    products(u, both)
+    bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
+    products(u, bilinear)
     total = sensitivities(u, node, side, data, weight)
     gradient[:] = 0.0
-    bend = np.zeros(len(both))
+    bend = np.zeros(len(bilinear))
     for a in range(len(weight)):
         add(gradient, weight[a], data.linear[a])
         add(bend, weight[a], data.quadratic[a])
     for s in range(len(data.group_linear)):
         m = side * data.group_wave[s, node]
-        total += m * (dot(data.group_linear[s], u) + dot(data.group_quadratic[s], both))
+        total += m * (dot(data.group_linear[s], u) + dot(data.group_quadratic[s], bilinear))
         add(gradient, m, data.group_linear[s])
         add(bend, m, data.group_quadratic[s])
     at = 0
@@ -86,10 +86,10 @@ def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> floa
 @loops
 def sensitivities(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
     """The modes' part of the model at inputs u; `weight` takes its slopes by all variables (Z,)."""
-    both, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
-    products(u, both)
+    bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
+    products(u, bilinear)
     for a in range(len(z)):
-        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], both)
+        z[a] = dot(data.linear[a], u) + dot(data.quadratic[a], bilinear)
     weight[:] = 0.0
     total = 0.0
     for k in range(len(data.share)):
@@ -115,10 +115,10 @@ def of_mode(z: Array, k: int, node: int, side: float, data: Data, weight: Array)
         value = side * ((1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * f))
         along = side * ((1 - y) * (b - a) + y * (f - c)) / data.step[k, 0]
         across = side * ((1 - x) * (c - a) + x * (f - b)) / data.step[k, 1]
-        own = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
-        total += own * value
-        weight[first] += own * (along - across * g / w**2) * data.radius[k, 0]
-        weight[first + 1] += own * across / w * data.radius[k, 1]
+        amplitude = data.share[k, s] + data.reach[k, s] * z[first + 2 + s]
+        total += amplitude * value
+        weight[first] += amplitude * (along - across * g / w**2) * data.radius[k, 0]
+        weight[first + 1] += amplitude * across / w * data.radius[k, 1]
         weight[first + 2 + s] = value * data.reach[k, s]
     return total
 
@@ -131,17 +131,17 @@ def ascend(u: Array, node: int, side: float, data: Data) -> float:
         The model's value at u.
     """
     d = len(u)
-    slope, trial, other = np.empty(d), np.empty(d), np.empty(d)
+    slope, trial, trial_slope = np.empty(d), np.empty(d), np.empty(d)
     value = model(u, node, side, data, slope)
     for _ in range(JUMPS):
         gained, length = False, 1.0
         for _ in range(3):
             for i in range(d):
                 trial[i] = u[i] + length * (np.sign(slope[i]) - u[i])
-            new = model(trial, node, side, data, other)
+            new = model(trial, node, side, data, trial_slope)
             if new > value + 1e-9 * abs(value):
                 value, gained = new, True
-                u[:], slope[:] = trial, other
+                u[:], slope[:] = trial, trial_slope
                 break
             length *= 0.35
         if not gained:
@@ -153,24 +153,24 @@ def ascend(u: Array, node: int, side: float, data: Data) -> float:
 def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Array) -> float:
     """Improve u by projected gradient steps of Barzilai's and Borwein's length; its value."""
     d = len(u)
-    here, there, other = u.copy(), np.empty(d), np.empty(d)
+    here, there, slope_there = u.copy(), np.empty(d), np.empty(d)
     size = 0.3 / (np.abs(slope).max() + 1e-300)
     for _ in range(CLIMBS):
         for i in range(d):
             there[i] = min(max(here[i] + size * slope[i], -1.0), 1.0)
-        new = model(there, node, side, data, other)
+        new = model(there, node, side, data, slope_there)
         along = bend = 0.0
         for i in range(d):
             step = there[i] - here[i]
             along += step * step
-            bend += step * (slope[i] - other[i])
+            bend += step * (slope[i] - slope_there[i])
         if along < 1e-8:
             break
         if new < value - 0.02 * abs(value):
             size *= 0.3
             continue
         size = along / bend if bend > 0 else 4 * size
-        here[:], slope[:] = there, other
+        here[:], slope[:] = there, slope_there
         if new > value:
             value = new
             u[:] = here
@@ -224,17 +224,17 @@ def refine(
     reached = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)
     mu[:] = slabs.mu[0]
     floor = effort.floor * (constant[1] + dot(np.abs(mu), data.rest))
-    count, begun = 1, slabs.value[0]
+    count, start_value = 1, slabs.value[0]
     while count < effort.slabs:
         first = int(np.argmax(slabs.value[:count]))
         aim = sufficient(reached, floor, effort, constant)
-        even = begun - (begun - aim) * MIN_PROGRESS * count / effort.slabs
+        even = start_value - (start_value - aim) * MIN_PROGRESS * count / effort.slabs
         if slabs.value[first] <= aim or (count >= TRIED and slabs.value[first] > even):
             break
-        if not divided(slabs, first, count):
+        if not halve_widest(slabs, first, count):
             break
-        for own in (first, count):
-            reached = examine(own, node, side, data, effort.steps, aim, slabs, reached, u)
+        for slab in (first, count):
+            reached = examine(slab, node, side, data, effort.steps, aim, slabs, reached, u)
         count += 1
     out[0] = slabs.value[:count].max() + constant[0] + constant[1]
     out[1] = reached + constant[0]
@@ -249,7 +249,7 @@ def sufficient(reached: float, floor: float, effort: Effort, constant: Array) ->
 
 @compiled
 def examine(
-    own: int,
+    slab: int,
     node: int,
     side: float,
     data: Data,
@@ -260,10 +260,10 @@ def examine(
     u: Array,
 ) -> float:
     """Bound of one slab; the model's best value, with its inputs in `u`."""
-    here, mu, weight = np.empty(len(u)), slabs.mu[own], slabs.weight[own]
-    value = minimise(mu, slabs.ends[own], node, side, data, steps, aim, reached, weight, here)
-    slabs.value[own] = min(value, slabs.value[own])
-    if slabs.value[own] > aim or own == 0:
+    here, mu, weight = np.empty(len(u)), slabs.mu[slab], slabs.weight[slab]
+    value = minimise(mu, slabs.ends[slab], node, side, data, steps, aim, reached, weight, here)
+    slabs.value[slab] = min(value, slabs.value[slab])
+    if slabs.value[slab] > aim or slab == 0:
         other = ascend(here, node, side, data)
         if other > reached:
             reached = other
@@ -272,7 +272,7 @@ def examine(
 
 
 @compiled
-def divided(slabs: Slabs, first: int, count: int) -> bool:
+def halve_widest(slabs: Slabs, first: int, count: int) -> bool:
     """Halve a slab along the ω or q whose sides differ most, into its place and `count`; if any."""
     ends, weight = slabs.ends[first], slabs.weight[first]
     width = len(weight) // len(ends)

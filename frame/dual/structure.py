@@ -189,9 +189,9 @@ def _springs(system: StoreyFrame, p: Inputs) -> TaylorModel:
     """k_z, V = (n,), as given or 12 c E I / l³."""
     if system.stiffness:
         return _of_floors(system, p, "k{}")
-    own = _of_floors(system, p, "c{}") * _of_floors(system, p, "l{}") ** -3.0
+    stiffness_factor = _of_floors(system, p, "c{}") * _of_floors(system, p, "l{}") ** -3.0
     inertia = _of_floors(system, p, "I{}") if len(system.moments) > 1 else stacked([p["I"]])
-    return own * inertia * stacked([p["E"] * 12.0])
+    return stiffness_factor * inertia * stacked([p["E"] * 12.0])
 
 
 def _softening(system: StoreyFrame, p: Inputs) -> TaylorModel:
@@ -222,8 +222,8 @@ def without_ratios(system: LinearSystem) -> LinearSystem:
 
 def _of_modes(ratios: list[TaylorModel], n: int, like: TaylorModel) -> TaylorModel:
     """ζ_k, V = (n,): one for all, one for each, or none."""
-    each = ratios or [like[0] * 0.0]
-    return stacked(each * n if len(each) == 1 else each)
+    ratios_of_modes = ratios or [like[0] * 0.0]
+    return stacked(ratios_of_modes * n if len(ratios_of_modes) == 1 else ratios_of_modes)
 
 
 def _value(factor: Factor | str | float, p: Inputs) -> TaylorModel | float:
@@ -254,6 +254,6 @@ def stacked(models: Sequence[TaylorModel]) -> TaylorModel:
     return concatenate([x[None] for x in models], -1 - models[0].rest.ndim)
 
 
-def spread(one: TaylorModel, array: Array) -> TaylorModel:
+def spread(factor: TaylorModel, array: Array) -> TaylorModel:
     """One function times an array of numbers, V = the array's shape."""
-    return one[(None,) * np.ndim(array)] * array
+    return factor[(None,) * np.ndim(array)] * array

@@ -60,7 +60,7 @@ def modes_wanted(
             waves = waves + at_once(source, loads, int(order), time)
             steep = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
             moved[:, o] += np.abs(read[o] * given[s]) * steep  # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
-            each = []
+            shares = []
             for power in POWERS:
                 row, share = (
                     _above(x**2 / squared**p)
@@ -69,8 +69,8 @@ def modes_wanted(
                 scaled = waves * squared[:, None] ** power
                 high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
                 half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2
-                each.append(np.sqrt(row * share) * half.max(1))
-            doubt[:, o] += np.min(each[light[o] :], axis=0)
+                shares.append(np.sqrt(row * share) * half.max(1))
+            doubt[:, o] += np.min(shares[light[o] :], axis=0)
     enough = np.flatnonzero((doubt <= allowed).all(1))
     wanted = max(int(enough[0]), 1) if len(enough) else n
     return wanted, np.min(allowed / np.maximum(moved, 1e-300), axis=1)

@@ -118,8 +118,8 @@ class Oscillators:
             value, rounding = value + direct, rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
         shape = (len(self.time), len(g.quotient), len(g.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
-        error, stray = error + rounding.max(-1), self._stray(largest[0], source, order)
-        return Waves(g.omega, g.quotient, value.reshape(shape), error, stray, largest)
+        error, deviation = error + rounding.max(-1), self._stray(largest[0], source, order)
+        return Waves(g.omega, g.quotient, value.reshape(shape), error, deviation, largest)
 
     def _error(
         self, largest: Array, bounds: Array, order: int, *, start: bool
@@ -169,8 +169,10 @@ class Oscillators:
         for at, jump in load.jumps if order else ():
             kinked = (self.time - h <= at * (1 + 1e-9)) & (self.time >= at * (1 - 1e-9))
             kink += np.where(kinked, h / 4 * power * jump, 0.0)
-        stray = (h**2 / 8 * bend + kink) / low
-        return np.asarray(stray + (load.stray(self.time) if _acts_at_once(source, order) else 0.0))
+        deviation = (h**2 / 8 * bend + kink) / low
+        return np.asarray(
+            deviation + (load.stray(self.time) if _acts_at_once(source, order) else 0.0)
+        )
 
 
 def at_once(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:

@@ -87,9 +87,9 @@ class LagrangianSystem:
 
     def output(self, name: str, velocity: Symbols) -> Expr:
         """An observed quantity in symbols, for velocities in any symbols."""
-        eq, of = self.symbols, self.observed[name]
+        eq, expression = self.symbols, self.observed[name]
         value = _expressions(
-            f"observed: {name}", lambda: [of(list(eq.q), list(velocity), eq.p)], eq.p
+            f"observed: {name}", lambda: [expression(list(eq.q), list(velocity), eq.p)], eq.p
         )
         return value[0]
 
@@ -148,12 +148,12 @@ def _expressions(
 
     allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"
     try:
-        made = [sympy.sympify(value) for value in values()]
+        expressions = [sympy.sympify(value) for value in values()]
     except (KeyError, IndexError, TypeError, AttributeError, sympy.SympifyError) as failure:
         raise RefusedError(name, repr(failure), allowed) from None
-    fits = len(made) == count and all(isinstance(value, sympy.Expr) for value in made)
-    require(fits, name, value=made, allowed=f"{count} by coordinate, {allowed}")
-    return made
+    fits = len(expressions) == count and all(isinstance(value, sympy.Expr) for value in expressions)
+    require(fits, name, value=expressions, allowed=f"{count} by coordinate, {allowed}")
+    return expressions
 
 
 def pendulum(

@@ -117,11 +117,15 @@ class History:
 
     def envelope(self, time: Array, side: float = 1.0) -> Array:
         """G at times, after jumps (`side` 1) or before them (−1)."""
-        n, place = len(self.samples), (time - self.start) / self.step
-        place = np.where(np.abs(place - np.round(place)) < 1e-9, np.round(place), place)
-        inside: Array = np.interp(place, np.arange(n), self.samples)
-        begun, ended = (place >= 0, place >= n - 1) if side > 0 else (place > 0, place > n - 1)
-        return np.asarray(np.where(begun & ~(ended & ~np.array(self.is_held)), inside, 0.0))
+        n, position = len(self.samples), (time - self.start) / self.step
+        position = np.where(
+            np.abs(position - np.round(position)) < 1e-9, np.round(position), position
+        )
+        inside: Array = np.interp(position, np.arange(n), self.samples)
+        has_started, ended = (
+            (position >= 0, position >= n - 1) if side > 0 else (position > 0, position > n - 1)
+        )
+        return np.asarray(np.where(has_started & ~(ended & ~np.array(self.is_held)), inside, 0.0))
 
     def stray(self, time: Array) -> Array:
         """Bound of how far f strays from straight lines in the step to each node (T,)."""

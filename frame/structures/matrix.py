@@ -98,9 +98,9 @@ class MatrixStructure:
             missing = np.flatnonzero(np.asarray(force.at)[self.massless])
             what, allowed = f"on unknowns {self.massless[missing]}", "on unknowns that have mass"
             require(not len(missing), "force", value=what, allowed=allowed)
-        own = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
-        fits = len(own) in (0, 1, len(self.massive)) and all(
-            Parameter("", range=RATIO).admits(x, x) for x in own
+        ratios = [self.parameters.get(x, np.nan) if isinstance(x, str) else x for x in self.ratios]
+        fits = len(ratios) in (0, 1, len(self.massive)) and all(
+            Parameter("", range=RATIO).admits(x, x) for x in ratios
         )
         require(
             fits,
@@ -247,16 +247,16 @@ class MatrixStructure:
         rows = np.zeros((len(self.observed), 2 * self.size))
         for k, row in enumerate(self.observed.values()):
             rows[k, : len(row)] = row
-        made = like.like(np.tile(rows, (like.value.size, 1, 1)))
+        observed = like.like(np.tile(rows, (like.value.size, 1, 1)))
         if len(self.massless):
             a, b, n = self.massive, self.massless, self.size
             follow = _follow(self._total(self.stiffness, p), a, b)
-            parts = (made[:, :, a + k] + made[:, :, b + k] @ follow for k in (0, n))
-            made = concatenate(list(parts), -1)
+            parts = (observed[:, :, a + k] + observed[:, :, b + k] @ follow for k in (0, n))
+            observed = concatenate(list(parts), -1)
         if not self.row_factors:
-            return made
+            return observed
         factors = concatenate([lifted(self._row_factor(x), p)[:, None] for x in self.observed], -1)
-        return factors[:, :, None] * made
+        return factors[:, :, None] * observed
 
     def _total(self, terms: Terms, p: Mapping[str, Jet]) -> Jet:
         """Sum of arrays times factors, V = (S, n, n)."""

@@ -103,10 +103,10 @@ def require_single(matrices: Matrices, chosen: Array) -> None:
     """
     rate = eigenvectors(state_matrix(matrices))[0].value
     size = rate.shape[-1] // 2
-    apart = np.abs(rate[:, :size, None] - rate[:, None, :size]) / np.maximum(
+    gaps = np.abs(rate[:, :size, None] - rate[:, None, :size]) / np.maximum(
         np.abs(rate[:, :size, None]), 1e-300
     )
-    for first, second in np.argwhere((apart < DOUBLE).all(0)):
+    for first, second in np.argwhere((gaps < DOUBLE).all(0)):
         if first < second and np.isin([first, second], chosen).any():
             raise ModalError(
                 f"modal: modes {first + 1} and {second + 1} have the same frequency,"
@@ -168,8 +168,8 @@ def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     squared, X, Y = (jet.map(np.real) for jet in eigenvectors(inverse(mass) @ stiffness))
     _require_stiff(squared.value)
     rate = squared**0.5
-    each = [2.0 * ratio * rate[:, k] for k, ratio in enumerate(ratios)]
-    scaled = [X[:, :, k] * x[:, None] for k, x in enumerate(each)]
+    rates = [2.0 * ratio * rate[:, k] for k, ratio in enumerate(ratios)]
+    scaled = [X[:, :, k] * x[:, None] for k, x in enumerate(rates)]
     columns = concatenate([column[..., None] for column in scaled], -1)
     return mass @ (columns @ Y)
 
@@ -201,9 +201,9 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     U = np.linalg.eigh(below @ stiffness @ below.swapaxes(-1, -2))[1]
     shapes = below.swapaxes(-1, -2) @ U
     alike = np.abs(shapes[0].T @ mass[0] @ shapes)  # of modal shapes and the others'
-    place = alike.argmax(1)
-    for _, k in np.argwhere(ratios[place] != ratios):
-        pair = f"modes {min(k, place[:, k].min()) + 1} and {max(k, place[:, k].max()) + 1}"
+    first = alike.argmax(1)
+    for _, k in np.argwhere(ratios[first] != ratios):
+        pair = f"modes {min(k, first[:, k].min()) + 1} and {max(k, first[:, k].max()) + 1}"
         cure = "give both the same ratio, or take narrower inputs"
         require(
             False,

@@ -40,9 +40,9 @@ def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
     if not isinstance(system, StoreyFrame | MatrixStructure):
         raise UnprovedError(f"nothing is known about the parameters of a {type(system).__name__}")
     for name, ends in box.items():
-        if not (own := system.parameter(name)).admits(*ends):
+        if not (parameter := system.parameter(name)).admits(*ends):
             what = f"{name} reaches from {ends[0]:g} to {ends[1]:g}"
-            raise UnprovedError(f"{what}, and is known to be {own.range or 'finite'}")
+            raise UnprovedError(f"{what}, and is known to be {parameter.range or 'finite'}")
     if isinstance(system, StoreyFrame):
         return _of_storey_frame(system, box)
     if len(system.massless):
@@ -79,7 +79,7 @@ def _of_storey_frame(system: StoreyFrame, box: Box) -> dict[str, int]:
 def accelerations(system: LinearSystem) -> dict[int, int]:
     """Outputs that are accelerations of a storey frame's floors, with the floors, from 0."""
     named = enumerate(system.outputs) if isinstance(system, StoreyFrame) else ()
-    return {place: int(name[1:]) - 1 for place, name in named if name[0] == "a"}
+    return {row: int(name[1:]) - 1 for row, name in named if name[0] == "a"}
 
 
 def common_ratio(system: LinearSystem) -> str | float | None:

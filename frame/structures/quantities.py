@@ -40,10 +40,10 @@ class Output(str):
 
     def __new__(cls, name: str, unit: str = "") -> Output:
         """The name with the unit, or with its own."""
-        made = super().__new__(cls, name)
-        own = name.unit if isinstance(name, Output) else UNITS.get(made._parts[0], "SI")
-        made.unit = unit or own
-        return made
+        output = super().__new__(cls, name)
+        own_unit = name.unit if isinstance(name, Output) else UNITS.get(output._parts[0], "SI")
+        output.unit = unit or own_unit
+        return output
 
     def __reduce__(self) -> tuple[type[Output], tuple[str, str]]:
         """How a copy is made, in another process, too."""
@@ -58,9 +58,9 @@ class Output(str):
     @property
     def words(self) -> str:
         """In words, with its name: "displacement of floor 3 (q3)"; else the name."""
-        kind, place = self._parts
-        known = WORDS.get(kind)
-        return f"{known} {place} ({self})" if known and place else self.replace("_", " ")
+        kind, floor = self._parts
+        words = WORDS.get(kind)
+        return f"{words} {floor} ({self})" if words and floor else self.replace("_", " ")
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ SYMBOLS = {
 """Names of the parameters that each list holds, by floor or storey."""
 SINGLE = {"modulus": "E", "damping_ratio": "zeta"}
 """The same of single values."""
-MADE = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
+SPRING_KEYS = "lengths, modulus and second_moment, or stiffness (with lengths for gravity)"
 
 
 @dataclass(frozen=True)
@@ -145,21 +145,21 @@ class StoreyFrame:
 
     def _require_springs(self) -> None:
         """Either stiffnesses, or all that makes them; heights where weights press."""
-        made: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
+        given: dict[str, object] = {"modulus": self.modulus, "second_moment": self.second_moment}
         if len(self.stiffness):
             columns = self.columns if len(self.columns) else None
-            beside = [k for k, x in {**made, "columns": columns}.items() if x is not None]
+            beside = [k for k, x in {**given, "columns": columns}.items() if x is not None]
             require(
                 not beside,
                 ", ".join(beside),
                 value="there",
                 allowed="either stiffness or what makes it",
             )
-            made = {}
+            given = {}
         if not len(self.stiffness) or self.gravity:
-            made["lengths"] = self.lengths if len(self.lengths) else None
-        for name, value in made.items():
-            require(value is not None, name, value=None, allowed=MADE)
+            given["lengths"] = self.lengths if len(self.lengths) else None
+        for name, value in given.items():
+            require(value is not None, name, value=None, allowed=SPRING_KEYS)
 
     def _require_loads(self) -> None:
         """Refuse forces on no floor, or without an amplitude."""
@@ -282,8 +282,8 @@ class StoreyFrame:
     def observation(self, p: Mapping[str, Jet]) -> Jet:
         """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
         kinds, links, n = [self.quantity(x) for x in self.outputs], self.springs(p), self.floors
-        one, rows = links.like(np.ones_like(links.value)), []
-        forces = one
+        ones_like, rows = links.like(np.ones_like(links.value)), []
+        forces = ones_like
         if "a" in dict(kinds):  # absolute accelerations: forces over masses
             at, inertia = self.matrices(p), -1.0 * self._of_floors("m{}", p) ** -1
             forces = inertia[..., None] * concatenate([at.stiffness, at.damping], -1)
@@ -291,7 +291,7 @@ class StoreyFrame:
             row = np.eye(2 * n)[z + n * (kind == "v")]
             if kind in ("drift", "shear") and z:
                 row[z - 1] = -1.0
-            size = links if kind == "shear" else one
+            size = links if kind == "shear" else ones_like
             rows.append(forces[:, z : z + 1] if kind == "a" else size[:, z, None, None] * row)
         return concatenate(rows, -2)
 

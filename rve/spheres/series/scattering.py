@@ -58,10 +58,10 @@ def _on_sphere(degree: Array, poisson: float) -> tuple[Array, Array]:
         Shape (k, 2, 2) each: along x Y and ∇Y, by solutions 1 and 3.
     """
     d, nu = degree, poisson
-    alpha, ones = d + 5 - 4 * nu, np.ones_like(d)
+    alpha, unit = d + 5 - 4 * nu, np.ones_like(d)
     radial = d * alpha - 2 * (3 * d + 1 - 2 * nu * (2 * d + 1))  # α d + c
     dilating = -4 * nu * (d + 1) * (2 * d + 3)  # λ/μ div u
-    moved = np.array([[d, radial], [ones, alpha]])
+    moved = np.array([[d, radial], [unit, alpha]])
     pulled = np.array(
         [[2 * (d - 1) * d, dilating + (2 * d + 2) * radial], [2 * (d - 1), radial + d * alpha]]
     )

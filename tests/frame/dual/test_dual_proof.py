@@ -211,7 +211,7 @@ def test_any_multipliers_bound_any_motion():
                 bound = kernel.dual(
                     mu, whole, node, side, problem.data, np.empty(len(mu)), np.empty(7)
                 )
-                bound += problem.constant[:, node].sum() + kernel.cancelled(mu, problem.data)
+                bound += problem.constant[:, node].sum() + kernel.remainder_bound(mu, problem.data)
                 assert (side * values[:, node, o] <= bound).all()
 
 

@@ -12,7 +12,7 @@ from alphacut.frame import StoreyFrame, envelope, parts
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate import branch_and_bound
 from alphacut.frame.dual import level, proof
-from alphacut.frame.dual.dual_function import deflected, require_in_range
+from alphacut.frame.dual.dual_function import deflect, require_in_range
 from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.methods.proof import Proof
@@ -206,12 +206,12 @@ def test_models_that_are_not_finite_are_refused(name, wrong):
 @pytest.mark.parametrize("gain", [np.nan, np.inf, 1e300])
 def test_a_descent_ends_before_its_multipliers_overflow(gain):
     mu, gradient = np.zeros(2), np.array([1e-6, 0.0])
-    assert not deflected(mu, gradient, np.zeros(2), gain)
+    assert not deflect(mu, gradient, np.zeros(2), gain)
 
 
 def test_a_descent_goes_on_with_ordinary_multipliers():
     mu = np.zeros(2)
-    assert deflected(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1)
+    assert deflect(mu, np.array([1.0, 0.5]), np.zeros(2), 0.1)
     assert mu == pytest.approx([-0.08, -0.04])
 
 
