@@ -13,8 +13,7 @@ ROOT = Path(__file__).parents[3]
 CASES = sorted((ROOT / "cases").glob("*.toml"))
 
 
-def test_keys_are_few_and_each_says_what_it_is():
-    assert len(every_key()) <= 118
+def test_each_key_says_what_it_is():
     assert all(info.description for info in every_key().values())
 
 
