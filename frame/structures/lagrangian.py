@@ -180,19 +180,38 @@ def pendulum(
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
         real(name, value, positive=True)
     real("damping", damping, least=0)
-    from sympy import cos
-
-    def lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
-        return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])
-
     return LagrangianSystem(
         coordinates=1,
         parameters=dict(m=mass, l=length, d=damping, g=gravity, phi_0=phi0, omega_0=omega0),
-        lagrangian=lagrangian,
-        initial=lambda p: ([p["phi_0"]], [p["omega_0"]]),
-        observed={
-            "force": lambda q, v, p: p["m"] * p["l"] * v[0] ** 2 + p["m"] * p["g"] * cos(q[0]),
-            "phi": lambda q, v, p: q[0],
-        },
-        force=lambda q, v, p: [-p["d"] * v[0]],
+        lagrangian=_lagrangian,
+        initial=_initial,
+        observed={"force": _bar_force, "phi": _angle},
+        force=_moment,
     )
+
+
+# functions of a module, which processes can be sent
+
+
+def _lagrangian(q: Symbols, v: Symbols, p: Named) -> Expr:
+    from sympy import cos
+
+    return p["m"] * p["l"] ** 2 * v[0] ** 2 / 2 + p["m"] * p["g"] * p["l"] * cos(q[0])
+
+
+def _initial(p: Named) -> tuple[Symbols, Symbols]:
+    return [p["phi_0"]], [p["omega_0"]]
+
+
+def _bar_force(q: Symbols, v: Symbols, p: Named) -> Expr:
+    from sympy import cos
+
+    return p["m"] * p["l"] * v[0] ** 2 + p["m"] * p["g"] * cos(q[0])
+
+
+def _angle(q: Symbols, v: Symbols, p: Named) -> Expr:
+    return q[0]
+
+
+def _moment(q: Symbols, v: Symbols, p: Named) -> Symbols:
+    return [-p["d"] * v[0]]

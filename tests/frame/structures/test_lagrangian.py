@@ -4,6 +4,7 @@ path.
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -81,3 +82,10 @@ def test_energy_of_the_free_pendulum_stays_bounded() -> None:
     phi = free.values(np.ones((1, 1)))[0, :, 1]
     late, early = np.abs(phi[-800:]).max(), np.abs(phi[:800]).max()
     assert late == pytest.approx(early, abs=2e-3)
+
+
+def test_the_pendulum_can_be_sent_to_other_processes() -> None:
+    system, point = pendulum(phi0=0.3), np.array([[0.3]])
+    values = LagrangianFlow(system, ("phi_0",), 0.1, 0.01).values(point)
+    sent = pickle.loads(pickle.dumps(system))
+    assert (LagrangianFlow(sent, ("phi_0",), 0.1, 0.01).values(point) == values).all()
