@@ -1,6 +1,7 @@
 """Questions to a motion: peaks, passing of limits, tolerances, probabilities."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from alphacut.frame.questions.probability import _interval, probabilities
 from alphacut.frame.questions.tolerances import _step_of, scaled, tolerances
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.result import Ends, Nature
 
 FRAME = StoreyFrame(
     (9e3, 7e3),
@@ -229,3 +230,27 @@ def test_a_share_of_relative_tolerances_would_be_seen():
     plain = {"between": None, "outer": None}
     shaken = replace(motion, error=np.zeros_like(motion.lower), **plain)
     assert (peaks(shaken).error == 0).all()
+
+
+def test_peaks_of_one_side_are_those_of_its_bounds():
+    """A band from −3 … −2 to 1 … 5: the magnitude, the greatest and the negative least value."""
+    band = Ends(np.array([[[-3.0], [1.0]]]), np.array([[[-2.0], [5.0]]]))
+    exact = SimpleNamespace(
+        alpha=[0.0],
+        outputs=("q1",),
+        lower=band.lower,
+        upper=band.upper,
+        attained=band,
+        error=np.zeros((1, 2, 1)),
+        natures=None,
+        nature=Nature.GUARANTEED,
+        between=None,
+        least_peaks=None,
+    )
+    found = peaks(exact, ["q1", "max q1", "min q1"])
+    assert found.upper.tolist() == [[5.0, 5.0, 3.0]]
+    assert found.lower.tolist() == [[2.0, 1.0, 2.0]]
+    assert found.reached.tolist() == [[5.0, 5.0, 3.0]]
+    assert found.most("min q1").upper == [3.0]
+    assert passing(found, {"min q1": 1.5})["min q1"].outcome == "exceeded"
+    assert passing(found, {"max q1": 5.5})["max q1"].outcome == "not exceeded"
