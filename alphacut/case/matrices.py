@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from alphacut.case.structure import (
     LOSS_STAND_IN,
@@ -53,7 +53,7 @@ def _parameter(value: object, _: ValidationInfo) -> FuzzyNumber:
         raise RefusedError("", value, 'a quantity, as "30 GPa ± 5 %" or 1.2', str(error)) from None
 
 
-Term = Annotated[tuple[Monomial, Array], text(_term)]
+Term = Annotated[tuple[Monomial, Array], PlainValidator(_term, json_schema_input_type=list[str])]
 Vector = Annotated[Array, text(_array_file)]
 Parameters = dict[str, Annotated[FuzzyNumber, text(_parameter)]]
 
