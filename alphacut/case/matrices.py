@@ -15,6 +15,7 @@ from alphacut.case.structure import (
     DampingRatio,
     MaterialDamping,
     Structure,
+    ratios_of,
     read_accelerogram,
 )
 from alphacut.case.types import Section, Some, after, case_file, text, unlike
@@ -118,10 +119,15 @@ class MatricesSection(Section):
             key = f"matrices: {error.key}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
 
+    @property
+    def _stated_ratios(self) -> dict[str, FuzzyNumber]:
+        """Damping ratios that do not come from the material."""
+        is_stated = not isinstance(self.damping_ratio, MaterialDamping)
+        return ratios_of(self.damping_ratio, None) if is_stated else {}
+
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
         numbers = dict(self.parameters)
-        if isinstance(self.damping_ratio, FuzzyNumber):
-            numbers[RATIO] = self.damping_ratio
+        numbers |= self._stated_ratios
         if modulus is not None and "E" in numbers:
             numbers["E"] = modulus
         return numbers or {"scale": Crisp(1.0)}
@@ -138,7 +144,7 @@ class MatricesSection(Section):
             observed=rows,
             ground=self.accelerogram,
             pattern=self._pattern(),
-            ratios=(RATIO,) if isinstance(self.damping_ratio, FuzzyNumber) else (),
+            ratios=tuple(self._stated_ratios),
             row_factors={name: self.outputs[name].factor.simplest for name in rows},
         )
 

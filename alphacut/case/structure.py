@@ -41,7 +41,8 @@ ZERO = Crisp(0.0)
 NAMES = {"q0": "displacements", "v0": "velocities", "output": "outputs"}
 """Keys by the names of the frame's own arguments, where they differ."""
 RATIO_WORDS = (
-    'damping over the critical one, of all modes; "material" takes that of the loss factors of the'
+    "damping over the critical one, of all modes, or texts, one a mode from the slowest on:"
+    ' ["2 %", "[2, 3, 4] %", "5 %"]; "material" takes that of the loss factors of the'
     ' cell, "material + 1 %" adds that of joints'
 )
 DAMPING = ("dampers", "damping_ratio", "rayleigh_mass", "rayleigh_stiffness")
@@ -86,8 +87,11 @@ def _ratio_of_loss(loss: float) -> float:
     return math.sin(math.atan(loss) / 2)
 
 
-def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping:
-    """A damping ratio, or that of the material."""
+def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...]:
+    """A damping ratio, that of the material, or one of each mode."""
+    if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
+        ratios = map(RATIO.read, value)
+        return tuple(ratio for ratio in ratios if isinstance(ratio, FuzzyNumber))
     words = value.partition("+") if isinstance(value, str) else ("", "", "")
     of_material = words[0].strip() == "material"
     if of_material and not words[1]:
@@ -99,9 +103,8 @@ def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping:
 
 RATIO = Quantity(least=0, below=1, fuzzy=True)
 DampingRatio = Annotated[
-    FuzzyNumber | MaterialDamping,
-    RATIO,
-    PlainValidator(_damping_ratio, json_schema_input_type=float | list[float] | str),
+    FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...],
+    PlainValidator(_damping_ratio, json_schema_input_type=float | list[float | str] | str),
 ]
 
 
@@ -204,13 +207,21 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
     return read_recording(case_file(value, info)).accelerogram()
 
 
-def ratio_of(
-    ratio: FuzzyNumber | MaterialDamping | None, loss: FuzzyNumber | None
-) -> FuzzyNumber | None:
-    """Damping ratio of all modes; of the material by its loss factor, which has a stand-in."""
-    if isinstance(ratio, MaterialDamping):
-        return ratio.ratio(loss or LOSS_STAND_IN)
-    return ratio
+def ratios_of(
+    ratio: FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...] | None, loss: FuzzyNumber | None
+) -> dict[str, FuzzyNumber]:
+    """Damping ratios by the names of their parameters: none, of all modes, or one of each.
+
+    That of the material comes from its loss factor, which has a stand-in.
+    """
+    if ratio is None:
+        return {}
+    if isinstance(ratio, tuple) and len(ratio) > 1:
+        return {f"zeta{mode}": number for mode, number in enumerate(ratio, start=1)}
+    number = ratio[0] if isinstance(ratio, tuple) else ratio
+    if isinstance(number, MaterialDamping):
+        number = number.ratio(loss or LOSS_STAND_IN)
+    return {"zeta": number}
 
 
 class Frame(Section):
@@ -292,20 +303,20 @@ class Frame(Section):
             RefusedError: Its values make no frame.
         """
         number = self.modulus if self.stiffness else modulus or self.modulus or STAND_IN
-        ratio = ratio_of(self.damping_ratio, loss)
+        ratios = ratios_of(self.damping_ratio, loss)
         try:
-            model = self._model(number, ratio)
+            model = self._model(number, [x.modal for x in ratios.values()])
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        numbers = self._numbers(number, ratio)
+        numbers = self._numbers(number) | ratios
         heights = {
             f"drift{storey}": height
             for storey, height in enumerate(self.per_floor(self.lengths), start=1)
         }
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
-    def _model(self, modulus: FuzzyNumber | None, ratio: FuzzyNumber | None) -> StoreyFrame:
+    def _model(self, modulus: FuzzyNumber | None, ratios: list[float]) -> StoreyFrame:
         return StoreyFrame(
             self._modal(self.masses),
             self._modal(self.lengths),
@@ -318,7 +329,7 @@ class Frame(Section):
             outputs=self.outputs,
             rayleigh=(self.rayleigh_mass.modal, self.rayleigh_stiffness.modal),
             ground=self.accelerogram,
-            damping_ratio=None if ratio is None else ratio.modal,
+            damping_ratio=ratios[0] if len(ratios) == 1 else tuple(ratios) or None,
             columns=() if self.stiffness else self._modal(self.columns),
             stiffness=self._modal(self.stiffness),
         )
@@ -326,17 +337,13 @@ class Frame(Section):
     def _modal(self, values: tuple[FuzzyNumber, ...] | None) -> tuple[float, ...]:
         return tuple(x.modal for x in self.per_floor(values))
 
-    def _numbers(
-        self, modulus: FuzzyNumber | None, ratio: FuzzyNumber | None
-    ) -> dict[str, FuzzyNumber]:
-        """Every number by the name of its parameter; some are none of this frame's."""
+    def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
+        """Numbers but damping ratios by their parameters; some are none of this frame's."""
         numbers: dict[str, FuzzyNumber] = {
             "E": modulus or STAND_IN,
             "rayleigh_mass": self.rayleigh_mass,
             "rayleigh_stiffness": self.rayleigh_stiffness,
         }
-        if ratio is not None:
-            numbers["zeta"] = ratio
         if self.second_moment is not None:
             numbers["I"] = self.second_moment[0]  # of all storeys, where it is one
         for key, symbol in SYMBOLS.items():

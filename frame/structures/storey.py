@@ -226,7 +226,8 @@ class StoreyFrame:
             RefusedError: The name is neither a group nor a parameter.
         """
         patterns = {"m": "m{}", "d": "d{}", "q0": "q{}_0", "v0": "v{}_0"}
-        patterns |= {x: x + "{}" for x in "klcI" if f"{x}1" in self.parameters}
+        lists = [x for x in (*"klcI", "zeta") if f"{x}1" in self.parameters]
+        patterns |= {x: x + "{}" for x in lists}
         if name == "F" and self.loads:
             return self.force_names
         if name in patterns:

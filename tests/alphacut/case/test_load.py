@@ -188,6 +188,18 @@ def test_a_key_is_changed_from_the_command_line(tmp_path, change, value, expecte
     assert value(read(tmp_path, FRAME, [change])) == expected
 
 
+def test_damping_ratios_may_be_given_one_a_mode(tmp_path):
+    floors = FRAME.replace('masses = ["[9, 10, 11] t"]', 'masses = ["[9, 10, 11] t", "9 t"]')
+    key = "frame.damping_ratio"
+    structure = read(tmp_path, floors, [f'{key}=["2 %", "[3, 4, 5] %"]']).frame.structure()
+    assert structure.model.damping_ratio == (0.02, 0.04)
+    cuts = {name: number.cut(0) for name, number in structure.inputs(("zeta",)).items()}
+    assert cuts["zeta2"] == pytest.approx((0.03, 0.05))
+    assert set(cuts) == {"zeta2"}  # zeta1 is one number
+    with pytest.raises(BadInput, match=key):
+        read(tmp_path, floors, [f'{key}=["2 %", "3 %", "4 %"]'])
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
