@@ -11,6 +11,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -48,14 +49,16 @@ class PartStore:
 
     def read(self, path: Path) -> Found | None:
         """Bounds on each level, or None where there are none that can be read."""
+        if path.is_symlink() or not path.is_file():
+            return None
         try:
             with np.load(path, allow_pickle=False) as arrays:
                 return [_unpacked(arrays, k) for k in range(int(arrays["levels"]))]
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile):
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
             return None
 
     def write(self, path: Path, found: Found) -> None:
-        """Store bounds, all or none of a file."""
+        """Stores bounds, all or none of a file; a full disk costs only what would be read again."""
         arrays: dict[str, Array] = {"levels": np.array(len(found))}
         for k, bounds in enumerate(found):
             arrays |= {f"{k}.{name}": array for name, array in _arrays_of(bounds).items()}

@@ -79,12 +79,12 @@ def convolve(
     at, total = product_places(d, *degrees), count(d, sum(degrees))
     shape = bilinear(a[0], b[0]).shape
     out = np.zeros((total, *shape))
-    inner, longer = (a.shape[-1] if bilinear is matmul else 1), max(len(a), len(b))
+    inner, longer = (a.shape[-1] if bilinear == matmul else 1), max(len(a), len(b))
     if longer * out[0].size * inner <= SMALL:
-        if bilinear is matmul and a.ndim == b.ndim == 3:
+        if bilinear == matmul and a.ndim == b.ndim == 3:
             _add_matrix_products(a, b, at, out)
             return out
-        if bilinear is np.multiply:
+        if bilinear == np.multiply:
             wide = (np.broadcast_to(c, (len(c), *shape)).reshape(len(c), -1) for c in (a, b))
             _add_products(*wide, at, out.reshape(total, -1))
             return out

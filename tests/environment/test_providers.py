@@ -30,6 +30,7 @@ DIRECT = {
     "jinja2": "python3-jinja2",
     "jsonschema": "python3-jsonschema",
     "matplotlib": "python3-matplotlib",
+    "mpl_toolkits": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
     "mpmath": "python3-sympy",  # which depends on it

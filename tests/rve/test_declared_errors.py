@@ -32,7 +32,7 @@ def covered(draw, cells, seed):
 @pytest.mark.parametrize("draw", ["round_cell", pytest.param("any_cell", marks=pytest.mark.slow)])
 def test_finite_elements_cover_on_a_few_random_cells(draw):
     ratios = covered(draw, 2, 3)
-    assert {"E", "ν", "C11 + C12", "C11 − C12", "C33", "stiffness", "s11", "s12"} <= set(ratios)
+    assert {"E", "ν", "C11 + C12", "C11 − C12", "C33", "s11", "s12"} <= set(ratios)
 
 
 def test_a_wrong_number_is_seen_by_the_judge():

@@ -63,7 +63,8 @@ def test_check_prints_what_was_read(tmp_path, capfd):
     assert "22.00 GPa … 24.00 GPa … 26.00 GPa  triangle" in out
     assert out.endswith("no problems\n")
     assert (
-        "record: 2001 samples, peak 2.500 m/s^2" in spoken(capfd, "check", "cases/building.toml")[1]
+        "record: 2001 samples of 0.01 s, peak 2.500 m/s^2, 0.255 g"
+        in spoken(capfd, "check", "cases/building.toml")[1]
     )
 
 

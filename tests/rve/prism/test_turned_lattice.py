@@ -1,5 +1,6 @@
 """The square lattice at 45 degrees, as a cell of two particles on a mesh of one's own."""
 
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ RADIUS = 0.6
 def stiffness_of_two(folder, size, monkeypatch):
     """C of particles at (−½, −½) and (½, ½), whose spacing √2 lies along the diagonals."""
     monkeypatch.syspath_prepend(MESHES)
-    import plane
+    plane = import_module("plane")
 
     monkeypatch.setattr(plane, "FOLDER", folder)
     plane.start()
