@@ -30,7 +30,6 @@ DIRECT = {
     "jinja2": "python3-jinja2",
     "jsonschema": "python3-jsonschema",
     "matplotlib": "python3-matplotlib",
-    "mpl_toolkits": "python3-matplotlib",
     "meshio": "python3-meshio",
     "mpi4py": "python3-mpi4py",
     "mpmath": "python3-sympy",  # which depends on it
@@ -48,6 +47,8 @@ DIRECT = {
     "ufl": "python3-dolfinx",
     "xarray": "python3-xarray",
 }
+LOCAL = {"_typeshed", "mpl_toolkits", "plane"}
+"""Names within others: of mypy, of Matplotlib, and meshes/plane.py."""
 INDIRECT = {  # imported by others on this project's behalf
     "cffi": "python3-cffi",  # DOLFINx, to compile forms
     "h5py": "python3-h5py",  # meshio, to write .xdmf
@@ -93,7 +94,7 @@ def foreign_imports() -> set[str]:
     files = [file for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")]
     assert len(files) > 200
     names = set().union(*(imports_of(file.read_text(encoding="utf-8")) for file in set(files)))
-    return names - sys.stdlib_module_names - set(FOLDERS) - {"_typeshed"}  # mypy's own
+    return names - sys.stdlib_module_names - set(FOLDERS) - LOCAL
 
 
 def environment_packages() -> set[str]:
