@@ -62,15 +62,12 @@ class PartStore:
         arrays: dict[str, Array] = {"levels": np.array(len(found))}
         for k, bounds in enumerate(found):
             arrays |= {f"{k}.{name}": array for name, array in _arrays_of(bounds).items()}
-        try:
+        with suppress(OSError):
             self.folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=self.folder) as folder:
                 partial = Path(folder) / path.name
                 np.savez(partial, **arrays)  # type: ignore[arg-type]
                 os.replace(partial, path)
-        except OSError:
-            with suppress(OSError):
-                self.folder.rmdir()
 
 
 def _arrays_of(bounds: PartBounds | UnprovedError) -> dict[str, Array]:

@@ -211,11 +211,14 @@ class StageStore:
             return
         if self.fresh:
             rmtree(path, ignore_errors=True)
-        yield path
-        if rank() == 0:
-            rmtree(path, ignore_errors=True)
-            with suppress(OSError):
-                path.parent.rmdir()
+        try:
+            yield path
+            if rank() == 0:
+                rmtree(path, ignore_errors=True)
+        finally:
+            for folder_of_parts in (path, path.parent):
+                with suppress(OSError):  # it holds parts
+                    folder_of_parts.rmdir()
 
     def _samples(self, folder: ResultsFolder) -> Path:
         """The store of samples, which the manifest lists before it is made.
