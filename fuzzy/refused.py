@@ -149,7 +149,9 @@ def chosen(key: str, value: object, names: Iterable[str]) -> None:
     require(value in allowed, key, value=value, allowed=", ".join(allowed))
 
 
-def require(holds: bool | np.bool_, key: str, value: object, allowed: str, cure: str = "") -> None:
+def require(
+    holds: bool | np.bool_, key: str, *, value: object, allowed: str, cure: str = ""
+) -> None:
     """Refuse a value unless a condition holds; the other arguments are those of `RefusedError`.
 
     Raises:

@@ -212,4 +212,4 @@ class MatricesSection(Section):
         ends = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(ends[:8])}, or a table by unknown"
         moved = bool(self._pattern().any())
-        require(moved, "matrices.direction", self.direction or None, allowed)
+        require(moved, "matrices.direction", value=self.direction or None, allowed=allowed)

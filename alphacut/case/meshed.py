@@ -68,7 +68,7 @@ class MeshedCell(Section):
         missing = [name for name, phase in self.phases.items() if phase.loss is None]
         complete = len(missing) in (0, len(self.phases))
         key = f"cell.phases.{missing[0]}.loss" if missing else ""
-        require(complete, key, None, "a loss factor of each phase, 0 for none")
+        require(complete, key, value=None, allowed="a loss factor of each phase, 0 for none")
         return self
 
     @property

@@ -140,7 +140,7 @@ class CutSearch:
             return float(changes[0]), (changes[1:] - changes[0]) / steps
 
         # both minimisers begin with a step of one gradient
-        factor = min(_STEEPNESS, first_step / max(np.linalg.norm(shares(start)[1]), _FLAT))
+        factor = min(_STEEPNESS, first_step / max(float(np.linalg.norm(shares(start)[1])), _FLAT))
 
         def objective(unit: Array) -> tuple[float, Array]:
             change, gradient = shares(unit)

@@ -23,7 +23,7 @@ so that the spline keeps lobes apart. Vertices are put on the outline itself aft
 
 
 def triangles(
-    size: float, radius: float, outline: Outline, sizes: Sizes | None, thickness: float = 0.0
+    size: float, radius: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
 ) -> Triangles:
     """Vertices (n, 2), triangles (m, 3) and their phases (m,): matrix 0, particle 1, interphase 2.
 
