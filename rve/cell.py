@@ -236,13 +236,12 @@ def moduli_of_energies(energies: Array, loads: Array) -> Array:
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """The three moduli, shape (…, axes, 3).
+    """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, axes, 3).
 
-    Of the square-symmetric part where that is all there is, else besides with C11 and with C22
-    alone.
+    Those of the square-symmetric part; unless `square`, then those by C11 and by C22 alone.
     """
-    readings = [square_moduli(stiffness)]
+    moduli = [square_moduli(stiffness)]
     for k in () if square else (0, 1):
         axial, lateral = stiffness[..., k, k], stiffness[..., 0, 1]
-        readings.append(np.stack([axial + lateral, axial - lateral, stiffness[..., 2, 2]], -1))
-    return np.stack(readings, axis=-2)
+        moduli.append(np.stack([axial + lateral, axial - lateral, stiffness[..., 2, 2]], -1))
+    return np.stack(moduli, axis=-2)

@@ -33,7 +33,7 @@ class Ellipse:
         turn: Angle from x1 to the first, counterclockwise, in degrees.
 
     Raises:
-        RefusedError: The aspect is out of range, or the angle is none.
+        RefusedError: The aspect is out of range, or the angle is not finite.
 
     Example:
         >>> Ellipse(aspect=2.0, turn=30.0).aspect
@@ -94,22 +94,16 @@ def require_fit(outline: Outline, radius: float, most: float = 1.0) -> None:
 
 
 def bend_radii(outline: Outline) -> tuple[Array, Array]:
-    """Points x(φ) of an outline of ρ = 1 and how sharply it bends there.
+    """Points x(φ) of an outline of ρ = 1, (n, 2), and bend radii |x'|²/|x''| there, (n,).
 
-    The measure is |x'|²/|x''|: the radius of curvature where the angle φ runs evenly along the
-    outline, and less where it does not. Edges that are short beside it have their nodes, which are
-    even in φ, nearly even along the arc.
-
-    Returns:
-        Shapes (n, 2) and (n,).
+    This is the radius of curvature (large where flat) where φ runs evenly along the outline, and
+    less elsewhere. Nodes are even in φ; on edges short against it they are nearly even in arc
+    length too.
     """
     angles: Array = np.asarray(np.arange(_BENDS) * (2 * np.pi / _BENDS), float)
     points = outline(angles)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    before, after, step = (
-        np.roll(points, 1, axis=0),
-        np.roll(points, -1, axis=0),
-        2 * np.pi / _BENDS,
-    )
-    speed = (after - before) / (2 * step)
-    turn = (after - 2 * points + before) / step**2
-    return points, np.asarray((speed**2).sum(axis=1) / np.maximum(np.hypot(*turn.T), 1e-12))
+    before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
+    step = 2 * np.pi / _BENDS
+    first = (after - before) / (2 * step)
+    second = (after - 2 * points + before) / step**2
+    return points, np.asarray((first**2).sum(axis=1) / np.maximum(np.hypot(*second.T), 1e-12))

@@ -1,4 +1,4 @@
-"""Levels and columns of prisms that were extruded, found by their vertical edges."""
+"""Levels and columns of extruded prisms, found by their vertical edges."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _levels(prisms: Prisms) -> tuple[Array, Rows]:
 
 
 def _columns(prisms: Prisms) -> tuple[Rows, int]:
-    """Column of each node by the vertical edges of the prisms, and their number."""
+    """Column of each node by the vertical edges of the prisms, (n,), and the number of columns."""
     below = prisms.cells[:, BELOW + BELOW[:3]].ravel()
     above = prisms.cells[:, ABOVE + HALF_WAY].ravel()
     size = len(prisms.points)
@@ -183,14 +183,14 @@ def _triangles(vertices: Rows, layer: Rows) -> Rows:
 def _plane(
     points: Array, cells: Rows, inside: Mask, radius: float, outline: Outline
 ) -> Triangulation:
-    """The planar mesh of the lowest level.
+    """Triangulation of the lowest level, with its edges and its nodes on the interface.
 
     Args:
-        points: Positions of its nodes, vertices first, shape (n, 2).
-        cells: Prisms of the lowest layer, shape (m, 15).
-        inside: Whether they belong to the particle, shape (m,).
-        radius: Of the particle, 0 for none.
-        outline: Of the particle.
+        points: Positions of the nodes, vertices first, shape (n, 2).
+        cells: Nodes of the prisms of the lowest layer in Basix's order, shape (m, 15).
+        inside: Mask of the prisms in the particle, shape (m,).
+        radius: Radius of the particle, 0 for none.
+        outline: Outline of the particle.
     """
     triangles = cells[:, BELOW]
     vertices = int(triangles[:, :3].max()) + 1
@@ -198,15 +198,17 @@ def _plane(
     for middle, (first, second) in zip((3, 4, 5), ((0, 1), (0, 2), (1, 2)), strict=True):
         ends[triangles[:, middle] - vertices] = triangles[:, [first, second]]
     edge_ends, _, on_interface = square.edges(triangles[:, :3], inside)
-    arc = np.zeros(len(points), bool)
-    arc[edge_ends[on_interface]] = True
-    pairs = np.sort(ends, axis=1)
-    arc[vertices:] = _rows_in(pairs, edge_ends[on_interface])
-    return Triangulation(points, vertices, ends, triangles, inside, arc, radius, outline)
+    interface_edges = edge_ends[on_interface]
+    is_on_interface = np.zeros(len(points), bool)
+    is_on_interface[interface_edges] = True
+    is_on_interface[vertices:] = _rows_in(np.sort(ends, axis=1), interface_edges)
+    return Triangulation(
+        points, vertices, ends, triangles, inside, is_on_interface, radius, outline
+    )
 
 
 def _rows_in(rows: Rows, candidates: Rows) -> Mask:
-    """Whether each row of pairs is among candidates, shape (n,)."""
+    """Mask of the pairs (n, 2) that are among candidates (k, 2), shape (n,)."""
     size = int(rows.max(initial=0)) + 1
     return np.isin(rows @ [size, 1], candidates @ [size, 1])
 

@@ -1,4 +1,4 @@
-"""Plane cell as Gmsh triangles of any order with a curved interface."""
+"""Two-dimensional cell of Gmsh triangles of any order with a curved interface."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MATRIX, PARTICLE, INTERPHASE = range(3)
 COARSEST = 0.7  # mesh size: on coarser ones small particles hide from every order
 
 ORDERS = 2, 3, 4, 5
-"""Polynomial degrees for which meshes about particles that are not round are sound."""
+"""Polynomial degrees for which meshes about particles that are not round are valid."""
 
 
 @dataclass(frozen=True)

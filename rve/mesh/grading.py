@@ -1,4 +1,4 @@
-"""Edge lengths of the plane cell: short near small particles, in gaps, and where outlines bend."""
+"""Edge lengths of the planar cell: short near small particles, in gaps, and where outlines bend."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ radii from 0.1 to 0.98."""
 
 
 REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
-"""Factors of `bend_grading` that are tried one after the other until all elements are sound."""
+"""Factors of `bend_grading` that are tried one after the other until all elements are valid."""
 
 
 def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) -> Sizes:
@@ -34,19 +34,19 @@ def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) ->
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     """Edge length that follows the bends of an outline over the nominal one, at (x1, x2).
 
-    On the outline as long beside its bend radius as on a circle beside the radius, divided by
-    `refinement`; from there it grows as about a circle.
+    On the outline its ratio to the bend radius is that of edge and radius on a circle, divided by
+    `refinement`; off the outline it grows as around a circle.
 
     Args:
         outline: Of the particle.
         radius: Its radius.
         refinement: Above 1 edges are shorter.
     """
-    places, bends = bend_radii(outline)
-    px, py = radius * places.T
-    bends = radius * bends
-    share = _PER_RADIUS / refinement
-    return lambda x, y: share * float((bends + np.hypot(px - x, py - y)).min())
+    points, radii = bend_radii(outline)
+    px, py = radius * points.T
+    radii = radius * radii
+    factor = _PER_RADIUS / refinement
+    return lambda x, y: factor * float((radii + np.hypot(px - x, py - y)).min())
 
 
 def _around(x: float, y: float, wide: float, high: float, least: float) -> float:

@@ -1,4 +1,4 @@
-"""Periodicity by elimination; the corner is fixed (section 4.2).
+"""Periodicity by elimination of degrees of freedom; the corner is fixed (section 4.2).
 
 The four corners are one periodic node; its fluctuation is fixed on the whole line over θ, because a
 translation u = c(θ) costs no energy at any θ.
@@ -16,12 +16,12 @@ from alphacut.fuzzy.refused import FailedError
 from alphacut.rve.mesh.triangulation import Triangulation
 
 SAME_PLACE = 1e-8
-"""Distance of two nodes that are one, in halves of the side: far above the noise of Gmsh's
+"""Distance below which two nodes coincide, in halves of the side: far above the noise of Gmsh's
 coordinates (3e-13), far below the shortest edge (1e-4). More would join nodes of tiny elements."""
 
 
 class MeshError(FailedError):
-    """A mesh of the cell is not sound."""
+    """A mesh of the cell is invalid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class Periodicity:
 
 @lru_cache(maxsize=4)
 def identify(plane: Triangulation) -> Periodicity:
-    """Pair the nodes on opposite sides of the cell."""
+    """Periodic unknowns of a planar mesh; cached."""
     unknown = unknowns(plane.points)
     return Periodicity(unknown, int(unknown[: plane.vertices].max()) + 1, int(unknown.max()) + 1)
 
@@ -72,29 +72,29 @@ def unknowns(points: Array) -> Rows:
 
 
 def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
-    """Nodes of the side x = −1 and, in the same order, their nearest nodes of the side x = 1.
+    """Periodic pairs of nodes: those of the side x = −1 and their partners on x = 1, each (k,).
 
-    Along a side there is one coordinate, so that the nearest nodes are those of the same rank.
+    Sorted along the side, partners have the same rank: a side has one coordinate.
 
     Args:
         points: Positions, shape (n, 2).
-        on_side: Whether a node lies on either side, shape (n,).
+        on_side: Mask of the nodes on one of the two sides, shape (n,).
         axis: 0 for the sides x1 = ±1, 1 for x2 = ±1.
 
     Raises:
         MeshError: A node has no partner within `SAME_PLACE`.
     """
-    along = points[:, 1 - axis]
+    tangential = points[:, 1 - axis]
     sides = [
-        nodes[np.argsort(along[nodes])]
+        nodes[np.argsort(tangential[nodes])]
         for nodes in (np.flatnonzero(on_side & (sign * points[:, axis] > 0)) for sign in (-1, 1))
     ]
     count = min(map(len, sides))
-    gaps = abs(along[sides[0][:count]] - along[sides[1][:count]])
+    gaps = abs(tangential[sides[0][:count]] - tangential[sides[1][:count]])
     if len(sides[0]) != len(sides[1]) or (gaps > SAME_PLACE).any():
-        lone = int(np.argmax(np.append(gaps > SAME_PLACE, True)))
-        longer = max(sides, key=len)
-        side = f"x{axis + 1} = ±1 at x{2 - axis} = {along[longer[lone]]:.6g}"
+        unpaired = int(np.argmax(np.append(gaps > SAME_PLACE, True)))
+        coordinate = tangential[max(sides, key=len)[unpaired]]
+        side = f"x{axis + 1} = ±1 at x{2 - axis} = {coordinate:.6g}"
         raise MeshError(
             f"a node of the sides {side} has no partner on the opposite side",
             "mesh opposite sides alike",

@@ -16,7 +16,7 @@ RING_LAYERS = 2
 """Layers of elements across an interphase; with quadratic ones E is off by some (thickness/2)⁴."""
 Sizes = Callable[[float, float], float]
 EDGES = ((1, 2), (0, 2), (0, 1))
-"""Of a triangle by their vertices, in Basix's order."""
+"""Edges of a triangle by their vertices, in Basix's order."""
 SPLINE_STEPS = 16, 128
 """Fewest and most steps of the spline through a quarter of an outline; four a radian of its turn,
 so that the spline keeps lobes apart. Vertices are put on the outline itself afterwards."""
@@ -30,9 +30,9 @@ def triangles(
     Args:
         size: Edge length, in halves of the cell's side.
         radius: Radius of the particle.
-        outline: Of the particle.
+        outline: Outline of the particle.
         sizes: Edge length at (x1, x2), in place of `size`.
-        thickness: Of a ring around it, 0 for none.
+        thickness: Thickness of the interphase around it, 0 for none.
     """
     with model() as gmsh:
         parts = surfaces(size, radius, outline, thickness, sizes)
@@ -60,14 +60,17 @@ def surfaces(
     thickness: float = 0.0,
     sizes: Sizes | None = None,
 ) -> dict[int, list[int]]:
-    """Surfaces in Gmsh of each phase by its number: particle 1, matrix 0, interphase 2.
+    """Add the cell's geometry to the current Gmsh model; tags of its surfaces by phase number.
 
     Args:
         size: Edge length, in halves of the cell's side.
-        radius: Of the particle, 0 for none.
-        outline: Of the particle.
-        thickness: Of a ring around it, 0 for none.
-        sizes: Edge length at (x1, x2), which the arcs of a ring take; `size` if left out.
+        radius: Radius of the particle, 0 for none.
+        outline: Outline of the particle.
+        thickness: Thickness of the interphase around it, 0 for none.
+        sizes: Edge length at (x1, x2) for the arcs of the interphase; `size` if left out.
+
+    Returns:
+        Gmsh tags by phase: matrix 0, particle 1, interphase 2; absent phases have no key.
     """
     import gmsh
 
@@ -108,7 +111,7 @@ def model() -> Iterator[Any]:
 
 
 def grade(gmsh: Any, sizes: Sizes) -> None:
-    """Take edge lengths from a function alone."""
+    """Let a function alone set the edge lengths of the mesh."""
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
     # of the size along a curve; the default asks for thousands of points
@@ -131,14 +134,14 @@ def _sides(geo: Any, size: float) -> int:
 
 
 def _square(geo: Any, size: float) -> list[int]:
-    """The cell without a particle: its surface."""
+    """Tag of the surface of a cell without a particle, in a list."""
     surface = geo.addPlaneSurface([_sides(geo, size)])
     geo.synchronize()
     return [surface]
 
 
 def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
-    """Elements along a quarter of a ring: the shortest edge that is wanted on its outer circle."""
+    """Number of elements along a quarter of a ring, of the shortest edge of its outer circle."""
     angles = np.linspace(0, np.pi / 2, 181)
     least = min(sizes(outer * np.cos(angle), outer * np.sin(angle)) for angle in angles)
     return max(2, int(np.ceil(np.pi / 2 * inner / least)))
@@ -147,7 +150,7 @@ def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
 def _particle_in_ring(
     geo: Any, size: float, radii: tuple[float, float], steps: int
 ) -> dict[int, list[int]]:
-    """Cell with a round particle in a ring of structured layers: surfaces of each phase."""
+    """Surface tags by phase of a round particle (1), the matrix (0) and a structured ring (2)."""
     import gmsh
 
     axes, centre = ((1, 0), (0, 1), (-1, 0), (0, -1)), geo.addPoint(0, 0, 0, size)
@@ -175,13 +178,13 @@ def _particle_in_ring(
 
 def _spline_steps(outline: Outline) -> int:
     """Steps of the spline through a quarter of an outline."""
-    points, bends = bend_radii(outline)
-    sharpest = float((np.hypot(*points.T) / bends).max())
-    return int(np.clip(4 * np.ceil(sharpest), *SPLINE_STEPS))
+    points, radii = bend_radii(outline)
+    largest_ratio = float((np.hypot(*points.T) / radii).max())
+    return int(np.clip(4 * np.ceil(largest_ratio), *SPLINE_STEPS))
 
 
 def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[int, int]:
-    """Cell with its particle bounded by four curves: surfaces of particle and matrix."""
+    """Surface tags of a particle bounded by four curves, and of the matrix around it."""
     import gmsh
 
     def point(angle: float) -> int:

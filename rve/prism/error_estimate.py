@@ -1,8 +1,8 @@
-"""Error of a product-space result, measured against the exact plane cell at each θ.
+"""Declared error of a product-space result: its distance from a reference model, plus that error.
 
-The product space has no θ-derivative, so its exact solution at each θ is a plane cell: the
-multipole series for circles of isotropic phases, slices of order 4 for all others. Neither shares
-elements or mesh with the wedges; its own declared error is added.
+The product space has no θ-derivative, so its exact solution at each θ is that of a two-dimensional
+unit cell. The reference solves that cell by the multipole series for circles of isotropic phases,
+by slices of order 4 for all others; neither shares elements or mesh with the prisms.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from alphacut.rve.result import HomogenisedStiffness, StressCurve
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.slices.model import SlicesModel
 
-_ACCURACY = 1e-9  # of the series
-_POINTS = 14  # of slices in θ
+_ACCURACY = 1e-9  # relative, of the series
+_POINTS = 14  # slices in θ
 
 
 def with_errors(result: HomogenisedStiffness) -> HomogenisedStiffness:
@@ -34,28 +34,29 @@ def with_errors(result: HomogenisedStiffness) -> HomogenisedStiffness:
         RuleError: The map of the radius is not smooth.
     """
     assert result.cell is not None
-    exact = _exact(result.cell)
-    moduli, truth = _readings(result.curve), _readings(exact.curve)
-    # where one load is lacking, s11 is along x1
-    truth = truth[1:] if len(moduli) == 1 else truth
-    pairs = [_relative_distance(*pair) for pair in zip(moduli, truth, strict=False)]
-    distance = np.max(pairs, axis=0)  # nan where a modulus is not known
-    error = np.asarray((1 + distance) * (1 + exact.modulus_errors) - 1)
-    return replace(result, errors={"space": error}, energies=_judged_energies(result, exact))
+    reference = _reference_result(result.cell)
+    moduli, reference_moduli = _mean_moduli(result.curve), _mean_moduli(reference.curve)
+    if len(moduli) == 1:  # two loads: s11 is along x1
+        reference_moduli = reference_moduli[1:]
+    pairs = zip(moduli, reference_moduli, strict=False)
+    distance = np.max([_relative_distance(*pair) for pair in pairs], axis=0)  # nan where unknown
+    error = np.asarray((1 + distance) * (1 + reference.modulus_errors) - 1)
+    energies = _energies_with_errors(result, reference)
+    return replace(result, errors={"space": error}, energies=energies)
 
 
-def _judged_energies(
-    result: HomogenisedStiffness, exact: HomogenisedStiffness
+def _energies_with_errors(
+    result: HomogenisedStiffness, reference: HomogenisedStiffness
 ) -> PhaseEnergies | None:
-    """Energies of the phases with their distance from the exact cell as declared errors."""
-    if result.energies is None or exact.energies is None:
+    """Energies of the phases; declared error: distance from the reference, plus its own error."""
+    if result.energies is None or reference.energies is None:
         return result.energies
-    values = result.energies.values
-    return PhaseEnergies(values, abs(values - exact.energies.values) + exact.energies.errors)
+    values, errors = result.energies.values, reference.energies.errors
+    return PhaseEnergies(values, abs(values - reference.energies.values) + errors)
 
 
-def _exact(cell: Cell) -> HomogenisedStiffness:
-    """Result of another model of the cell, far more accurate than wedges are."""
+def _reference_result(cell: Cell) -> HomogenisedStiffness:
+    """Result of the series or the slices for the cell, far more accurate than that of prisms."""
     matrix, inclusion = cell.matrix, cell.inclusion
     if (
         cell.square
@@ -70,10 +71,10 @@ def _exact(cell: Cell) -> HomogenisedStiffness:
     return model.solve(cell.radius, matrix, [inclusion], cell.interphase)[0]
 
 
-def _readings(curve: StressCurve) -> Sequence[Array]:
-    """The mean moduli, (3,), along either axis and, at last, of both.
+def _mean_moduli(curve: StressCurve) -> Sequence[Array]:
+    """Mean C11 + C12, C11 − C12 and C33, (3,), in Pa: by C22 in place of C11, by C11, by both.
 
-    Where no third load was solved, C11 − C12 is not known, and only those printed are.
+    Without a third load C11 − C12 is nan, and the list has one entry, of σ11 and σ12 alone.
     """
     s11, s12 = curve.mean
     if curve.stiffness is None:
@@ -84,5 +85,5 @@ def _readings(curve: StressCurve) -> Sequence[Array]:
 
 
 def _relative_distance(first: Array, second: Array) -> Array:
-    """Relative distance by the larger of both ratios."""
+    """Larger of both ratios less 1, entry by entry."""
     return np.asarray(np.maximum(first / second, second / first) - 1)

@@ -11,7 +11,7 @@ from alphacut.fuzzy.arrays import Array
 
 
 def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
-    """Voigt matrices (…, 6, 6) from K, (C11 − C12)/2 and C44."""
+    """Stiffness in Voigt order, (…, 6, 6), from K, (C11 − C12)/2 and C44, (…,), in their unit."""
     voigt = np.zeros((*np.shape(bulk), 6, 6))
     voigt[..., :3, :3] = np.asarray(bulk - 2 / 3 * deviator)[..., None, None]
     for i in range(3):
@@ -21,7 +21,7 @@ def cubic_voigt(bulk: Array, deviator: Array, shear: Array) -> Array:
 
 
 def cubic_moduli(stiffness: Array) -> Array:
-    """K, (C11 − C12)/2 and C44 of the cubic part of matrices (…, 6, 6), shape (…, 3)."""
+    """K, (C11 − C12)/2 and C44, (…, 3), of the cubic part of a stiffness (…, 6, 6)."""
     diagonal = np.diagonal(stiffness, axis1=-2, axis2=-1)
     axial, shear = diagonal[..., :3].mean(axis=-1), diagonal[..., 3:].mean(axis=-1)
     lateral = (stiffness[..., 0, 1] + stiffness[..., 0, 2] + stiffness[..., 1, 2]) / 3

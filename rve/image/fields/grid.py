@@ -19,7 +19,7 @@ COLUMNS = 6144  # pixels times loads worked on at once: what the second cache ho
 
 @dataclass(frozen=True)
 class Operator:
-    """Sum over pixels of the element matrices for the coefficients of each pixel.
+    """Stiffness of a pixel grid: sum of the element matrices times each pixel's coefficients.
 
     Args:
         element: Unknowns and modes of a pixel.
@@ -32,7 +32,7 @@ class Operator:
     deviator: Array
 
     def apply(self, fields: Array) -> Array:
-        """The operator on fields of shape (loads, unknowns, rows, columns)."""
+        """Product with fields, shape (loads, unknowns, rows, columns), of the same shape."""
         result = np.zeros_like(fields)
         modes = [self.element.modes[part] for part in self.element.parts]
         matrix = np.hstack([m.T @ m for m in modes])
@@ -44,9 +44,12 @@ class Operator:
         return result
 
     def load(self, mean_modes: Array) -> Array:
-        """Minus the operator on uniform fields of some modes, shape (mode rows, loads)."""
-        count = mean_modes.shape[1]
-        result = np.zeros((count, self.element.unknowns, *self.trace.shape))
+        """Right-hand sides of uniform fields: minus their nodal forces, shaped like fields.
+
+        Args:
+            mean_modes: Modes of each uniform field, from `Element.mean_modes`, (modes, loads).
+        """
+        result = np.zeros((mean_modes.shape[1], self.element.unknowns, *self.trace.shape))
         forces = [-self.element.modes[p].T @ mean_modes[p] for p in self.element.parts]
         for rows in blocks(result.shape):
             local = sum(
@@ -60,13 +63,13 @@ class Operator:
 def blocks(shape: tuple[int, ...]) -> Iterator[slice]:
     """Slices of rows, each of about `COLUMNS` pixels times loads."""
     loads, _, rows, columns = shape
-    lines = max(1, COLUMNS // (loads * columns))
-    for row in range(0, rows, lines):
-        yield slice(row, min(rows, row + lines))
+    count = max(1, COLUMNS // (loads * columns))
+    for row in range(0, rows, count):
+        yield slice(row, min(rows, row + count))
 
 
 def gathered(element: Element, fields: Array, rows: slice) -> Array:
-    """Local unknowns of the pixels of some rows, shape (n, loads, rows, columns)."""
+    """Element unknowns of the pixels of some rows, shape (n, loads, rows, columns)."""
     lines = np.arange(rows.start, rows.stop)
     local = np.empty((len(element.local), len(fields), lines.size, fields.shape[-1]))
     for k, (kind, up, right) in enumerate(element.local):
@@ -76,7 +79,7 @@ def gathered(element: Element, fields: Array, rows: slice) -> Array:
 
 
 def scatter(element: Element, forces: Array, result: Array, rows: slice) -> None:
-    """Add local forces, shape (n, loads, rows, columns), to the unknowns they belong to."""
+    """Add element forces, (n, loads, rows, columns), of the pixels of some rows to `result`."""
     lines = np.arange(rows.start, rows.stop)
     for k, (kind, up, right) in enumerate(element.local):
         force = np.roll(forces[k], right, axis=-1) if right else forces[k]
