@@ -10,7 +10,7 @@ from typing import TextIO
 
 from alphacut.case.load import Case
 from alphacut.commands.options import Command, add_quiet, add_run, answer, opened
-from alphacut.figures.all import drawn
+from alphacut.figures.all import draw_figures
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require
 from alphacut.io.files import Document, alone, as_json, say, write_text
@@ -54,7 +54,7 @@ def computed(case: Case, store: StageStore, petsc: Mapping[str, str], *, figures
     start = time.perf_counter()
     with pool(store.workers) as executor:
         results = Pipeline(Results(case.content), store, petsc, figures, executor).run()
-        names = drawn(results, store, executor) if figures else []
+        names = draw_figures(results, store, executor) if figures else []
     document: Document = {
         "format_version": FORMAT,
         "case": case.name,

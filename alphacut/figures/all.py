@@ -24,7 +24,7 @@ from alphacut.stages.store import Stage, StageResult, StageStore, Work
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PARTS = 6  # into which the figures are dealt out, so that no process waits long for the other
+PARTS = 6  # tasks that the figures are divided into, so that no process waits long for another
 Drawing = tuple[str, Callable[[], "Figure"]]
 
 
@@ -44,21 +44,24 @@ def drawings(results: Results) -> Iterator[Drawing]:
 
 
 def _material(results: Results) -> Iterator[Drawing]:
-    """Map of radii, which the stage microstructure draws itself; modulus, image, stress."""
-    content, map_of = results.content, results.content.radius_map
+    """Figures of the radius map, the modulus, the stresses and the image.
+
+    The stage microstructure draws the p-box of its own map.
+    """
+    content, radius_map = results.content, results.content.radius_map
     if results.is_paper and content.modulus.method == "prism":
         cell, mesh = modal_cell(*content.round_cell), content.mesh
         yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
-    if map_of is not None and results.microstructure is None:
-        yield "fig13-p-box", partial(material.p_box, map_of)
-    if map_of is not None:
-        yield "fig14-cone", partial(material.cone, map_of)
+    if radius_map is not None and results.microstructure is None:
+        yield "fig13-p-box", partial(material.p_box, radius_map)
+    if radius_map is not None:
+        yield "fig14-cone", partial(material.cone, radius_map)
     if (data := results.modulus) is not None and results.is_paper:
         given = content.round_cell[1].inclusion_modulus
         if isinstance(given, FuzzyNumber):
             cuts = data.document["E_GPa"]
-            ends = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
-            number = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, ends))
+            bounds = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
+            number = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, bounds))
             yield "fig36-fuzzy-numbers", partial(fuzzy_numbers.kinds, given, number)
             yield "fig37-alpha-cuts", partial(fuzzy_numbers.alpha_cuts, given)
     if (data := results.modulus) is not None:
@@ -72,7 +75,7 @@ def _material(results: Results) -> Iterator[Drawing]:
 
 
 def _structure(results: Results) -> Iterator[Drawing]:
-    """The structure, its fuzzy mapping and the walk of the Graph Follower."""
+    """Figures of the structure, its fuzzy mapping and the walk of the Graph Follower."""
     if not results.envelopes or results.structure is None:
         return
     if results.is_paper:
@@ -86,16 +89,16 @@ def _structure(results: Results) -> Iterator[Drawing]:
         yield "fig21-25-graph-follower", partial(follower.follower, results, widest_task)
 
 
-def drawn(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
-    """Draws every figure as SVG and PNG into figures/, unless they show the same already.
+def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:
+    """Draws all figures as SVG and PNG into figures/, unless stored ones have the same inputs.
 
     Args:
-        results: Of the run.
+        results: Results of the run.
         store: Store of the results.
-        executor: Processes that draw side by side; None: this one draws.
+        executor: Processes that draw concurrently; None: this process draws.
 
     Returns:
-        Names of the files, in the folder of the results.
+        Paths of the files, relative to the folder of the results.
     """
     inputs = [results.content, results.answers]
     inputs += [sorted(x.fingerprint for x in results.stages.values())]
@@ -107,7 +110,7 @@ def drawn(results: Results, store: StageStore, executor: Executor | None) -> lis
 
 
 def draw_all(results: Results, executor: Executor | None, work: Work) -> StageResult:
-    """Draws all figures, in parts; the result has their names."""
+    """Draws all figures as `PARTS` tasks; the result has the paths of their files."""
     assert work.folder is not None
     folder = work.folder
     mesh = _mesh(results, folder, executor)
@@ -122,22 +125,22 @@ def draw_all(results: Results, executor: Executor | None, work: Work) -> StageRe
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:
-    """Draws every figure whose place leaves the rest `part`; names of their files."""
+    """Draws the figures whose index modulo `PARTS` is `part`; paths of files in `folder`."""
     with report_style():
         return [
             str(path.relative_to(folder))
-            for name, make in list(drawings(results))[part::PARTS]
-            for path in save(make(), folder / "figures" / file_stem(name, results))
+            for name, draw in list(drawings(results))[part::PARTS]
+            for path in save(draw(), folder / "figures" / file_stem(name, results))
         ]
 
 
 def file_stem(name: str, results: Results) -> str:
-    """The figure's name; the paper's number leads it in the paper's case alone."""
+    """Name of a figure's files: with the paper's number only in the case of the paper."""
     return name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
 
 
 def _mesh(results: Results, folder: Path, executor: Executor | None) -> dict[str, Future[bool]]:
-    """Fig. 15 under way by its file, where prisms gave the modulus."""
+    """Fig. 15 as a future by its file, true if it was drawn; empty without prism elements."""
     prisms = results.content.round is not None and results.content.modulus.method == "prism"
     if results.modulus is None or not prisms:
         return {}

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def draw_decision(document: Document) -> Figure:
     """Peak of each limited output over its limit, a bar for each level."""
     limits = {name: limit for name, limit in document["limits"].items() if name != ANY}
-    drawn, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
+    figure, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
     alpha = np.asarray(document["alpha"], float)
     heights = np.arange(len(limits))[::-1]
     for height, limit in zip(heights, limits.values(), strict=True):
@@ -45,7 +45,7 @@ def draw_decision(document: Document) -> Figure:
     words = [limit_words(x["output"], x["limit"], x["unit"]) for x in limits.values()]
     axes.set_yticks(heights, words, color=INK)
     axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
-    return drawn
+    return figure
 
 
 def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
@@ -63,7 +63,7 @@ def draw_probability(document: Document) -> Figure:
     alpha = np.asarray(document["alpha"], float)
     limits = np.asarray(event["curve"]["limit"], float)
     lower, upper = (np.asarray(event["curve"][side], float) for side in ("lower", "upper"))
-    drawn, axes = style.figure(7.2, 3.6)
+    figure, axes = style.figure(7.2, 3.6)
     for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):
         axes.fill_between(limits, low, high, color=shade, lw=0)
     for end in (lower[-1], upper[-1]):
@@ -74,13 +74,13 @@ def draw_probability(document: Document) -> Figure:
     axes.set_ylabel("probability of exceeding it")
     axes.set_ylim(0, 1.02)
     alpha_legend(axes, alpha)
-    return drawn
+    return figure
 
 
 def draw_tolerances(document: Document) -> Figure:
     """Supports of the case and at the scale that exceeds no limit, over their modal values."""
     supports = document["supports"]
-    drawn, axes = style.figure(7.2, 1.0 + 0.4 * len(supports))
+    figure, axes = style.figure(7.2, 1.0 + 0.4 * len(supports))
     places = np.arange(len(supports))[::-1]
     series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "no limit exceeded"))
     for kind, colour, height, label in series:
@@ -93,7 +93,7 @@ def draw_tolerances(document: Document) -> Figure:
     axes.set_yticks(places, list(supports))
     axes.set_xlabel("value over the modal one")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
+    return figure
 
 
 def draw_fragility(document: Document) -> Figure:
@@ -102,7 +102,7 @@ def draw_fragility(document: Document) -> Figure:
     alpha = np.asarray(document["alpha"], float)
     measure = np.asarray(limit["measure"], float)
     lower, upper = (np.asarray(limit["band"][end], float) for end in ("lower", "upper"))
-    drawn, axes = style.figure(7.2, 3.8)
+    figure, axes = style.figure(7.2, 3.8)
     for low, high, shade in zip(lower, upper, colours(alpha), strict=True):
         axes.fill_between(measure, low, high, color=shade, lw=0, step="post")
     for end in (lower[-1], upper[-1]):
@@ -115,7 +115,7 @@ def draw_fragility(document: Document) -> Figure:
     axes.set_ylabel("share of records that exceed it")
     axes.set_ylim(0, 1.02)
     alpha_legend(axes, alpha)
-    return drawn
+    return figure
 
 
 DRAWINGS: dict[str, Callable[[Document], Figure]] = {

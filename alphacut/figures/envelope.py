@@ -35,7 +35,7 @@ def drawings(
 
 def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure:
     """Nested bands between lower and upper envelope, the error of the lowest, the modal motion."""
-    drawn, axes = style.figure()
+    figure, axes = style.figure()
     shown = dataset.sel(output=output)
     alpha, time = dataset["alpha"].values, dataset["time"].values
     for level, shade in enumerate(style.colours(alpha)[:-1]):
@@ -50,7 +50,7 @@ def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure
     title = f"{Output(output).words}; fuzzy: {', '.join(task.fuzzy)}; {words}"
     style.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     style.alpha_legend(axes, alpha)
-    return drawn
+    return figure
 
 
 def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str) -> str:
@@ -86,7 +86,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
     points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
-    drawn, axes = style.figure()
+    figure, axes = style.figure()
     axes.plot(flow.time, curves.T, color=style.BLUE, lw=0.5, alpha=0.5)
     shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
     for side in ("lower", "upper"):
@@ -94,7 +94,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     time_axes(axes, flow.time, output)
     level = f"α = {float(dataset['alpha']):g}"
     style.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
-    return drawn
+    return figure
 
 
 def identified(document: Document) -> Figure:
@@ -104,7 +104,7 @@ def identified(document: Document) -> Figure:
         document: As of `stages.identify.learned`.
     """
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
-    drawn, axes = style.figure(height=0.9 + 0.32 * len(names))
+    figure, axes = style.figure(height=0.9 + 0.32 * len(names))
     places = np.arange(len(names), dtype=float)[::-1]
     prior = np.array([document["prior"][name] for name in names], float)
     unit = prior.mean(axis=1)[:, None]
@@ -124,12 +124,12 @@ def identified(document: Document) -> Figure:
     axes.set_yticks(places, names)
     axes.set_xlabel("value over the middle of what it was before")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    return drawn
+    return figure
 
 
 def spectra(suite: Document) -> Figure:
     """Pseudo-acceleration of each record over the period, their mean, and T1."""
-    drawn, axes = style.figure(7.2, 3.6)
+    figure, axes = style.figure(7.2, 3.6)
     periods = np.asarray(suite["spectra"]["period_s"], float)
     names = [name for name in suite["spectra"] if name != "period_s"]
     curves = np.array([suite["spectra"][name] for name in names], float)
@@ -140,4 +140,4 @@ def spectra(suite: Document) -> Figure:
     axes.set_xlabel("period [s]")
     axes.set_ylabel(f"Sa [m/s²], damping {suite['damping_ratio']:.3g}")
     axes.legend(fontsize=8)
-    return drawn
+    return figure

@@ -45,7 +45,7 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     time, graphs = flow.time, flow.values(points)[..., column]
     guess, new = walk.guess[0, :, column], walk.new[0, :, column]  # by node and side
     lower, upper = graphs.min(0), graphs.max(0)
-    drawn, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
+    figure, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
     panels = [named[letter] for letter in "12345"]
     places = np.argwhere(new >= 0)
     start = places[0, 0]
@@ -88,8 +88,8 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     for panel in panels[::2]:
         prefix_axis(panel, output, Output(output).unit)
     lines = [Line2D([], [], label=words, **look) for words, look in LINES.items()]
-    drawn.legend(handles=lines, fontsize=8, loc="outside lower center", ncols=3)
-    return drawn
+    figure.legend(handles=lines, fontsize=8, loc="outside lower center", ncols=3)
+    return figure
 
 
 def recorded(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.case.structure import Frame
-from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look, figure
+from alphacut.figures import style
+from alphacut.figures.style import BLUE, GREY, INK, ORANGE, Look
 from alphacut.fuzzy import Crisp
 
 if TYPE_CHECKING:
@@ -17,11 +18,11 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 ARROW = {"arrowstyle": "-|>", "color": ORANGE}
 PITCH = 1.6
-"""Distance of the masses of a chain."""
+"""Distance of the masses of the chain in Fig. 27; a mass is 1 wide."""
 
 
 def frame(section: Frame) -> Figure:
-    """Fig. 26: floors, columns with their lengths or stiffnesses, displacements."""
+    """Fig. 26: floors with mass m and displacement q, columns with length l or stiffness k."""
     stated_lengths = section.lengths or (
         Crisp(3.0),
     )  # not to scale where only stiffnesses are given
@@ -29,7 +30,7 @@ def frame(section: Frame) -> Figure:
     height, level = sum(lengths), 0.0
     span = 0.45 * max(height, 6.0) if len(lengths) < 5 else 0.3 * height
     high = min(9.0, 1.4 + 0.5 * height, 2.31 * height / span)
-    drawn, axes = figure(1.9 * high * span / height, high)
+    figure, axes = style.figure(1.9 * high * span / height, high)
     hatched(axes, (-0.1 * span, 1.1 * span), (-0.03 * span, 0))
     masses, stiffness = section.per_floor(section.masses), section.per_floor(section.stiffness)
     for floor, (length, mass) in enumerate(zip(lengths, masses, strict=True), start=1):
@@ -47,26 +48,32 @@ def frame(section: Frame) -> Figure:
         axes.annotate("", (1.32 * span, level), (1.08 * span, level), arrowprops=ARROW)
         axes.annotate(f"$q_{{{floor}}}$", (1.35 * span, level), va="center", color=ORANGE)
     bare(axes, (-0.6 * span, 1.55 * span), (-0.05 * height, 1.08 * height))
-    return drawn
+    return figure
 
 
 def chain(section: Frame) -> Figure:
-    """Fig. 27: the frame as masses on springs, with its dampers if it has any."""
+    """Fig. 27: the frame as a chain of masses and springs, with its dampers if it has any."""
     floors, placement = section.floors, section.damper_placement if section.damped else None
     foot = -0.9 if placement == "ground" else -0.5
     right, wide = PITCH * floors + 0.2, min(12.0, 2.2 + 1.5 * floors)
-    drawn, axes = figure(wide, 2.15 * wide / (PITCH * floors + 0.5) + 0.1)
+    figure, axes = style.figure(wide, 2.15 * wide / (PITCH * floors + 0.5) + 0.1)
     hatched(axes, (-0.12, 0), (foot, 0.75))
     if placement == "ground":
         hatched(axes, (-0.12, right), (foot - 0.12, foot))
     for floor in range(1, floors + 1):
-        link(axes, floor, placement)
+        draw_storey(axes, floor, placement)
     bare(axes, (-0.2, right + 0.1), (foot - 0.2, 1.05))
-    return drawn
+    return figure
 
 
-def link(axes: Axes, floor: int, placement: str | None) -> None:
-    """A mass with its spring, its damper and the arrow of its displacement."""
+def draw_storey(axes: Axes, floor: int, placement: str | None) -> None:
+    """Draws a floor's mass m, spring k, damper d and displacement q.
+
+    Args:
+        axes: Axes of the chain.
+        floor: Number of the floor, from 1.
+        placement: "ground" or "storey": to what the damper connects the mass; None: no damper.
+    """
     right = PITCH * floor
     left, start = right - 1.0, max(0.0, right - PITCH)
     middle, half = (left + right) / 2, (start + left) / 2
@@ -86,7 +93,7 @@ def link(axes: Axes, floor: int, placement: str | None) -> None:
 
 
 def bare(axes: Axes, across: Point, up: Point) -> None:
-    """Limits of a picture to scale, without axes."""
+    """Sets the limits of a picture to scale, and hides its axes."""
     axes.set_xlim(*across)
     axes.set_ylim(*up)
     axes.set_aspect("equal")
@@ -94,19 +101,19 @@ def bare(axes: Axes, across: Point, up: Point) -> None:
 
 
 def hatched(axes: Axes, across: Point, up: Point) -> None:
-    """A rectangle that stands for the ground."""
+    """Draws a hatched rectangle that stands for the ground."""
     axes.fill_between(across, *up, hatch="////", facecolor="white", edgecolor=GREY, lw=0)
 
 
 def spring(axes: Axes, left: float, right: float, height: float) -> None:
-    """A zigzag between two points at one height."""
+    """Draws a spring as a zigzag between two points at the same height."""
     inner = np.linspace(left + 0.15 * (right - left), right - 0.15 * (right - left), 10)
     zigzag = height + 0.1 * np.array([0, 1, -1, 1, -1, 1, -1, 1, -1, 0])
     axes.plot([left, *inner, right], [height, *zigzag, height], color=BLUE, lw=1.2)
 
 
 def damper(axes: Axes, start: Point, end: Point) -> None:
-    """A dashpot between two points, along the axes."""
+    """Draws a dashpot between two points on a horizontal or vertical line."""
     a, b = np.array(start), np.array(end)
     along, across = (b - a), 0.09 * np.array([a[1] - b[1], b[0] - a[0]]) / np.hypot(*(b - a))
     cup, rim, piston = a + 0.4 * along, a + 0.68 * along, a + 0.55 * along

@@ -41,7 +41,7 @@ def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     import matplotlib.pyplot as plt
 
     numbers = kinds_of(given, result)
-    drawn, panels = plt.subplots(1, len(numbers), figsize=(11.0, 2.6), sharey=True)
+    figure, panels = plt.subplots(1, len(numbers), figsize=(11.0, 2.6), sharey=True)
     for axes, (name, number) in zip(panels, numbers.items(), strict=True):
         number.plot(axes, color=BLUE, lw=1.6)
         margin = 0.15 * (number.support.width or given.support.width)
@@ -51,7 +51,7 @@ def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
         source = "E" if number.modal == result.modal else "E$_i$"
         style.prefix_axis(axes, source, "Pa", across=True)
     panels[0].set_ylabel("membership μ")
-    return drawn
+    return figure
 
 
 def alpha_cuts(number: FuzzyNumber) -> Figure:
@@ -60,7 +60,7 @@ def alpha_cuts(number: FuzzyNumber) -> Figure:
     Args:
         number: Young's modulus of the particle, in Pa.
     """
-    drawn, axes = style.figure()
+    figure, axes = style.figure()
     alpha = np.linspace(0, 1, CUTS)
     number.plot(axes, color=INK, lw=1.4)
     factor, unit = axis_prefix(number.support.upper, "Pa")
@@ -80,4 +80,4 @@ def alpha_cuts(number: FuzzyNumber) -> Figure:
     style.membership_axes(axes, "")
     axes.set_ylim(-0.06, 1.06)
     style.prefix_axis(axes, "fuzzy Young's modulus of the particle E$_i$", "Pa", across=True)
-    return drawn
+    return figure

@@ -35,18 +35,18 @@ def modal_map(section: RadiusMapSection) -> HermiteMap:
 
 
 def distribution(radius: HermiteMap, at: Array) -> Array:
-    """P(r ≤ at) under the law of θ."""
+    """Probabilities P(r ≤ at) of the radius under the law of θ, in the shape of `at`."""
     law = radius.distribution
     theta = np.linspace(law.lower, law.upper, 4001)
     radii, mass = radius((theta[1:] + theta[:-1]) / 2), np.diff(law.cdf(theta))
     order = np.argsort(radii, kind="stable")
-    share = np.cumsum(mass[order]) - mass[order] / 2
-    return np.asarray(np.interp(at, radii[order], share, left=0.0, right=1.0))
+    cdf = np.cumsum(mass[order]) - mass[order] / 2
+    return np.asarray(np.interp(at, radii[order], cdf, left=0.0, right=1.0))
 
 
 def p_box(section: RadiusMapSection) -> Figure:
     """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
-    drawn, axes = style.figure()
+    figure, axes = style.figure()
     corners = maps(section, 0.0)
     low = min(radius.extremes()[0] for radius in corners)
     high = max(radius.extremes()[1] for radius in corners)
@@ -63,15 +63,15 @@ def p_box(section: RadiusMapSection) -> Figure:
     axes.set_ylabel("cumulative distribution")
     axes.set_ylim(0, 1.02)
     axes.legend(loc="lower right")
-    return drawn
+    return figure
 
 
 def cone(section: RadiusMapSection) -> Figure:
     """Fig. 14: the particle in the product domain, of radius r(θ) at every θ."""
     import matplotlib.pyplot as plt
 
-    drawn = plt.figure(figsize=(5.0, 5.4))
-    axes: Any = drawn.add_subplot(projection="3d")
+    figure = plt.figure(figsize=(5.0, 5.4))
+    axes: Any = figure.add_subplot(projection="3d")
     radius = modal_map(section)
     theta, angle = np.linspace(*section.theta, 80), np.linspace(0, 2 * np.pi, 80)
     r = radius(theta)[:, None]
@@ -96,17 +96,18 @@ def cone(section: RadiusMapSection) -> Figure:
     axes.set_yticks([-1, 0, 1])
     axes.set_box_aspect((1, 1, 1.3), zoom=0.88)
     axes.view_init(elev=18, azim=-55)
-    return drawn
+    return figure
 
 
 def levels_of_samples(dataset: xarray.Dataset) -> Array:
-    """Membership of each sample: the least membership of its inputs, shape (samples,).
+    """Membership of each sample: the highest level whose cuts hold all its inputs, (samples,).
 
-    The α-cut of each input is read from where the bounds are reached, which is at its ends.
+    The cut of an input spans the points at which the bounds of E are reached: its ends are two of
+    them where E is monotone in it.
     """
     points, alpha = dataset["point"].values, dataset["alpha"].values
-    places = dataset["E_at"].values
-    low, high = places.min(axis=1), places.max(axis=1)  # (alpha, parameter)
+    extreme_points = dataset["E_at"].values  # (alpha, bound, parameter)
+    low, high = extreme_points.min(axis=1), extreme_points.max(axis=1)  # (alpha, parameter)
     slack = 1e-9 * np.maximum(high[0] - low[0], 1e-300)
     levels = np.full(len(points), alpha[0])
     for level, lower, upper in zip(alpha, low, high, strict=True):
@@ -116,41 +117,45 @@ def levels_of_samples(dataset: xarray.Dataset) -> Array:
 
 
 def stress_curves(dataset: xarray.Dataset) -> Figure:
-    """Fig. 16: homogenised stress 11 over θ, a curve for each fuzzy sample."""
-    drawn, axes = style.figure()
+    """Fig. 16: homogenised stress σ₁₁ over θ, one curve a sample, coloured by its membership.
+
+    Args:
+        dataset: Of the stage modulus; `curve11` has shape (samples, θ), in Pa.
+    """
+    figure, axes = style.figure()
     alpha = dataset["alpha"].values
     shades = dict(zip(alpha, [*style.colours(alpha)[:-1], style.INK], strict=True))
     membership = levels_of_samples(dataset)
-    theta, curves = dataset["theta"].values, dataset["curve11"].values / GPA
-    for sample in np.argsort(membership, kind="stable"):
-        axes.plot(theta, curves[sample], color=shades[membership[sample]], lw=0.8)
+    theta, stress_GPa = dataset["theta"].values, dataset["curve11"].values / GPA
+    for sample in np.argsort(membership, kind="stable"):  # high memberships on top
+        axes.plot(theta, stress_GPa[sample], color=shades[membership[sample]], lw=0.8)
     axes.set_xlabel("θ")
     axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
-    style.title(axes, f"{len(curves)} samples")
+    style.title(axes, f"{len(stress_GPa)} samples")
     style.alpha_legend(axes, alpha)
-    return drawn
+    return figure
 
 
 def mean_stress(dataset: xarray.Dataset) -> Figure:
-    """Fig. 17: mean homogenised stress 11 of every sample, rearranged into α-cuts."""
-    drawn, axes = style.figure()
+    """Fig. 17: mean homogenised stress σ₁₁ of each sample at its membership, and its α-cuts."""
+    figure, axes = style.figure()
     means, levels = dataset["s11_sample"].values / GPA, levels_of_samples(dataset)
     axes.plot(means, levels, ".", color=style.ORANGE, ms=4, zorder=4, label="samples")
     style.shaded_cuts(axes, dataset["alpha"].values, *(dataset["s11"].values / GPA).T)
     style.membership_axes(axes, "mean homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
     axes.legend(loc="upper left")
-    return drawn
+    return figure
 
 
 def fuzzy_modulus(result: StageResult, frame: Frame | None) -> Figure:
-    """Fig. 18: the fuzzy modulus, beside the modulus that the case quotes, and below it fuzzy ν."""
+    """Fig. 18: fuzzy Young's modulus, with the one that the case states, and Poisson's ratio ν."""
     import matplotlib.pyplot as plt
 
     size = (style.WIDTH, 1.75 * style.HEIGHT)
-    drawn, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
+    figure, (axes, below) = plt.subplots(2, 1, figsize=size, height_ratios=(3, 2))
     dataset, average = result.arrays, result.document["average"]
-    alpha, ends = dataset["alpha"].values, dataset["E"].values / GPA
-    style.shaded_cuts(axes, alpha, *ends.T)
+    alpha, modulus_GPa = dataset["alpha"].values, dataset["E"].values / GPA
+    style.shaded_cuts(axes, alpha, *modulus_GPa.T)
     if frame is not None and frame.modulus is not None:
         cuts = np.array([frame.modulus.cut(level) for level in (0.0, 1.0)]) / GPA
         line: style.Look = {
@@ -165,12 +170,12 @@ def fuzzy_modulus(result: StageResult, frame: Frame | None) -> Figure:
     style.membership_axes(axes, f"effective Young's modulus E, {average} (GPa)")
     style.shaded_cuts(below, alpha, *dataset["nu"].transpose("bound", "alpha").values)
     style.membership_axes(below, "effective Poisson's ratio ν of the same")
-    return drawn
+    return figure
 
 
 def membership(dataset: xarray.Dataset) -> Figure:
     """Fig. 19: membership function of a convex fuzzy parameter and one of its α-cuts."""
-    drawn, axes = style.figure()
+    figure, axes = style.figure()
     alpha, (left, right) = dataset["alpha"].values, dataset["E"].values.T / GPA
     lower, upper = (float(np.interp(SHOWN_LEVEL, alpha, side)) for side in (left, right))
     axes.plot(style.outline(left, right), style.outline(alpha, alpha), color=style.INK, lw=1.5)
@@ -181,14 +186,14 @@ def membership(dataset: xarray.Dataset) -> Figure:
     beside: style.Look = {"xytext": (8, -2), "textcoords": "offset points", "va": "center"}
     axes.annotate("core", ((left[-1] + right[-1]) / 2, 1.0), **beside)
     style.membership_axes(axes, "fuzzy parameter, here E (GPa)")
-    return drawn
+    return figure
 
 
 def image(dataset: xarray.Dataset) -> Figure:
-    """Phases as greys to the left, α-cuts of E to the right."""
+    """Segmented phases of the image as greys, and the α-cuts of E."""
     import matplotlib.pyplot as plt
 
-    drawn, (picture, cuts) = plt.subplots(1, 2, figsize=(style.WIDTH, 3.4), width_ratios=(1, 1.4))
+    figure, (picture, cuts) = plt.subplots(1, 2, figsize=(style.WIDTH, 3.4), width_ratios=(1, 1.4))
     picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
     picture.set_xticks([])
     picture.set_yticks([])
@@ -196,4 +201,4 @@ def image(dataset: xarray.Dataset) -> Figure:
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
     style.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)
     style.membership_axes(cuts, "Young's modulus E, plane strain (GPa)")
-    return drawn
+    return figure

@@ -42,12 +42,12 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
     points = grid.positions(cell.radius)
     levels = points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
-    drawn = plt.figure(figsize=(11.0, 4.2))
-    widths = drawn.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
-    draw_plane_mesh(drawn.add_subplot(widths[0]), grid, levels[layers // 2])
-    draw_density(drawn.add_subplot(widths[1]), cell, levels[:, 0, 2])
-    draw_prisms(drawn.add_subplot(widths[2], projection="3d"), grid, levels)
-    return drawn
+    figure = plt.figure(figsize=(11.0, 4.2))
+    widths = figure.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
+    draw_plane_mesh(figure.add_subplot(widths[0]), grid, levels[layers // 2])
+    draw_density(figure.add_subplot(widths[1]), cell, levels[:, 0, 2])
+    draw_prisms(figure.add_subplot(widths[2], projection="3d"), grid, levels)
+    return figure
 
 
 def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
@@ -138,7 +138,7 @@ def stages(results: Results) -> Figure:
     from matplotlib.patches import FancyBboxPatch
 
     boxes, arrows = stages_of(results)
-    drawn, axes = style.figure(2.9 * len(boxes), 1.9)
+    figure, axes = style.figure(2.9 * len(boxes), 1.9)
     box: Look = {"boxstyle": "round,pad=0.02", "facecolor": "#dbe9f4", "edgecolor": INK, "lw": 1}
     centred: Look = {"ha": "center", "va": "top"}
     for number, (title, lines) in enumerate(boxes):
@@ -154,7 +154,7 @@ def stages(results: Results) -> Figure:
     axes.set_xlim(-0.1, PITCH * len(boxes) - PITCH + BOX_WIDTH + 0.1)
     axes.set_ylim(-0.1, 1.6)
     axes.axis("off")
-    return drawn
+    return figure
 
 
 def stages_of(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]:

@@ -34,20 +34,20 @@ def figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
     """A figure with one pair of axes."""
     import matplotlib.pyplot as plt
 
-    drawn, axes = plt.subplots(figsize=(width, height))
-    return drawn, axes
+    figure, axes = plt.subplots(figsize=(width, height))
+    return figure, axes
 
 
-def save(drawn: Figure, stem: Path) -> list[Path]:
-    """Writes STEM.svg and STEM.png, whole or not at all, and closes the figure."""
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Writes a figure to STEM.svg and STEM.png, and closes it; paths of the two files."""
     import matplotlib.pyplot as plt
 
     paths = [stem.with_name(stem.name + ending) for ending in (".svg", ".png")]
     for path in paths:
         with whole_file(path) as partial:
-            drawn.savefig(partial, metadata={"Date": None} if path.suffix == ".svg" else None)
-        drawn.set_layout_engine("none")  # laid out once, for both files
-    plt.close(drawn)
+            figure.savefig(partial, metadata={"Date": None} if path.suffix == ".svg" else None)
+        figure.set_layout_engine("none")  # laid out once, for both files
+    plt.close(figure)
     return paths
 
 

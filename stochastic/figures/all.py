@@ -53,7 +53,7 @@ def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
     if result.study.shape == DISCS:
         figures |= of_discs(result)
     with figure_style():
-        return {name: save(figure(), folder / name) for name, figure in sorted(figures.items())}
+        return {name: save(draw(), folder / name) for name, draw in sorted(figures.items())}
 
 
 def of_map(result: Microstructure) -> Figures:
@@ -104,7 +104,7 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
     """Distribution function of the radii, and their law if there is one (Fig. 11)."""
     import matplotlib.pyplot as plt
 
-    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
     particles = result.study.shape.particles
     values = 1e3 * np.concatenate([section.particles.radii for section in result.sections])
     axes.ecdf(values, color=BLUE, label=f"{len(values)} {particles}")
@@ -113,12 +113,12 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
         axes.plot(1e3 * grid, law.cdf(grid), color=ORANGE, ls="--", label=law.label)
     axes.set(xlabel="radius [mm]", ylabel=f"share of {particles}", ylim=(0, 1.02))
     axes.legend()
-    return drawn
+    return figure
 
 
 def draw_neighbour_statistics(discs: Particles) -> Figure:
     """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one size."""
-    drawn, (left, right) = two_panels(EQUAL.format(len(discs)))
+    figure, (left, right) = two_panels(EQUAL.format(len(discs)))
     direct = neighbours(discs)
     distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
     left.hist(distance, bins=80, density=True, color=BLUE)
@@ -132,14 +132,14 @@ def draw_neighbour_statistics(discs: Particles) -> Figure:
     right.set(xlabel="number of direct neighbours", ylabel="share of discs")
     right.set(xlim=(2.3, number.max() + 0.7))
     right.legend()
-    return drawn
+    return figure
 
 
 def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
     """Values of r_n of cells that share a wall, beside those of equal discs (Fig. 9)."""
     import matplotlib.pyplot as plt
 
-    drawn, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
+    figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
     diagrams = [section.diagram for section in result.sections if section.diagram]
     for axes, shown, title in zip(
         panels, (diagrams, [equal]), ("the sections", "equal discs"), strict=True
@@ -151,14 +151,14 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
         axes.set(xlabel="reduced radius of a cell", ylabel="that of a neighbour", aspect="equal")
         axes.set_title(f"{title}: correlation {np.corrcoef(pairs)[0, 1]:+.3f}")
         axes.grid(visible=False)
-    return drawn
+    return figure
 
 
 def draw_areas(result: Microstructure) -> Figure:
     """Measure of the cells over r_n, with the limits and what no particle can reach (Fig. 12)."""
     import matplotlib.pyplot as plt
 
-    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
     shape, (low, high) = result.study.shape, result.limits
     for section in result.sections:
         radius, measure = section.reduced_radii, 1e3**shape.dimensions * section.cells
@@ -174,14 +174,14 @@ def draw_areas(result: Microstructure) -> Figure:
     axes.set(xlabel=REDUCED, ylabel=f"{shape.cells} of the cell [{unit}]", xlim=(0, bound + 0.07))
     share = f"{100 * result.share_within:.2f} % of the {shape.cells}"
     axes.set_title(f"limits {low:.4g} and {high:.4g} contain {share}")
-    return drawn
+    return figure
 
 
 def draw_pbox(result: Microstructure) -> Figure:
     """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
     import matplotlib.pyplot as plt
 
-    drawn, (axes, residual_axes) = plt.subplots(
+    figure, (axes, residual_axes) = plt.subplots(
         2, 1, figsize=(6.4, 5.6), height_ratios=(3, 1.4), sharex=True
     )
     table = to_dataset(result)
@@ -200,14 +200,14 @@ def draw_pbox(result: Microstructure) -> Figure:
     axes.set(ylabel=f"{result.study.shape.cells}-weighted share", ylim=(0, 1.02))
     residual_axes.set(xlabel=REDUCED, ylabel="less the fit [%]")
     axes.legend(loc="upper left")
-    return drawn
+    return figure
 
 
 def draw_map(result: Microstructure) -> Figure:
     """The map θ ↦ r_n: the sample's own, the fitted cubic and its fuzzy bounds (eq. 12)."""
     import matplotlib.pyplot as plt
 
-    drawn, axes = plt.subplots(figsize=(6.4, 3.8))
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
     fit, box = result.pbox.fit, result.pbox
     law = fit.distribution
     theta = np.asarray(np.linspace(law.lower, law.upper, 601), float)
@@ -222,4 +222,4 @@ def draw_map(result: Microstructure) -> Figure:
     )
     axes.set(xlabel="θ, standard deviations", ylabel=REDUCED, ylim=(0, 1))
     axes.legend()
-    return drawn
+    return figure

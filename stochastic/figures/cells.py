@@ -73,12 +73,12 @@ def draw_cells(diagram: Apollonius) -> Figure:
     width, height = 1e3 * discs.size
     title = f"one section of {width:.4g} × {height:.4g} mm with {len(discs)} discs"
     title = title if (view == discs.size).all() else f"a corner of {title}"
-    drawn, (left, right) = two_panels(title, "Voronoi cells", "Apollonius cells")
+    figure, (left, right) = two_panels(title, "Voronoi cells", "Apollonius cells")
     bare = apollonius(Particles(discs.centres, np.zeros(len(discs)), discs.size, discs.periodic))
     for axes, shown, colour in ((left, bare, PALE), (right, diagram, LIGHT)):
         plot_discs(axes, discs, colour, view)
         plot_cells(axes, shown, view)
-    return drawn
+    return figure
 
 
 def draw_neighbours(discs: Particles) -> Figure:
@@ -86,7 +86,7 @@ def draw_neighbours(discs: Particles) -> Figure:
     from matplotlib.collections import LineCollection
 
     titles = "Delaunay triangulation: the direct neighbours", "Voronoi cells, its dual"
-    drawn, (left, right) = two_panels(EQUAL.format(len(discs)), *titles)
+    figure, (left, right) = two_panels(EQUAL.format(len(discs)), *titles)
     direct = neighbours(discs)
     start = discs.centres[direct.first]
     edges = list(1e3 * np.stack([start, start + direct.offset], axis=1))
@@ -94,7 +94,7 @@ def draw_neighbours(discs: Particles) -> Figure:
         plot_discs(axes, discs, LIGHT)
     left.add_collection(LineCollection(edges, colors=ORANGE, linewidths=0.8))
     plot_cells(right, apollonius(discs))
-    return drawn
+    return figure
 
 
 def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
@@ -113,7 +113,7 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
     touching = {tuple(np.round(v, 12)) for v in direct.offset[direct.first == centre]}
     colours = [GREEN if tuple(np.round(v, 12)) in touching else LIGHT for v in near]
     fake = _from_pair_distances(discs, len(near), reach, generator)
-    drawn, panels = two_panels(
+    figure, panels = two_panels(
         EQUAL.format(len(discs)),
         f"pair distances alone: {_overlaps(fake, radius)} of {len(fake)} overlap",
         f"the packing: {colours.count(GREEN)} of {len(near)} are direct neighbours",
@@ -124,7 +124,7 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
         radii = np.full(len(places), radius)
         _circles(axes, places, radii, facecolor=colour, edgecolor=GREY, alpha=0.8)
         _view(axes, -limit, limit)
-    return drawn
+    return figure
 
 
 def _from_pair_distances(
@@ -157,10 +157,10 @@ def draw_overlay(picture: Array, discs: Particles) -> Figure:
     import matplotlib.pyplot as plt
 
     width, height = 1e3 * discs.size
-    drawn, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
+    figure, axes = plt.subplots(figsize=(6.4, 6.4 * float(np.clip(height / width, 0.5, 1.6))))
     axes.imshow(picture, cmap="gray", extent=(0, width, 0, height), interpolation="none")
     outline = {"facecolors": "none", "edgecolors": ORANGE, "linewidths": 1.0}
     _circles(axes, discs.centres, discs.radii, **outline)
     _view(axes, 0 * discs.size, discs.size)
     axes.set_title(f"{len(discs)} circles; what has no outline was left out", fontsize="medium")
-    return drawn
+    return figure

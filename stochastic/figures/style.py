@@ -33,7 +33,7 @@ SETTINGS: dict[str, Any] = {
 
 @contextmanager
 def figure_style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
-    """Context in which figures have this style; `more` are other settings of Matplotlib."""
+    """Context in which figures have this style; `more` are further settings of Matplotlib."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -52,15 +52,15 @@ def two_panels(title: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
     return figure, list(panels)
 
 
-def save(drawn: Figure, stem: Path) -> list[Path]:
-    """Write STEM.svg and STEM.png and close the figure."""
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure to STEM.svg and STEM.png, and close it; paths of the two files."""
     import matplotlib.pyplot as plt
 
     stem.parent.mkdir(parents=True, exist_ok=True)
     files = []
     for kind in ("svg", "png"):
         partial, file = stem.with_suffix(f".partial.{kind}"), stem.with_suffix(f".{kind}")
-        drawn.savefig(partial, metadata={"Date": None} if kind == "svg" else None)
+        figure.savefig(partial, metadata={"Date": None} if kind == "svg" else None)
         files.append(partial.replace(file))
-    plt.close(drawn)
+    plt.close(figure)
     return files
