@@ -64,7 +64,7 @@ class Optimisation:
 
     def _search(self, cut: CutSearch, outputs: tuple[str, ...]) -> None:
         """Run the first points of a cut and the descents of all bounds."""
-        points = _spread(len(cut.moving), self.look, cut.level)
+        points = _spread(len(cut.uncertain_inputs), self.look, cut.level)
         allowed = np.concatenate([cut.corners, points[cut.slack(points) >= 0]])
         if len(allowed):
             cut.campaign(cut.points(allowed))

@@ -99,10 +99,10 @@ class _Search:
     def _search(self) -> None:
         """Run the corners of the outputs whose effects keep their signs, and search the others."""
         widest = self.cuts[-1]
-        first: Array = np.empty((0, len(widest.moving)))
+        first: Array = np.empty((0, len(widest.uncertain_inputs)))
         if not self.domain.interactions:
             walk = SignWalk(self.campaign, widest, self.method.seed)
-            self.monotone, first = walk.corners_suffice(), walk.base
+            self.monotone, first = walk.corners_suffice(), walk.samples
             self.n_points = walk.points
         names = tuple(np.array(self.outputs)[~self.monotone])
         if not names:

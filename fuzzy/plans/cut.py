@@ -47,39 +47,39 @@ class Bound:
 
 
 class CutSearch:
-    """One α-cut under search, in unit coordinates of the inputs that have a width."""
+    """One α-cut under search, in unit coordinates of the uncertain inputs: those with a width."""
 
     def __init__(self, campaign: Campaign, domain: Domain, level: int) -> None:
         self.campaign, self.domain, self.level = campaign, domain, level
         self.alpha = domain.alpha[level]
         self.lower, self.upper = (ends[level] for ends in domain.boxes)
         self.near = _FACE * (self.upper - self.lower)
-        self.moving = np.flatnonzero(self.upper > self.lower)
+        self.uncertain_inputs = np.flatnonzero(self.upper > self.lower)
 
     @cached_property
     def corners(self) -> Array:
-        """Allowed corners of the unit cube, shape (n, moving); none of more than six inputs."""
-        inputs = len(self.moving)
+        """Allowed corners of the unit cube, (n, uncertain inputs); empty for over six inputs."""
+        inputs = len(self.uncertain_inputs)
         if inputs > _MAX_CORNER_INPUTS:
             return np.empty((0, inputs))
         corners = np.array(list(product((0.0, 1.0), repeat=inputs)))
         return np.asarray(corners[self.slack(corners) >= 0])
 
     def points(self, unit: Array) -> Array:
-        """Inputs of points (n, moving) of the unit cube, shape (n, inputs)."""
+        """Inputs of points (n, uncertain inputs) of the unit cube, shape (n, inputs)."""
         points = np.repeat(self.lower[None], len(unit), axis=0)
-        width = (self.upper - self.lower)[self.moving]
-        points[:, self.moving] = self.lower[self.moving] + unit * width
+        width = (self.upper - self.lower)[self.uncertain_inputs]
+        points[:, self.uncertain_inputs] = self.lower[self.uncertain_inputs] + unit * width
         return np.clip(points, self.lower, self.upper)
 
     def unit(self, points: Array) -> Array:
-        """Points (n, inputs) in unit coordinates, shape (n, moving)."""
-        width = (self.upper - self.lower)[self.moving]
-        unit: Array = np.clip((points - self.lower)[:, self.moving] / width, 0, 1)
+        """Points (n, inputs) in unit coordinates, shape (n, uncertain inputs)."""
+        width = (self.upper - self.lower)[self.uncertain_inputs]
+        unit: Array = np.clip((points - self.lower)[:, self.uncertain_inputs] / width, 0, 1)
         return unit
 
     def slack(self, unit: Array) -> Array:
-        """Room that the interactions leave at points of the unit cube, shape (n,)."""
+        """Slack of the interactions at points of the unit cube, ≥ 0 where allowed, shape (n,)."""
         return self.domain.slack(self.points(unit), self.alpha)
 
     def contains(self, points: Array) -> Mask:
@@ -121,7 +121,7 @@ class CutSearch:
         """Result of a descent by gradients inside the cut; its samples stay in the campaign.
 
         Args:
-            start: Allowed point in unit coordinates, shape (moving,).
+            start: Allowed point in unit coordinates, shape (uncertain inputs,).
             bound: What is minimised.
             first_step: Longest first step in unit coordinates: a short one does not leave the basin
                 of its start. Without limit it mostly reaches a face at once.
@@ -219,7 +219,7 @@ def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[CutSearch]:
     """Cuts that have a width, from the narrowest on."""
     for level in reversed(range(len(domain.alpha))):
         cut = CutSearch(campaign, domain, level)
-        if len(cut.moving):
+        if len(cut.uncertain_inputs):
             yield cut
 
 

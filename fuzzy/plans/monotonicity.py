@@ -1,8 +1,8 @@
 """Verification of monotonicity: the sign of every input's effect on every output, level by level.
 
-A sign is *proved* where the caller states it and no sample contradicts it: each stated input is
-changed alone to look. Otherwise it is *seen*: differences at probes of the box all have it, with a
-margin. What is seen is evidence, not proof, and the bounds that rest on it are attained only.
+A sign is *proved* where the caller states it and no sample contradicts it; samples in which one
+stated input changes alone test it. Otherwise it is *observed*: differences at probes of the box all
+have it, with a margin. That is evidence, not proof, and bounds that rest on it are attained only.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from alphacut.fuzzy.knowledge.known import Signs
 from alphacut.fuzzy.refused import chosen
 from alphacut.fuzzy.sets.boxes import Domain
 
-_PROBES = 4  # of a box, besides its extreme corners and the modal point
-_MARGIN = 0.05  # of the spread of the slopes over the probes, which the least slope must exceed
-_STEP = 1e-3  # of a difference, as a share of the width of the box
+_PROBES = 4  # points inside a box, besides its extreme corners and the modal point
+_MARGIN = 0.05  # of the range of the slopes over the probes, which the least slope must exceed
+_STEP = 1e-3  # of a finite difference, over the width of the box
 
 
 @dataclass(frozen=True)
 class Effects:
-    """Signs of all effects.
+    """Signs of the effects of the inputs on the outputs.
 
     Args:
         outputs: Names of the outputs.
-        signs: +1, −1, or 0 where none holds, shape (levels, outputs, inputs); an input without
+        signs: +1, −1, or 0 where neither holds, shape (levels, outputs, inputs); an input without
             width has +1.
     """
 
@@ -36,7 +36,7 @@ class Effects:
     signs: Signs
 
     def notes(self, domain: Domain) -> tuple[str, ...]:
-        """Effects without a sign, and up to which level."""
+        """A sentence for each effect without a sign, with the highest level where it has none."""
         return tuple(
             f"output {output} is not monotone in input {name}, or not surely, up to α ="
             f" {domain.alpha[np.flatnonzero(signs == 0)[-1]]:g}"
@@ -61,22 +61,32 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
     signs = campaign.knowledge.stated(domain.names, outputs)
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(signs.any(axis=0)):
-        campaign(_changed(domain.modal, signs, lowers[0], uppers[0], int(column)))
+        campaign(_sign_test_points(domain.modal, signs, lowers[0], uppers[0], int(column)))
     levels = []
     for row in range(len(lowers)):
         lower, upper = lowers[row], uppers[row]
         signs = np.where(upper == lower, np.int8(1), signs)
         if (signs == 0).any():
-            seen = _Box(campaign, outputs, lower, upper).seen(domain.modal[None], signs)
-            signs = np.where(signs == 0, seen, signs)
+            observed = _Box(campaign, outputs, lower, upper).observed_signs(domain.modal, signs)
+            signs = np.where(signs == 0, observed, signs)
         levels.append(signs)
     return Effects(outputs, np.array(levels))
 
 
-def _changed(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
-    """Points at which a stated sign shows alone: both ends of one input, the others fixed.
+def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
+    """Pairs of points that differ in one input alone, at its two bounds, to test its stated sign.
 
-    They are fixed at their modal values, and at the extreme corners of every pattern of signs.
+    The other inputs have their modal values, or those of an extreme corner of a pattern of signs.
+
+    Args:
+        modal: Modal values, shape (inputs,).
+        signs: Stated signs, shape (outputs, inputs).
+        lower: Lower bounds of the box, shape (inputs,).
+        upper: Upper bounds of the box, shape (inputs,).
+        column: Index of the input.
+
+    Returns:
+        Points without repetitions, shape (points, inputs).
     """
     points = np.repeat(np.concatenate([modal[None], _extreme(signs, lower, upper)]), 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
@@ -91,48 +101,48 @@ def _extreme(signs: Signs, lower: Array, upper: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Box:
-    """One level's box under inspection."""
+    """The box of a level, in which signs are observed."""
 
     campaign: Campaign
     outputs: tuple[str, ...]
     lower: Array
     upper: Array
 
-    def seen(self, modal: Array, stated: Signs) -> Signs:
-        """Signs of the slopes at all probes, with the margin, shape (outputs, inputs), else 0."""
+    def observed_signs(self, modal: Array, stated: Signs) -> Signs:
+        """Signs that slopes have at all probes, with the margin, else 0; (outputs, inputs)."""
         free = np.flatnonzero((stated == 0).any(axis=0))
-        first = np.sign(self._slopes(modal, free)[0]).astype(np.int8)
+        first = np.sign(self._slopes(modal[None], free)[0]).astype(np.int8)
         corners = _extreme(np.where(stated != 0, stated, first), self.lower, self.upper)
-        slopes = self._slopes(np.concatenate([modal, corners, self._spread()]), free)
+        slopes = self._slopes(np.concatenate([modal[None], corners, self._halton_points()]), free)
         least, most = slopes.min(axis=0), slopes.max(axis=0)
-        room = _MARGIN * (most - least)
-        rises, falls = (least > 0) & (least >= room), (most < 0) & (-most >= room)
+        margin = _MARGIN * (most - least)
+        rises, falls = (least > 0) & (least >= margin), (most < 0) & (-most >= margin)
         idle = (least == 0) & (most == 0)  # no effect at any probe: either end will do
         return np.asarray((rises | idle).astype(np.int8) - falls.astype(np.int8))
 
-    def _spread(self) -> Array:
-        """Even points of the box, without the first, which is a corner."""
+    def _halton_points(self) -> Array:
+        """Halton points of the box, (`_PROBES`, inputs); without the first, which is a corner."""
         from scipy.stats import qmc
 
         unit: Array = qmc.Halton(len(self.lower), scramble=False).random(_PROBES + 1)[1:]
         return self.lower + unit * (self.upper - self.lower)
 
     def _slopes(self, points: Array, inputs: Rows) -> Array:
-        """Slopes by some inputs at the points, shape (n, outputs, inputs); 0 by the others.
+        """One-sided difference quotients by some inputs, (n, outputs, inputs); 0 by the others.
 
-        Differences are one-sided and stay inside the box.
+        Their points stay inside the box.
         """
         values = self._values(points)
         slopes = np.zeros((*values.shape, points.shape[1]))
         for column in inputs:
             step = _STEP * (self.upper[column] - self.lower[column])
             steps = np.where(points[:, column] + step > self.upper[column], -step, step)
-            moved = points.copy()
-            moved[:, column] += steps
-            slopes[:, :, column] = (self._values(moved) - values) / steps[:, None]
+            stepped = points.copy()
+            stepped[:, column] += steps
+            slopes[:, :, column] = (self._values(stepped) - values) / steps[:, None]
         return slopes
 
     def _values(self, points: Array) -> Array:
-        """The outputs that matter at the points, shape (n, outputs)."""
+        """Values of `outputs` at the points, shape (n, outputs)."""
         values = self.campaign(points)
         return values.array[:, [values.column(name) for name in self.outputs]]

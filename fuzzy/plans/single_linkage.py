@@ -173,7 +173,7 @@ class SingleLinkage:
         """Sample and descend, all cuts in turn, until every bound meets the rule.
 
         Args:
-            first: Uniform samples of the widest cut, in unit coordinates, shape (n, moving).
+            first: Uniform samples of the widest cut in unit coordinates, (n, uncertain inputs).
 
         Raises:
             SpentError: The budget ended the search.
@@ -299,7 +299,7 @@ class SingleLinkage:
                 if sigma == SIGMA_SEVERAL_HUMPS and state.n_humps(cut) < 2:
                     continue
                 volume = self._volumes[cut.level]
-                distance = critical_distance(len(rows), len(cut.moving), volume, sigma)
+                distance = critical_distance(len(rows), len(cut.uncertain_inputs), volume, sigma)
                 for start in linkage_starts(unit, values, distance):
                     if names[start] not in state.started:
                         state.started.add(names[start])
@@ -315,10 +315,10 @@ class SingleLinkage:
 
         There may be fewer than `count` where the interactions allow next to nothing.
         """
-        allowed: Array = np.empty((0, len(cut.moving)))
+        allowed: Array = np.empty((0, len(cut.uncertain_inputs)))
         drawn = 0
         while len(allowed) < count and drawn < _MAX_DRAWS:
-            unit = rng.random((count, len(cut.moving)))
+            unit = rng.random((count, len(cut.uncertain_inputs)))
             allowed, drawn = np.concatenate([allowed, unit[cut.slack(unit) >= 0]]), drawn + count
         self._volumes[cut.level] = len(allowed) / drawn
         if len(allowed) < count:
