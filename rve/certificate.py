@@ -1,4 +1,4 @@
-"""Certificate of a result: properties that every right one has, measured."""
+"""Checks of a result: measured violations of properties that every correct result has."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ALGEBRAIC = 1e-7
 
 
 class CertificateError(FailedError):
-    """A result lacks a property that every right one has."""
+    """A result lacks a property that every correct one has."""
 
 
 WHAT = {
@@ -55,7 +55,10 @@ def require(checks: Mapping[str, float], *, discretisation: float = ROUND_OFF) -
 
 
 def certified(result: HomogenisedStiffness) -> HomogenisedStiffness:
-    """A result, with its cell and stiffness, with the certificate within its declared error.
+    """The result with its checks, which hold within its declared error.
+
+    Args:
+        result: With its cell and its stiffness.
 
     Raises:
         CertificateError: Symmetry or a bound is violated.

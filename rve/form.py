@@ -1,4 +1,4 @@
-"""The elasticity form of the cell, for triangles and for wedges of the product space (eq. 1 to 7).
+"""The elasticity form of the cell, for triangles and for prisms of the product space (eq. 1 to 7).
 
 div and D act on x alone: on the product space, whose mesh is three-dimensional, the form has no
 derivative along θ.

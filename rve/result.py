@@ -74,7 +74,7 @@ class StressCurve:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HomogenisedStiffness:
-    """Effective behaviour of one cell with what it cost.
+    """Effective stiffness of one cell, with declared errors, checks and cost.
 
     Args:
         curve: Homogenised stress over θ.
@@ -86,11 +86,11 @@ class HomogenisedStiffness:
         errors: Declared relative errors of the mean moduli by source (space, theta): of C11 + C12,
             C11 − C12 and C33, shape (3,), nan for a modulus that was not computed; empty where none
             were estimated.
-        checks: Certificate: name of each property to its measured violation, within its bound.
+        checks: Measured violation of each property of `certificate`, by name, within its bound.
         cell: What was homogenised.
-        average: What E and ν are of, a name in `anisotropy.AVERAGES`.
-        energies: Parts of the phases in the strain energy, of which loss factors are; None where
-            the model was not asked for them.
+        average: Average that E and ν belong to, a name in `anisotropy.AVERAGES`.
+        energies: Parts of the phases in the strain energy, for loss factors; None where the model
+            was not asked for them.
 
     Example:
         >>> from alphacut.rve import Phase, SeriesModel
@@ -114,10 +114,10 @@ class HomogenisedStiffness:
     energies: PhaseEnergies | None = None
 
     def averaged(self, average: str) -> HomogenisedStiffness:
-        """The same cell with E and ν of another average.
+        """The same result with E and ν of another average.
 
         Raises:
-            RefusedError: There is none of this name, or it needs a plane stiffness not computed.
+            RefusedError: The name is unknown, or the average needs a stiffness not computed.
         """
         require_average(average)
         if average != AXES and self.stiffness is None:
@@ -127,7 +127,7 @@ class HomogenisedStiffness:
 
     @property
     def convention(self) -> str:
-        """The average that E and ν are of, in words."""
+        """Name, in words, of the average that E and ν belong to."""
         return AVERAGES[self.average]
 
     def __repr__(self) -> str:
@@ -206,9 +206,9 @@ class HomogenisedStiffness:
         return np.asarray(np.sqrt(np.outer(diagonal, diagonal)))
 
     def error_of(self, function: Callable[[Array], Array | float]) -> Array:
-        """Declared absolute error of a function of the three moduli, of its shape.
+        """Declared absolute error of a function of the three moduli, shaped like its value.
 
-        A modulus that was not computed must not matter to the function.
+        The function must not depend on a modulus that was not computed.
         """
         return spread(function, self.moduli, self._known_errors(self.modulus_errors))
 
@@ -217,33 +217,34 @@ class HomogenisedStiffness:
 
     @property
     def estimated_error(self) -> float:
-        """Declared relative error of E, all sources together; nan where none was made."""
+        """Declared relative error of E, all sources together; nan if none was declared."""
         return self._error_of_modulus(self.modulus_errors)
 
     @property
     def error(self) -> dict[str, float]:
         """Declared relative error of E by source; their sum is `estimated_error`."""
-        shares = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
-        scale = self.estimated_error / (sum(shares.values()) or 1.0)
-        return {name: scale * share for name, share in shares.items()}
+        errors = {name: self._error_of_modulus(part) for name, part in self.errors.items()}
+        scale = self.estimated_error / (sum(errors.values()) or 1.0)
+        return {name: scale * error for name, error in errors.items()}
 
     @property
     def poisson_error(self) -> float:
-        """Declared absolute error of ν; nan where none was made."""
+        """Declared absolute error of ν; nan if none was declared."""
         return float(self.error_of(lambda moduli: self.constants_of(moduli)[1]))
 
     @property
     def largest_error(self) -> float:
-        """The largest declared error of what is printed and exported; nan where none was made.
+        """Largest declared error of the printed and exported constants; nan if none was declared.
 
-        Relative for E, mean stresses and moduli, absolute for Poisson's ratio.
+        The largest of the relative errors of E and the moduli (so of the mean stresses) and the
+        absolute error of ν.
         """
         if not self.errors:
             return float("nan")
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
 
     def _error_of_modulus(self, errors: Array) -> float:
-        """Relative error of E from those of the moduli."""
+        """Relative error of E from relative errors of the three moduli, shape (3,)."""
         modulus = self.modulus
 
         def ratio(moduli: Array) -> Array:
@@ -254,21 +255,21 @@ class HomogenisedStiffness:
 
 
 def spread(function: Callable[[Array], Array | float], values: Array, errors: Array) -> Array:
-    """Largest change of `function` over a box of its arguments, seen at the corners.
+    """Largest absolute change of `function` over a box of its arguments, at the corners.
 
     Each value runs from value/(1 + error) to value·(1 + error).
 
     Args:
         function: Takes an array like `values`; monotone in each of them over the box.
-        values: Positive, shape (n,).
-        errors: Relative, shape (n,).
+        values: Middle of the box, positive, shape (n,).
+        errors: Relative errors, shape (n,).
 
     Returns:
-        Absolute, of the function's shape; nan where an error is.
+        Array shaped like the function's value; nan if an error is.
     """
     if not np.isfinite(errors).all():
         return np.full(np.shape(function(values)), np.nan)
     centre = np.asarray(function(values))
-    ends = product(*((1 / (1 + error), 1 + error) for error in errors))
-    changes = [abs(np.asarray(function(values * factor)) - centre) for factor in ends]
+    corners = product(*((1 / (1 + error), 1 + error) for error in errors))
+    changes = [abs(np.asarray(function(values * factors)) - centre) for factors in corners]
     return np.asarray(np.max(changes, axis=0))

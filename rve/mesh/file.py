@@ -1,4 +1,4 @@
-"""A mesh of one's own: prisms of the product space in a file of Gmsh, as they are.
+"""The user's mesh: prisms of the product space in a file of Gmsh, as they are.
 
 The file is the geometry at its own θ: levels may be uneven, columns bent and phases any number.
 """

@@ -21,7 +21,7 @@ PRISM_15 = 18
 MATRIX, INCLUSION, INTERPHASE = NAMES = "matrix", "inclusion", "interphase"
 """Names of the phases in their order."""
 SIDES = {"x1 = -1": (0, -1.0), "x1 = 1": (0, 1.0), "x2 = -1": (1, -1.0), "x2 = 1": (1, 1.0)}
-"""Names of the sides with their axis and place."""
+"""Sides by name: axis and coordinate."""
 LEVELS = "lowest level", "highest level"
 
 
@@ -32,7 +32,7 @@ class Prisms:
     Args:
         points: (x1, x2, θ) of all nodes, shape (n, 3).
         cells: Nodes of each prism in Basix's order, shape (m, 15).
-        phase: Phase of each prism, a place in `names`, shape (m,).
+        phase: Phase of each prism, an index of `names`, shape (m,).
         names: Names of the phases.
     """
 
@@ -55,10 +55,10 @@ def extruded(
     Args:
         size: Edge length in the plane, in halves of the cell's side.
         radius: Radius of the particle; 0 for a mesh that knows nothing of it.
-        outline: Of the particle.
-        layers: Along θ.
+        outline: Outline of the particle.
+        layers: Number of layers along θ.
         sizes: Edge length at (x1, x2), in place of `size`.
-        thickness: Of a ring around the particle, 0 for none.
+        thickness: Thickness of the interphase around the particle, 0 for none.
     """
     with square.model() as gmsh:
         parts = square.surfaces(size, radius, outline, thickness)
@@ -80,15 +80,14 @@ def extruded(
 
 
 def _name_surfaces(gmsh: Any) -> None:
-    """Name the sides of the cell and the ends of θ."""
+    """Give the surfaces of Gmsh's model on the sides and on both ends of θ physical groups."""
     ends = {LEVELS[0]: (2, 0.0), LEVELS[1]: (2, 1.0)}
     for name, (axis, coordinate) in (SIDES | ends).items():
         tags = []
         for dimension, tag in gmsh.model.getEntities(2):
             box = gmsh.model.getBoundingBox(dimension, tag)
-            if (
-                abs(box[axis] - coordinate) + abs(box[axis + 3] - coordinate) < 1e-5
-            ):  # boxes are enlarged
+            offset = abs(box[axis] - coordinate) + abs(box[axis + 3] - coordinate)
+            if offset < 1e-5:  # Gmsh enlarges bounding boxes
                 tags.append(tag)
         gmsh.model.addPhysicalGroup(2, tags, name=name)
 

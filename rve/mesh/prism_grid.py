@@ -107,16 +107,16 @@ def _ring_positions(mesh: Triangulation, ring: Ring, radii: Array, thickness: fl
 
 @dataclass(frozen=True, eq=False)
 class PrismGrid:
-    """Wedges over a planar mesh; topology only, positions follow from a radius map.
+    """Prisms over a planar mesh; topology only, positions follow from a radius map.
 
     Args:
         plane: The planar mesh.
-        cells: Nodes of each wedge in Basix's order, shape (wedges, 15), layer by layer, in each in
+        cells: Nodes of each prism in Basix's order, shape (prisms, 15), layer by layer, in each in
             the order of the triangles.
         heights: Levels of θ as shares of its support, from 0 to 1, shape (layers + 1,).
-        phase: Phase of each wedge, a place in `names`, shape (wedges,).
+        phase: Phase of each prism, an index of `names`, shape (prisms,).
         names: Names of the phases.
-        conforming: Whether the phases are those of the wedges and the nodes follow the cone; if not
+        conforming: Whether the phases are those of the prisms and the nodes follow the cone; if not
             they stay where the planar mesh has them.
         fixed: Positions of all nodes where a file gives them, whatever the map, shape (nodes, 3).
     """
@@ -136,7 +136,7 @@ class PrismGrid:
 
     @property
     def inside(self) -> Mask:
-        """Mask of the wedges in the particle."""
+        """Mask of the prisms in the particle."""
         return np.tile(self.plane.inside, self.layers)
 
     @property

@@ -28,10 +28,10 @@ class CellFields:
 
     Args:
         points: (x1, x2, θ), shape (n, 3).
-        cells: Nodes of the wedges in Basix's order, shape (m, 15).
-        phase: Place of the phase of each wedge in `names`, shape (m,).
+        cells: Nodes of the prisms in Basix's order, shape (m, 15).
+        phase: Index of the phase of each prism in `names`, shape (m,).
         displacement: In halves of the cell's side, shape (n, 2, loads).
-        stress: (σ11, σ22, σ12), means over the wedges of one phase that meet in a node, shape
+        stress: (σ11, σ22, σ12), means over the prisms of one phase that meet in a node, shape
             (n, 3, loads), in Pa.
         names: Names of the phases.
         node: Node of the mesh that each point is, shape (n,).
@@ -47,7 +47,7 @@ class CellFields:
 
     @property
     def vtk_cells(self) -> Rows:
-        """Nodes of the wedges in the order of VTK's quadratic wedge, shape (m, 15)."""
+        """Nodes of the prisms in the order of VTK's quadratic wedge, shape (m, 15)."""
         return self.cells[:, VTK_ORDER]
 
 
@@ -104,15 +104,15 @@ def _fields(
     at_nodes = at_points(strain(fluctuation), vertices_and_midpoints())
     positions = grid.positions(problem.map, problem.thickness)
     total = np.empty((grid.nodes, 2, len(vectors)))
-    wedges = np.empty((len(grid.cells), NODES, 3, len(vectors)))
+    prism_strains = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, vector in enumerate(vectors):
         u, uniform = problem.field(vector), np.asarray(loads[k], float)
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
         total[form.node, :, k] = u + positions[form.node, :2] @ tensor
         fluctuation.x.array[:] = u.ravel()
         strains = at_nodes.eval(form.mesh, cells_of_rank).reshape(len(cells_of_rank), NODES, 3)
-        wedges[form.wedge, ..., k] = strains + uniform
-    stress = np.stack(stiffness)[grid.phase][:, None] @ wedges
+        prism_strains[form.wedge, ..., k] = strains + uniform
+    stress = np.stack(stiffness)[grid.phase][:, None] @ prism_strains
     numbered = grid.cells + grid.phase[:, None] * grid.nodes
     point_numbers, cells = np.unique(numbered, return_inverse=True)
     cells = cells.reshape(numbered.shape)

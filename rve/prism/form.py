@@ -1,4 +1,4 @@
-"""The form on cell × θ: mesh of wedges, weight f_Θ, and what is read off at quadrature points."""
+"""The form on cell × θ: prism elements, weight f_Θ, strains and areas at quadrature points."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ class FoldedMeshError(FailedError):
 
 
 class PrismForm:
-    """Wedge mesh, form and loads of one grid; positions and phases are set anew.
+    """Prism mesh, form and loads of one grid; positions and phases are set anew.
 
     Args:
-        grid: Topology; each rank takes its share of the wedges.
+        grid: Topology; the ranks divide its prisms among them.
         comm: Communicator.
 
     Attributes:
         mesh: DOLFINx's.
-        space: Displacements, two at each node of a wedge.
-        node: Node of the grid that each of this rank's nodes is, shape (n,).
-        wedge: Wedge of the grid that each of its cells is, shape (m,).
-        layer: Its layer.
-        dx: Measure of each phase by its name, with the rule of the wedges, for forms of one's own.
+        space: Displacements, two at each node of a prism.
+        node: Number in the grid of each of this rank's nodes, shape (n,).
+        wedge: Number in the grid of each of this rank's prisms, shape (m,).
+        layer: Layer of each of these prisms, shape (m,).
+        dx: Measure of each phase by its name, with the rule of the prisms, for forms of the user.
         elastic: Stiffness and loads; `elastic.density` is f_Θ at the points.
         areas: Weights of the points in their slice, shape (cells, 3, points); a slice's sum is 4.
     """
@@ -81,8 +81,10 @@ class PrismForm:
         An interphase, of a grid that has one, gets its thickness.
 
         Raises:
-            FoldedMeshError: An element is inverted; the form then stays where it was.
-            RefusedError: The density of θ is not positive at a quadrature point, likewise.
+            FoldedMeshError: An element is inverted.
+            RefusedError: The density of θ is not positive at a quadrature point.
+
+        After either error the form stays where it was.
         """
         names = ("_levels", "_law", "areas")
         nodes = self.mesh.geometry.x.copy()
@@ -95,7 +97,7 @@ class PrismForm:
             raise
 
     def _move(self, radius: RadiusMap, thickness: float) -> None:
-        """Moves the nodes, and marks the particle where they are sound."""
+        """Moves the nodes, checks the elements, and marks the particle at the quadrature points."""
         positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
         self._levels = self.grid.levels(radius.distribution)
@@ -107,13 +109,13 @@ class PrismForm:
             cure = "shorten the support, or take the series"
             raise RefusedError(key, f"{density.min():g}", "positive densities", cure)
         self.areas = self._areas()
-        self._require_sound()
+        self._require_valid_elements()
         self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
         if not self.grid.conforming:
             self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
 
-    def _require_sound(self) -> None:
-        """Refuse inverted elements, and about outlines that are not round nearly inverted ones.
+    def _require_valid_elements(self) -> None:
+        """Refuse inverted elements, and nearly inverted ones about outlines that are not round.
 
         Raises:
             FoldedMeshError: There is one at a quadrature point.
@@ -128,7 +130,7 @@ class PrismForm:
             raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
     def _inside(self, positions: Array, radius: RadiusMap) -> Array:
-        """Share of the particle at the quadrature points, shape (cells, points)."""
+        """Indicator of the particle, 1 inside and 0 elsewhere, at the points, (cells, points)."""
         shapes: Array = wedge(1).tabulate(0, slab_rule()[0])[0].reshape(-1, 15)
         x = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
         return np.asarray(self.grid.sign(x, radius))
@@ -166,10 +168,10 @@ class PrismForm:
         return rule.nodes, rule.weights
 
     def of_slices(self, values: Array) -> Array:
-        """Values of the slices, (3 layers,), at this rank's wedges, shape (cells, 3)."""
+        """Values of the slices, (3 layers,), at this rank's prisms, shape (cells, 3)."""
         return np.asarray(values.reshape(-1, SLICES)[self.layer])
 
     def by_layer(self, values: Array) -> Array:
-        """Sums over this rank's wedges of each layer of values (cells, …), shape (layers, …)."""
+        """Sums over this rank's prisms of each layer of values (cells, …), shape (layers, …)."""
         member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
         return np.asarray(np.tensordot(member, values, axes=1))

@@ -59,14 +59,14 @@ from alphacut.rve.solver.options import SolverOptions
 from alphacut.stochastic import RadiusMap, ThetaLaw
 
 ROUGH_MESH = 0.1
-"""Relative violation of a bound that a mesh of one's own may have, whose error nobody knows."""
+"""Relative violation of a bound that a user's mesh may have, whose error nobody knows."""
 INTERFACES = ("conforming", "sign")
 Seconds = dict[str, float]
 
 
 @dataclass(frozen=True)
 class PrismModel:
-    """Product-space finite elements: quadratic serendipity wedges around the cone.
+    """Product-space finite elements: quadratic serendipity prisms around the cone.
 
     Args:
         mesh_size: Edge length of the triangles, in halves of the cell's side, in (0, 1].
@@ -81,7 +81,7 @@ class PrismModel:
         moduli: Least and greatest modulus of the particle, in Pa, between which samples of a map
             are projected on two solutions; None: each is solved.
         outline: Distance of the particle's edge from its centre over r(θ), a function of the angle.
-        mesh: File of Gmsh with a mesh of one's own, which is solved as it is; see `solve`.
+        mesh: File of Gmsh with the user's mesh, which is solved as it is; see `solve`.
         level_set: Function z(x1, x2, θ) that is negative in the particles, any number of them, for
             interface "sign"; see `solve`.
 
@@ -129,7 +129,7 @@ class PrismModel:
     ) -> list[HomogenisedStiffness]:
         """One result for each of `inclusions`, in their order, on one mesh.
 
-        On a mesh of one's own, `solve(law, {name: phase})` gives one result, of the law of θ and
+        On the user's mesh, `solve(law, {name: phase})` gives one result, of the law of θ and
         the materials of its physical groups, in whose order its energies are. With a level set the
         names are "matrix" and "inclusion". Neither declares an error: a coarser mesh tells it.
 
@@ -137,7 +137,7 @@ class PrismModel:
             ConvergenceError: The linear solver stopped early.
             CertificateError: A property that every right result has is violated.
             FoldedMeshError: The map bends more than the layers can follow.
-            MeshError: A mesh of one's own is no cell of prisms.
+            MeshError: The user's mesh is no cell of prisms.
             RefusedError: A Poisson's ratio is above 0.45, or a radius does not fit, or law and
                 phases are not those of the mesh.
         """
@@ -160,7 +160,7 @@ class PrismModel:
                 strains, residual = basis.project(inclusion.modulus), basis.error
                 iterations = basis.iterations
             else:
-                strains, solved = self._solved(problem, cell, seconds)
+                strains, solved = self._solve_cell(problem, cell, seconds)
                 iterations, residual = solved.iterations, solved.residual
             result = replace(
                 self._result(strains, cell, residual),
@@ -173,7 +173,7 @@ class PrismModel:
         return results
 
     def _solve_own_mesh(self, law: object, phases: object) -> HomogenisedStiffness:
-        """The result on a mesh of one's own."""
+        """Result on the mesh of a file or of a level set."""
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
             problem, named = self.mesh_problem(law, phases)
@@ -227,18 +227,18 @@ class PrismModel:
         """
         radius = reference_radius(radius_map, self.outline, thickness)
         if self.interface != "conforming":
-            return self._moved(radius_map, 0.0, REFINEMENTS[0])
+            return self._moved_problem(radius_map, 0.0, REFINEMENTS[0])
         if is_round(self.outline):
-            return self._moved(radius_map, radius, REFINEMENTS[0], thickness)
+            return self._moved_problem(radius_map, radius, REFINEMENTS[0], thickness)
         for refinement in REFINEMENTS[:-1]:
             with suppress(FoldedMeshError):
-                return self._moved(radius_map, radius, refinement)
-        return self._moved(radius_map, radius, REFINEMENTS[-1])
+                return self._moved_problem(radius_map, radius, refinement)
+        return self._moved_problem(radius_map, radius, REFINEMENTS[-1])
 
-    def _moved(
+    def _moved_problem(
         self, radius_map: RadiusMap, radius: float, refinement: float, thickness: float = 0.0
     ) -> PrismProblem:
-        """The problem on a mesh made at a radius, moved to a map."""
+        """Problem on the mesh of a reference radius, with its nodes moved to a map."""
         mesh = (self.mesh_size, radius, self.outline, refinement, self.layers, self.parallel)
         problem = _problem(*mesh, RING_THICKNESS if thickness else 0.0)
         problem.move(radius_map, thickness)
@@ -274,10 +274,10 @@ class PrismModel:
         basis = modulus_basis(problem, matrix, ratios.pop(), self.moduli, self.loads(cell))
         return basis if basis.error <= TOLERANCE else None
 
-    def _solved(
+    def _solve_cell(
         self, problem: PrismProblem, cell: Cell, seconds: Seconds
     ) -> tuple[SliceStrains, Solutions]:
-        """Means over the slices of a sample, and the solutions that they are of."""
+        """Slice means of the strains of a cell, and the fluctuations that they belong to."""
         return self._solve_system(problem, cell.stiffness, self.loads(cell), seconds)
 
     def _solve_system(
@@ -287,7 +287,7 @@ class PrismModel:
         strains: Array,
         seconds: Seconds,
     ) -> tuple[SliceStrains, Solutions]:
-        """Means over the slices for the phases' stiffness under macroscopic strains."""
+        """Slice means of the strains and fluctuations under macroscopic strains (loads, 3)."""
         with timed(seconds, "assemble"):
             problem.assemble(stiffness)
             loads = problem.loads(strains)
@@ -305,7 +305,16 @@ class PrismModel:
         return means, solved
 
     def _result(self, strains: SliceStrains, cell: Cell, residual: float) -> HomogenisedStiffness:
-        """The result with its certificate and its declared errors."""
+        """Homogenised stiffness of solved slice means, with declared errors, checked.
+
+        Args:
+            strains: Slice means under `loads(cell)`.
+            cell: The cell solved.
+            residual: Relative residual of the linear system.
+
+        Raises:
+            CertificateError: A check is violated by more than twice the declared error.
+        """
         stress, loads = strains.stress(cell.stiffness), self.loads(cell)
         stiffness_at_nodes = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
         curve = StressCurve(
@@ -320,18 +329,18 @@ class PrismModel:
         )
         if self.estimate:
             result = with_errors(result)
-        allowed = 2 * result.largest_error if result.errors else self._roughly
+        allowed = 2 * result.largest_error if result.errors else self._mesh_tolerance
         checks = _checks(strains, cell.stiffness, loads, cell.phases) | {"residual": residual}
         return replace(result, checks=require(checks, discretisation=ROUND_OFF + allowed))
 
     @property
-    def _roughly(self) -> float:
-        """Most that a mesh adds to the stiffness, where no error is declared."""
+    def _mesh_tolerance(self) -> float:
+        """Relative error of the stiffness to allow for in checks where none is declared."""
         return 0.1 * self.mesh_size ** (3 if self.interface == "conforming" else 1)
 
 
 def energies_of(strains: SliceStrains, phases: Sequence[AnyPhase], loads: Array) -> PhaseEnergies:
-    """Energies of the phases, with errors yet unknown."""
+    """Energies of the phases under macroscopic strains `loads` (n, 3); their errors are nan."""
     parts = strains.energy_parts([phase.stiffness_parts for phase in phases])
     values = moduli_of_energies(parts, loads)
     return PhaseEnergies(values, np.full(values.shape, np.nan))
@@ -343,7 +352,7 @@ def _checks(
     loads: Array,
     phases: Sequence[AnyPhase],
 ) -> dict[str, float]:
-    """Violations of Hill–Mandel, symmetry and bounds."""
+    """Relative violations of Hill–Mandel, symmetry and bounds, by their names in `WHAT`."""
     stress, energy = strains.stress(stiffness), strains.energy(stiffness)
     work = loads @ mean(strains.weights, stress)
     return {

@@ -1,4 +1,4 @@
-"""A mesh of one's own with its law of θ and its materials, refused where they do not fit."""
+"""The user's mesh with its law of θ and its materials, refused where they do not fit."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ _ENDS = "lower", "upper"
 
 
 def own_mesh_problem(path: Path | str, parallel: bool) -> PrismProblem:
-    """The problem on a mesh of one's own, kept for the next materials.
+    """Problem on the user's mesh, cached for the next materials.
 
     Raises:
         RefusedError: There is no such file, or it is none of Gmsh.

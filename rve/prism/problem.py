@@ -19,7 +19,7 @@ from alphacut.rve.solver.numbering import (
     LevelNumbering,
     NodeScatter,
     map_of,
-    reduced,
+    reduced_vector,
     zero_matrix,
 )
 from alphacut.rve.solver.options import SolverOptions
@@ -76,7 +76,7 @@ class PrismProblem:
 
     Args:
         grid: Topology.
-        comm: Communicator; its ranks share the wedges and the levels.
+        comm: Communicator; its ranks share the prisms and the levels.
 
     Attributes:
         form: Mesh and form.
@@ -127,7 +127,7 @@ class PrismProblem:
         """Reduced forces −⟨Bᵀ C ε̄⟩ of macroscopic strains (loads, 3), for the phases as set."""
         num_rows, size = len(self.numbering.rows), self.numbering.size
         forces = [self.form.elastic.load(strain, parts) for strain in strains]
-        return [reduced(force, self.local_map, num_rows, size) for force in forces]
+        return [reduced_vector(force, self.local_map, num_rows, size) for force in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
         """The solver of the stiffness as assembled, or of another symmetric operator.
@@ -150,8 +150,8 @@ class PrismProblem:
 
     def assemble_forces(self, form: fem.Form) -> PETSc.Vec:
         """Reduced vector Pᵀ b of a linear form of the user on `form.space`."""
-        values = fem.assemble_vector(form).array
-        return reduced(values, self.local_map, len(self.numbering.rows), self.numbering.size)
+        values, numbering = fem.assemble_vector(form).array, self.numbering
+        return reduced_vector(values, self.local_map, len(numbering.rows), numbering.size)
 
     def field(self, vector: PETSc.Vec) -> Array:
         """Displacements of this rank's nodes, shape (nodes, 2), from reduced unknowns."""

@@ -36,9 +36,9 @@ class ProductSpace:
         law: Radius of the particle over θ, or the law of θ where the mesh is that of a file.
 
     Attributes:
-        space: Displacements of two components in serendipity wedges.
+        space: Displacements of two components in serendipity prisms.
         dx: Measure of each phase by its name, "matrix" and "inclusion" or the physical groups of
-            the file, with the quadrature of the wedges.
+            the file, with the quadrature of the prisms.
         density: f_Θ at the quadrature points.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The slices model: plane cell problems at the nodes of a rule in θ.
+"""The slices model: two-dimensional cell problems at the nodes of a rule in θ.
 
 The product-space form has no θ-derivative, so its exact solution at each θ is the plane problem
 with radius r(θ).
@@ -51,7 +51,7 @@ from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 if TYPE_CHECKING:
     from alphacut.rve.slices.plane_cell import PlaneCell
 
-_FADE = 0.03  # least share of the last change that is taken to be left by order 4
+_FADE = 0.03  # least ratio of the changes by two successive orders that is extrapolated with
 _ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
 _CANCELLATION = 2e-14  # relative round-off for each unit of radius and contrast
@@ -113,12 +113,12 @@ class SlicesModel:
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         require_interphase(interphase, self.outline)
-        all_radii = require_continuous(radius_map)
+        mapped = require_continuous(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
-        solved = np.concatenate([radius_map(rule.nodes), [all_radii.min(), all_radii.max()]])
-        radii, places = np.unique(np.round(solved, DIGITS), return_inverse=True)
-        nodes = places[: rule.nodes.size]
+        all_radii = np.concatenate([radius_map(rule.nodes), [mapped.min(), mapped.max()]])
+        radii, indices = np.unique(np.round(all_radii, DIGITS), return_inverse=True)
+        nodes = indices[: rule.nodes.size]
         slices = [self._slice(radius, matrix, inclusions, interphase) for radius in radii]
         seconds = {"total": perf_counter() - start}
         results = []
@@ -163,12 +163,20 @@ class SlicesModel:
     def _mean_energies(
         self, result: HomogenisedStiffness, radii: Array, nodes: Rows, values: Array, errors: Array
     ) -> PhaseEnergies:
-        """Means of energies at `radii`, (n, phases, 2, 3); the rule's nodes are `nodes` of them."""
+        """Mean energies of the phases under f_Θ with declared errors.
+
+        Args:
+            result: The result, with its cell.
+            radii: Radii solved, rising, shape (n,).
+            nodes: Index among `radii` of each node of the rule in θ.
+            values: Energies at the radii, shape (n, phases, 2, 3), in Pa.
+            errors: Their declared errors.
+        """
         cell, rule = result.cell, ThetaRule(result.curve.theta, result.curve.weights)
         assert cell is not None
         moduli = values.sum(axis=(1, 2))
 
-        def missed(at_radii: Array) -> Array:
+        def error_in_theta(at_radii: Array) -> Array:
             relative = theta_error(
                 cell.radius,
                 rule,
@@ -181,9 +189,10 @@ class SlicesModel:
 
         # moduli of stiffer phases, c + X ∂c/∂X, are averaged as well as moduli are
         in_theta = [
-            [missed(moduli + values[:, p, x]) for x in range(2)] for p in range(len(cell.phases))
+            [error_in_theta(moduli + values[:, p, x]) for x in range(2)]
+            for p in range(len(cell.phases))
         ]
-        error = rule.mean(errors[nodes]) + np.array(in_theta) + missed(moduli)
+        error = rule.mean(errors[nodes]) + np.array(in_theta) + error_in_theta(moduli)
         return PhaseEnergies(rule.mean(values[nodes]), error)
 
     def _slice(
@@ -193,7 +202,10 @@ class SlicesModel:
         inclusions: Sequence[AnyPhase],
         interphase: Interphase | None,
     ) -> Slice | OutlineSlice:
-        """One plane cell by what tells its error."""
+        """Cell of one radius solved for all inclusions, with what its error estimate compares.
+
+        A circle without interphase: three orders on one mesh; else two orders and two meshes.
+        """
         size, outline = self.mesh_size, self.outline
         options: dict[str, Any] = {"mesh_size": size, "outline": outline, "energies": self.energies}
         if is_round(outline) and interphase is None:
@@ -219,11 +231,11 @@ def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
 
 @dataclass(frozen=True)
 class Slice:
-    """A plane cell solved for m inclusions by elements of orders 2, 3 and 4 on one mesh.
+    """A two-dimensional cell solved for m inclusions by elements of orders 2, 3 and 4 on one mesh.
 
     Args:
         by_order: Stiffness by order, in Pa, shape (3, m, 3, 3).
-        unknowns: Of the linear system, by order.
+        unknowns: Number of unknowns of the linear system, by order.
         mesh_size: Edge length of the mesh, in halves of the cell's side.
         cancellation: Relative round-off where forces of a stiff particle cancel, shape (m, 1).
         energies: Parts of the phases in the three moduli by order, shape (m, 2, 2, 3), in Pa; empty
@@ -237,16 +249,16 @@ class Slice:
     energies: Mapping[int, Array] = field(default_factory=dict)
 
     def stiffness(self, order: int) -> Array:
-        """By one order, shape (m, 3, 3), in Pa."""
+        """Stiffness by elements of one order, shape (m, 3, 3), in Pa."""
         return np.asarray(self.by_order[_ORDERS.index(order)])
 
     def error(self, order: int, *, square: bool) -> Array:
         """Declared relative errors of C11 + C12, C11 − C12, C33, shape (m, 3).
 
-        The distance from order 4, and the declared error of that one.
+        The relative distance from order 4, and the declared error of order 4.
 
         Args:
-            order: Of the result.
+            order: Order of the elements of the result.
             square: Whether the stiffness has the symmetry of the square; else errors along either
                 axis count.
         """
@@ -258,9 +270,9 @@ class Slice:
     def _error_of_highest(self, gaps: Array) -> Array:
         """Declared errors by order 4, shape (m, 3), from changes by each rise of order, (2, m, 3).
 
-        The geometric series of further orders, times a safety factor. What one order more leaves
-        of the last change is what the last rise left of the one before. One modulus may change
-        little by chance: each counts a share of the largest error.
+        The geometric series of the changes by further orders, times a safety factor; its ratio
+        is that of the last two changes. One modulus may change little by chance: the error of each
+        is at least a fraction of the largest.
         """
         fade = np.clip(gaps[1] / np.maximum(gaps[0], 1e-300), _FADE, 0.5)
         safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
@@ -278,7 +290,7 @@ def solve_slice(
     outline: Outline = circle,
     energies: bool = False,
 ) -> Slice:
-    """Solve one plane cell by orders 2, 3 and 4 on one mesh."""
+    """Solve a two-dimensional cell by elements of orders 2, 3 and 4 on one mesh."""
     from alphacut.rve.mesh.curved import plane_mesh
     from alphacut.rve.slices.plane_cell import PlaneCell
 
@@ -306,15 +318,15 @@ def solve_outline_slice(
     energies: bool = False,
     interphase: Interphase | None = None,
 ) -> OutlineSlice:
-    """Solve one plane cell with a particle that is not round, or in a ring, on two meshes.
+    """Solve a two-dimensional cell with a particle that is not round, or in a ring, on two meshes.
 
     Args:
-        radius: Of the particle.
+        radius: Radius of the particle.
         matrix: Phase outside it.
         inclusions: Phases of the particle, m of them.
         mesh_size: Edge length of the mesh of the result, in halves of the cell's side.
-        outline: Of the particle.
-        order: Of the result.
+        outline: Outline of the particle.
+        order: Order of the elements of the result.
         energies: Whether to compute the energies of the phases.
         interphase: Ring around a round particle.
     """

@@ -1,4 +1,4 @@
-"""A plane cell with a particle that is not round: two orders and two meshes tell its error."""
+"""A cell with a particle that is not round: its error is estimated by two orders and two meshes."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def second_size(mesh_size: float) -> float:
 
 @dataclass(frozen=True)
 class OutlineSlice:
-    """A plane cell solved for m inclusions by several orders, the highest on two meshes.
+    """A two-dimensional cell solved for m inclusions by several orders, the highest on two meshes.
 
     Args:
         by_order: Stiffness in Pa, (m, 3, 3), by order; `ACCURATE` and `JUDGE` are among them.
-        on_second_mesh: By order `JUDGE`, shape (m, 3, 3).
-        unknowns: Of the linear system, by order.
+        on_second_mesh: Stiffness by order `JUDGE` on the second mesh, shape (m, 3, 3), in Pa.
+        unknowns: Number of unknowns of the linear system, by order.
         round_off: Relative error by rounding of each inclusion, shape (m, 1).
         energies: Parts of the phases in the three moduli by order, shape (m, 2, 2, 3), in Pa; empty
             where they were not asked for.
@@ -48,7 +48,7 @@ class OutlineSlice:
     energies: Mapping[int, Array] = field(default_factory=dict)
 
     def stiffness(self, order: int) -> Array:
-        """By one order, shape (m, 3, 3), in Pa."""
+        """Stiffness by elements of one order, shape (m, 3, 3), in Pa."""
         return self.by_order[order]
 
     def error(self, order: int, *, square: bool) -> Array:
@@ -60,7 +60,7 @@ class OutlineSlice:
         far off as here in the median, order 5 is 4 times.
 
         Args:
-            order: Of the result.
+            order: Order of the elements of the result.
             square: Whether the stiffness has the symmetry of the square; never true here.
         """
         accurate, judge = self.by_order[ACCURATE], self.by_order[JUDGE]
@@ -79,9 +79,9 @@ def _distance(first: Array, second: Array, *, square: bool) -> Array:
 
 
 def energies_with_errors(energies: Mapping[int, Array], order: int) -> tuple[Array, Array]:
-    """Energies by an order and their declared errors, shape (m, 2, 2, 3) each.
+    """Energies by elements of `order` and their declared errors, shape (m, 2, 2, 3) each.
 
-    The distance from the highest other order, which is far from both where that is the lower one.
+    The error is the distance from the highest other order, times a safety factor.
     """
     values, judge = energies[order], energies[max(set(energies) - {order})]
     error = ORDER_SAFETY * abs(values - judge)

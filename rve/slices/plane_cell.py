@@ -1,4 +1,4 @@
-"""One plane cell by curved Lagrange triangles of any order, periodic by elimination."""
+"""A two-dimensional unit cell by curved Lagrange triangles of any order."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from alphacut.rve.mesh.curved import PlaneMesh, curved_nodes
 from alphacut.rve.mesh.jacobian import quadrature_degree
 from alphacut.rve.mesh.periodicity import unknowns
 from alphacut.rve.solver.krylov import ConvergenceError, solve
-from alphacut.rve.solver.numbering import map_of, reduced, zero_matrix
+from alphacut.rve.solver.numbering import map_of, reduced_vector, zero_matrix
 
 PREFIX = "rve_slice_"
 RESIDUAL = 1e-8  # relative, of a factorisation
 
 
 class PlaneCell:
-    """Isoparametric triangles of `order`.
+    """Periodic cell in plane strain of isoparametric triangles; sides are paired by elimination.
 
     Args:
         mesh: Triangles of the cell.
@@ -44,9 +44,9 @@ class PlaneCell:
         parts = [measure_of(plane, np.flatnonzero(phase == k), rule) for k in range(count)]
         self._form = CellForm(space, fem.functionspace(plane, ("DG", 0)), parts)
         self._form.density.x.array[:] = 1.0
-        self._places: Array = np.empty((len(nodes), 2))
-        self._places[space.dofmap.list] = plane.geometry.x[plane.geometry.dofmap, :2]
-        pairs = unknowns(self._places)
+        self._nodes: Array = np.empty((len(nodes), 2))
+        self._nodes[space.dofmap.list] = plane.geometry.x[plane.geometry.dofmap, :2]
+        pairs = unknowns(self._nodes)
         self.unknowns = 2 * (int(pairs.max()) + 1)
         self._local = map_of(pairs, MPI.COMM_SELF)
         rows = range(self.unknowns)
@@ -62,7 +62,8 @@ class PlaneCell:
         self._matrix.zeroEntries()
         self._form.add_stiffness(self._matrix)
         forces = [self._form.load(strain) for strain in np.eye(3)]
-        loads = [reduced(force, self._local, self.unknowns, self.unknowns) for force in forces]
+        size = self.unknowns
+        loads = [reduced_vector(force, self._local, size, size) for force in forces]
         solved = solve(cholesky(self._matrix, PREFIX), loads)
         if not solved.residual <= RESIDUAL:
             raise ConvergenceError(
@@ -71,9 +72,9 @@ class PlaneCell:
                 "check the moduli, or take the series",
             )
         self._fields = solved.vectors
-        uniform = -self._affine().T @ np.stack(forces, axis=-1)
-        gained = [[load.dot(x) for x in solved.vectors] for load in loads]
-        return np.asarray((uniform - gained) / AREA)  # ⟨σ⟩ by Hill–Mandel
+        affine = -self._affine().T @ np.stack(forces, axis=-1)
+        fluctuation = [[load.dot(x) for x in solved.vectors] for load in loads]
+        return np.asarray((affine - fluctuation) / AREA)  # ⟨σ⟩ by Hill–Mandel
 
     def phase_energies(self, phases: Sequence[AnyPhase]) -> Array:
         """Parts of K and G of the phases in the three moduli, shape (phases, 2, 3), in Pa.
@@ -103,13 +104,13 @@ class PlaneCell:
         energies, affine = [], self._affine()
         for strain, field in zip(THREE_LOADS, fields, strict=True):
             force = self._form.load(strain, phase)
-            load = reduced(force, self._local, self.unknowns, self.unknowns)
+            load = reduced_vector(force, self._local, self.unknowns, self.unknowns)
             uniform = -(affine @ strain) @ force
             energies.append(uniform - 2 * load.dot(field) + field.dot(self._matrix * field))
         return np.array(energies) / AREA
 
     def _affine(self) -> Array:
         """Displacements of the unit strains (11, 22, 12 with 2 ε12 = 1), shape (nodes · 2, 3)."""
-        (x, y), zero = self._places.T, np.zeros(len(self._places))
+        (x, y), zero = self._nodes.T, np.zeros(len(self._nodes))
         first, second = np.stack([x, zero, y / 2], -1), np.stack([zero, y, x / 2], -1)
         return np.stack([first, second], axis=1).reshape(-1, 3)

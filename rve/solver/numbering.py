@@ -20,19 +20,19 @@ from alphacut.rve.mesh.prism_grid import PrismGrid
 
 
 def map_of(pairs: Rows, comm: MPI.Intracomm) -> PETSc.LGMap:
-    """Local-to-global map of nodes to their pairs of unknowns, −1 where dropped."""
+    """PETSc's local-to-global map of nodes to their pairs of unknowns, −1 where eliminated."""
     return PETSc.LGMap().create(pairs.astype(PETSc.IntType), bsize=2, comm=comm)
 
 
 def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
-    """Matrix of zeros with room for all unknowns that share a cell.
+    """Zero matrix with the sparsity pattern of all unknowns that share a cell.
 
     Args:
-        pairs: Pairs of unknowns of the nodes of the cells that touch these rows, −1 where dropped,
-            shape (cells, nodes).
-        local_map: Of the nodes of this rank.
+        pairs: Pairs of unknowns of the nodes of the cells that touch these rows, −1 where
+            eliminated, shape (cells, nodes).
+        local_map: Nodes of this rank to pairs of unknowns.
         rows: Unknowns of this rank.
-        size: Unknowns in all.
+        size: Number of unknowns of all ranks.
     """
     has_unknown = pairs >= 0
     cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[has_unknown]
@@ -50,8 +50,15 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
     return matrix
 
 
-def reduced(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> PETSc.Vec:
-    """Vector of `num_rows` unknowns here and `size` in all: the sum of the values (nodes · 2,)."""
+def reduced_vector(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> PETSc.Vec:
+    """Assembled vector Pᵀ b of nodal values b, (2 nodes,): values of identified nodes are added.
+
+    Args:
+        values: b on this rank, two entries a node.
+        local_map: Nodes of this rank to pairs of unknowns.
+        num_rows: Number of unknowns of this rank.
+        size: Number of unknowns of all ranks.
+    """
     vector = PETSc.Vec().createMPI((num_rows, size), bsize=2, comm=local_map.comm)
     vector.setLGMap(local_map)
     nodes = np.arange(len(values) // 2, dtype=PETSc.IntType)
@@ -61,31 +68,31 @@ def reduced(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> 
 
 
 class NodeScatter:
-    """Scatter of reduced unknowns to nodes of this rank, which takes no others.
+    """Scatter of a vector of unknowns to the nodes of this rank.
 
     Args:
-        pairs: Pair of unknowns of each node, −1 where dropped, shape (nodes,).
-        vector: Any vector of reduced unknowns.
+        pairs: Pair of unknowns of each node, −1 where eliminated, shape (nodes,).
+        vector: Any vector of unknowns, for its layout.
     """
 
     def __init__(self, pairs: Rows, vector: PETSc.Vec) -> None:
-        self._kept = np.flatnonzero(pairs >= 0)
+        self._free_nodes = np.flatnonzero(pairs >= 0)
         self._shape = len(pairs), 2
-        blocks = pairs[self._kept].astype(PETSc.IntType)
+        blocks = pairs[self._free_nodes].astype(PETSc.IntType)
         needed = PETSc.IS().createBlock(2, blocks, comm=PETSc.COMM_SELF)
         self._values = PETSc.Vec().createSeq(2 * len(blocks), comm=PETSc.COMM_SELF)
         self._scatter = PETSc.Scatter().create(vector, needed, self._values, None)
 
     def __call__(self, vector: PETSc.Vec) -> Array:
-        """Displacements of the nodes, zero where dropped, shape (nodes, 2)."""
+        """Displacements of the nodes, zero where eliminated, shape (nodes, 2)."""
         self._scatter.scatter(vector, self._values)
         displacements = np.zeros(self._shape)
-        displacements[self._kept] = self._values.array_r.reshape(-1, 2)
+        displacements[self._free_nodes] = self._values.array_r.reshape(-1, 2)
         return displacements
 
 
 class LevelNumbering:
-    """Reduced unknowns, two at each node that is left.
+    """Numbering of the unknowns after elimination, two at each remaining node.
 
     Args:
         grid: Topology.
@@ -93,9 +100,9 @@ class LevelNumbering:
 
     Attributes:
         periodicity: Unknowns of one level.
-        planar: Unknowns of a level.
-        between: Unknowns half-way between two levels: those of vertices.
-        size: Unknowns in all.
+        planar: Number of unknowns of a level.
+        between: Number of unknowns half-way between two levels: those of vertices.
+        size: Number of unknowns of all ranks.
         levels: Levels of this rank.
         middles: Half-way levels of this rank.
         rows: Unknowns of this rank.
@@ -126,12 +133,12 @@ class LevelNumbering:
         return np.concatenate([on.ravel(), half.ravel()])
 
     def by_level(self, values: Array) -> tuple[Array, Array]:
-        """Unknowns on the levels, (layers + 1, planar), and half-way, (layers, between); copies."""
+        """Copies of values on levels, (layers + 1, planar), and half-way, (layers, between)."""
         below = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
         top = values[self.grid.layers * self.stride :][None]
         return np.concatenate([below[:, : self.planar], top]), below[:, self.planar :].copy()
 
-    def joined(self, on: Array, half: Array) -> Array:
-        """The vector from what `by_level` makes of it; of a rank's levels alone, its part."""
-        paired = np.concatenate([on[: len(half)], half], axis=1)
-        return np.concatenate([paired.ravel(), on[len(half) :].ravel()])
+    def from_levels(self, on: Array, half: Array) -> Array:
+        """Vector of values on levels and half-way, as of `by_level`, here or on this rank alone."""
+        layers = np.concatenate([on[: len(half)], half], axis=1)
+        return np.concatenate([layers.ravel(), on[len(half) :].ravel()])

@@ -1,8 +1,8 @@
 """A preconditioner that is exact where the cell does not change with θ.
 
 On a prism mesh the stiffness is nearly a Kronecker product M ⊗ K of the mass matrix along θ,
-M_jk = ∫ f_Θ φ_j φ_k dθ, and the stiffness K of a plane cell, which drifts with the radius from
-level to level. A wedge carries linear functions of θ (hats) on all nodes of its triangles and
+M_jk = ∫ f_Θ φ_j φ_k dθ, and the stiffness K of a planar cell, which drifts with the radius from
+level to level. A prism carries linear functions of θ (hats) on all nodes of its triangles and
 quadratic ones on vertices. Take hats and bubbles of θ for a basis; the nodal value half-way is then
 the bubble plus the mean of the hats at its ends. With
 
@@ -59,7 +59,7 @@ class ThetaMass:
 
 
 def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
-    """The masses on the levels θ_k, shape (layers + 1,), by the rule of the wedges."""
+    """The masses on the levels θ_k, shape (layers + 1,), by the rule of the prisms."""
     layers, heights = len(levels) - 1, np.diff(levels)[:, None]
     abscissae, double = np.polynomial.legendre.leggauss(3)
     t, w = (abscissae + 1) / 2, double / 2
@@ -159,7 +159,7 @@ class ThetaPreconditioner:
         hats, bubbles = self._own_rows(hats, bubbles)
         half = len(bubbles)
         bubbles += (hats[:half, :corners] + hats[1 : half + 1, :corners]) / 2
-        result.array[:] = numbering.joined(hats[: len(self.levels)], bubbles)
+        result.array[:] = numbering.from_levels(hats[: len(self.levels)], bubbles)
 
     def _solved_levels(self, hats: Array, bubbles: Array) -> Array:
         """This rank's part of diag(K⁻¹) (M^-½ ⊗ 1; (G^-½ ⊗ 1) Jᵀ Zᵀ) on hats and bubbles."""
@@ -169,7 +169,7 @@ class ThetaPreconditioner:
             mass.excess[list(self.numbering.middles)],
         )
         orthogonal = excess @ bubbles - (excess @ mass.shift.T @ hats) @ self.injection  # Jᵀ
-        return self.numbering.joined(
+        return self.numbering.from_levels(
             self._solved(self.levels, root @ hats), self._solved(self.middles, orthogonal)
         )
 

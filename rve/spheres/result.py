@@ -54,7 +54,7 @@ def volume_fraction(radius: Array) -> Array:
 
 
 def certified_spheres(result: HomogenisedSpheres) -> HomogenisedSpheres:
-    """Result with its certificate: symmetry, Voigt, Reuss, Hashin–Shtrikman.
+    """Result with its checks: symmetry, Voigt, Reuss, Hashin–Shtrikman.
 
     Raises:
         CertificateError: One is violated by more than the declared error.

@@ -63,7 +63,7 @@ def test_hill_s_relations_are_what_a_strain_along_the_fibres_gives(particle):
 def strained_along(cell, phases, fraction):
     """C13, C23, C63 and C33 by fields under ε33 = 1: an eigenstress C13 of the phases."""
     from alphacut.rve.cell import AREA
-    from alphacut.rve.solver.numbering import reduced
+    from alphacut.rve.solver.numbering import reduced_vector
 
     cell.stiffness(tuple(phase.stiffness for phase in phases))
     column = [
@@ -71,7 +71,7 @@ def strained_along(cell, phases, fraction):
     ]
     cell._form.set_phases(column)
     force = cell._form.load(np.array([1.0, 0, 0]))
-    load = reduced(force, cell._local, cell.unknowns, cell.unknowns)
+    load = reduced_vector(force, cell._local, cell.unknowns, cell.unknowns)
     mixed = -cell._affine().T @ force - [load.dot(field) for field in cell._fields]
     cell._form.set_phases([phase.stiffness for phase in phases])
     cell._matrix.zeroEntries()
