@@ -1,5 +1,7 @@
 """Slices: plane cells by curved elements against the exact series, and their rule in θ."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,12 +71,26 @@ def test_full_stiffness_is_exact_for_other_poissons_ratios(inclusion):
     assert largest_error(stiffness, 0.8, matrix, inclusion) < 5e-6
 
 
-def test_a_matrix_that_is_turned_turns_the_result():
-    """An orthotropic particle with its axes exchanged exchanges those of the cell."""
-    turn = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1]])
-    turned = VoigtPhase((turn @ ORTHOTROPIC.stiffness @ turn).tolist())
-    one, other = (stiffness_of(0.6, 4, size=0.2, inclusion=c) for c in (ORTHOTROPIC, turned))
-    assert turn @ one @ turn == pytest.approx(other, rel=1e-6, abs=1e-7 * one.max())
+QUARTER_TURN = [[0, -1], [1, 0]], [[0, 1, 0], [1, 0, 0], [0, 0, -1]]
+MIRROR = [[1, 0], [0, -1]], np.diag([1, 1, -1])
+
+
+@pytest.mark.parametrize("inclusion", [INCLUSION, ORTHOTROPIC], ids=["isotropic", "orthotropic"])
+@pytest.mark.parametrize(
+    ("motion", "turn"), [(QUARTER_TURN, 120.0), (MIRROR, -30.0)], ids=["turned", "mirrored"]
+)
+def test_a_cell_on_its_turned_mesh_has_the_turned_stiffness(motion, turn, inclusion):
+    """A quarter turn exchanges x1 and x2; angles −φ change the signs of C16 and C26."""
+    of_points, of_stresses = map(np.array, motion)
+    mesh = plane_mesh(0.5, size=0.4, outline=Ellipse(2.0, 30.0))
+    image = replace(mesh, points=mesh.points @ of_points.T, outline=Ellipse(2.0, turn))
+    turned_inclusion = of_stresses @ inclusion.stiffness @ of_stresses.T
+    stiffness = PlaneCell(mesh, 3).stiffness((MATRIX.stiffness, inclusion.stiffness))
+    turned = PlaneCell(image, 3).stiffness((MATRIX.stiffness, turned_inclusion))
+    scale = stiffness[0, 0]
+    assert of_stresses @ stiffness @ of_stresses.T == pytest.approx(turned, abs=1e-9 * scale, rel=0)
+    assert abs(stiffness[:2, 2]).min() > 1e-3 * scale
+    assert abs(stiffness[0, 0] - stiffness[1, 1]) > 1e-2 * scale
 
 
 @pytest.mark.slow
