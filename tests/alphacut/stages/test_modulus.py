@@ -13,7 +13,7 @@ from tests.alphacut.small import CELL, written
 
 MODELS = {
     "series": (),
-    "slices": ("modulus.method=slices", "mesh.size=0.3"),
+    "slices": ("modulus.method=slices", "mesh.size=0.5"),
     "spheres": ("cell.particles=spheres", "modulus.tolerance=1e-4"),
 }
 
