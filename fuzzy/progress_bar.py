@@ -12,6 +12,7 @@ _BAR_DELAY = 1.0  # seconds before a bar appears
 _BAR_PERIOD = 0.2  # seconds between its updates
 _LINE_PERIOD = 10.0  # seconds between lines where there is no terminal
 _WIDTH = 30  # letters of the bar
+_FORETOLD = 0.05  # share of the work from which the time left is told; less foretells nothing
 
 
 def share(progress: Progress | None, first: float, last: float) -> Progress:
@@ -68,7 +69,7 @@ class _Lines:
         now = monotonic()
         if now - self.written >= _LINE_PERIOD:
             self.written, elapsed = now, now - self.begun
-            left = f", some {elapsed / share - elapsed:.0f} s left" if share > 0 else ""
+            left = f", some {elapsed / share - elapsed:.0f} s left" if share >= _FORETOLD else ""
             sys.stderr.write(f"{share:4.0%} after {elapsed:.0f} s{left}\n")
             sys.stderr.flush()
 
