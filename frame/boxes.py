@@ -230,8 +230,8 @@ class UnitFlow:
     def scale(self) -> Array:
         """Factor on a tolerance for each output, shape (m,).
 
-        Relative: the peaks. Else 1 when all outputs share a unit, or their peaks by that of
-            `reference`.
+        A relative tolerance is multiplied by each output's peak. Another one is that of output
+        `reference`: the factor is 1 if all outputs share its unit, else the ratio of peaks.
         """
         if self.relative:
             return self.peak

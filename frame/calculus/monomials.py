@@ -99,7 +99,7 @@ def convolve(
 
 @njit(cache=True, nogil=True)
 def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
-    """Add entry-by-entry products of all pairs of coefficients (…, v)."""
+    """Add a[x] b[y], entry by entry, (v,), to out[at[x, y]] for all pairs of monomials x, y."""
     for x in range(len(a)):
         if not a[x].any():
             continue
@@ -111,7 +111,7 @@ def _add_products(a: Array, b: Array, at: Rows, out: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def _add_matrix_products(a: Array, b: Array, at: Rows, out: Array) -> None:
-    """Add products of all pairs of matrices (…, p, q) and (…, q, r)."""
+    """Add a[x] @ b[y], (p, q) by (q, r), to out[at[x, y]] for all pairs of monomials x, y."""
     for x in range(len(a)):
         if not a[x].any():
             continue

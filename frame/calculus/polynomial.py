@@ -96,24 +96,24 @@ class Polynomial:
     coefficients: Array
 
     @cached_property
-    def slope(self) -> Array:
+    def gradient(self) -> Array:
         """Coefficients of the first derivatives, shape (d, terms, K)."""
         return np.stack(
             [derivative(self.index, i, self.coefficients) for i in range(self.index.shape[1])]
         )
 
     @cached_property
-    def curve(self) -> Array:
+    def hessian(self) -> Array:
         """Coefficients of the second derivatives, shape (d, d, terms, K)."""
         d = self.index.shape[1]
-        out = np.zeros((d, *self.slope.shape), self.coefficients.dtype)
+        out = np.zeros((d, *self.gradient.shape), self.coefficients.dtype)
         for i in range(d):
             for j in range(i, d):
-                out[i, j] = out[j, i] = derivative(self.index, j, self.slope[i])
+                out[i, j] = out[j, i] = derivative(self.index, j, self.gradient[i])
         return out
 
     def divided(self, scale: Array) -> Polynomial:
-        """Each polynomial over a number of its own, `scale` (K,)."""
+        """The polynomials, each divided by its entry of `scale` (K,)."""
         return Polynomial(self.index, self.coefficients / scale)
 
     def __call__(self, u: Array) -> Array:
@@ -130,7 +130,7 @@ class Polynomial:
     def _packed(self) -> list[Array]:
         """Coefficients of all first and all second derivatives side by side, without zero rows."""
         d, degree = self.index.shape[1], int(self.index.sum(1).max())
-        derivatives = (self.slope, self.curve[np.triu_indices(d)])
+        derivatives = (self.gradient, self.hessian[np.triu_indices(d)])
         counts = (terms(d, max(degree - k, 0)) for k in (1, 2))
         arrays_and_counts = zip(derivatives, counts, strict=True)
         return [x[:, :n].swapaxes(0, 1).reshape(n, -1) for x, n in arrays_and_counts]

@@ -35,13 +35,13 @@ def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
         return np.asarray(size @ np.abs(coefficients))
 
     zero = bound(polynomial.coefficients)
-    first = np.stack([bound(polynomial.slope[i]) for i in range(d)])
-    second = np.stack([[bound(polynomial.curve[i, j]) for j in range(d)] for i in range(d)])
+    first = np.stack([bound(polynomial.gradient[i]) for i in range(d)])
+    second = np.stack([[bound(polynomial.hessian[i, j]) for j in range(d)] for i in range(d)])
     third = np.zeros((d, *second.shape))
     for i in range(d):
         for j in range(d):
             for k in range(d):
-                third[i, j, k] = bound(derivative(polynomial.index, k, polynomial.curve[i, j]))
+                third[i, j, k] = bound(derivative(polynomial.index, k, polynomial.hessian[i, j]))
     return [zero, first, second, third]
 
 

@@ -1,10 +1,10 @@
-"""Exact motions of a structure with classical modes at single inputs, and bounds of their rounding.
+"""Responses of a structure with classical modes at single inputs, and bounds of their rounding.
 
-An output is Σ_k r_k c_k e(λ_k), over modes of unit mass: r what the output reads of mode k, c what
-a source puts into it, e the response of its oscillator. Computed modes X and λ are the exact ones
-of a pencil that is near by: Xᵀ K X = diag λ + E and Xᵀ M X = I + F, whose entries are bounded by
-the computed residuals and their γ_n (Higham 2002, section 3.5). With G = |E| + |F| diag λ the
-outputs are off, to first order, by
+An output is Σ_k r_k c_k e(λ_k), over modes of unit mass: r the output's coefficient of mode k,
+c the mode's participation in a source, e the response of its oscillator. Computed modes X and λ
+are the exact ones of a pencil near by: Xᵀ K X = diag λ + E and Xᵀ M X = I + F, whose entries are
+bounded by the computed residuals and their γ_n (Higham 2002, section 3.5). With
+G = |E| + |F| diag λ the outputs are off, to first order, by
 
     Σ_jk |r_j| G_jk |e[λ_j, λ_k]| |c_k| + Σ_jk |r_j e_j| |F_jk| |c_k|,
 
@@ -25,7 +25,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.response.duhamel import (
     impulses,
-    responses_at_named_nodes,
+    responses_at_given_nodes,
     responses_at_nodes,
 )
 from alphacut.frame.structures.linear import LinearSystem, evaluate, histories
@@ -68,15 +68,15 @@ class Modal:
     order: Rows
     accelerated: Array
 
-    def read(self, point: Rows, output: Rows) -> tuple[Array, Array]:
-        """What outputs (N,) read of the modes at points (N,), and its rounding, each (N, n)."""
+    def output_coefficients(self, point: Rows, output: Rows) -> tuple[Array, Array]:
+        """Coefficients r of outputs (N,) at points (N,), and their rounding, each (N, n)."""
         n, order = self.shape.shape[-1], self.order[output][:, None]
         rows, shape = self.rows[point, output], self.shape[point]
         row = np.where(order == 1, rows[:, n:], rows[:, :n])
         row = np.where(order == 2, self.accelerated[output], row)
         size = np.einsum("si,sik->sk", np.abs(row), np.abs(shape))
-        read = np.einsum("si,sik->sk", row, shape)
-        return read, gamma(n + ENTRY_ROUNDINGS) * size
+        coefficients = np.einsum("si,sik->sk", row, shape)
+        return coefficients, gamma(n + ENTRY_ROUNDINGS) * size
 
 
 def modes_at(
@@ -222,7 +222,7 @@ def outputs_at(
     for name, load in loads.items():
         rho[name] = load.rho[0], load.rho[1], load.error
         most[name] = np.stack([load.impulse, time * load.impulse])
-    read, read_error = modal.read(point, output)
+    read, read_error = modal.output_coefficients(point, output)
     total, total_error = np.zeros(len(point)), np.zeros(len(point))
     for source, values in rho.items():
         wave = _wave(source, sigma, turn, modal.order[output], values, most[source])
@@ -282,13 +282,13 @@ class LoadAtNodes:
     value: Array
 
 
-def load_at_named_nodes(sigma: Array, load: History, time: Array, node: Rows) -> LoadAtNodes:
-    """Responses for σ (N, n) at node (N,) of `time`."""
-    responses = responses_at_named_nodes(sigma, load, time, node, 1)
+def load_at_given_nodes(sigma: Array, load: History, time: Array, node: Rows) -> LoadAtNodes:
+    """Responses of oscillators σ (N, n) to a load, each row at its node (N,) of `time`."""
+    responses = responses_at_given_nodes(sigma, load, time, node, 1)
     return LoadAtNodes(*responses, impulses(load, time)[node], load.values(time[node]))
 
 
 def load_at_nodes(sigma: Array, load: History, time: Array) -> LoadAtNodes:
-    """Responses for σ (n,) at all nodes."""
+    """Responses of oscillators σ (n,) to a load at all nodes."""
     responses = responses_at_nodes(sigma, load, time, 1)
     return LoadAtNodes(*responses, impulses(load, time), load.values(time))

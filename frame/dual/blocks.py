@@ -38,9 +38,9 @@ MAX_MONOMIALS = 33_000
 DEGREES = (4, 10)
 """Least and greatest degree of the series."""
 FINE = 3e-4
-"""Doubt of L and of N, as a share of each, at which no higher degree is tried."""
+"""Relative error bound of L and N at which no higher degree is tried."""
 ROUGH = 0.05
-"""Doubt above which a block counts as not enclosed."""
+"""Relative error bound above which a block counts as not enclosed."""
 MAX_SHAPE = 10.0
 """Bound of an entry of X, which is 1 in the block's own row, above which none is found."""
 ROUNDS = 60
@@ -68,8 +68,8 @@ class Block:
     norm: TaylorModel
 
     @property
-    def doubt(self) -> float:
-        """Greatest doubt of L's diagonal and of N, as a share of each."""
+    def relative_error(self) -> float:
+        """Largest error bound of the diagonals of L and N, relative to their middle values."""
         rate, norm = (np.diag(x.rest) / np.diag(x.value) for x in (self.rate, self.norm))
         return float(max(rate.max(), norm.max()))
 
@@ -158,25 +158,28 @@ def subspace_series(
     return rate, shape, moved
 
 
-def sharpest(block: Rows, rotation: Array, centre: Centre, enough: float) -> Block | None:
-    """The block by the least degree that is fine, or the greatest affordable; None if rough.
+def narrowest_block(block: Rows, rotation: Array, centre: Centre, tolerance: float) -> Block | None:
+    """Enclosure of a block by series of the least degree whose error bound is below `tolerance`.
 
     Args:
-        block: Numbers of its modes.
-        rotation: Of its modes.
+        block: Numbers of its modes from below, shape (p,).
+        rotation: Rotation R of its modes, shape (p, p).
         centre: The structure.
-        enough: Doubt that suffices, `FINE` at least and half of `ROUGH` at most.
+        tolerance: Relative error bound of L and N that suffices, clipped to [FINE, ROUGH / 2].
+
+    Returns:
+        By the last degree tried if none is below it; None if the error bound exceeds `ROUGH`.
     """
     series: Series | None = None
-    found, enough = None, min(max(enough, FINE), ROUGH / 2)
+    found, tolerance = None, min(max(tolerance, FINE), ROUGH / 2)
     for degree in range(DEGREES[0], _max_degree(centre.mass.inputs) + 1):
         series = subspace_series(block, degree, centre, series)
         found = enclosed(block, rotation, series, centre)
         if found is None and degree > DEGREES[0]:
-            break  # sizes of all degrees together stand in the way; more of them do not help
-        if found is not None and found.doubt < enough:
+            break  # the sums of coefficients over all degrees are too large; more only add to them
+        if found is not None and found.relative_error < tolerance:
             break
-    return found if found is not None and found.doubt < ROUGH else None
+    return found if found is not None and found.relative_error < ROUGH else None
 
 
 def _max_degree(d: int) -> int:

@@ -12,7 +12,7 @@ from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.attained import (
     Modal,
-    load_at_named_nodes,
+    load_at_given_nodes,
     load_at_nodes,
     modes_at,
     outputs_at,
@@ -139,7 +139,7 @@ class Box:
     def _motions(self, modal: Modal, point: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
         sigma = modal.sigma[point]
         loads = {
-            name: load_at_named_nodes(sigma, load, self.time, node)
+            name: load_at_given_nodes(sigma, load, self.time, node)
             for name, load in self.loads.items()
         }
         return outputs_at(modal, point, output, self.time[node], loads)
@@ -148,7 +148,7 @@ class Box:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
         total, m = self._shape
         deviation, outputs = np.zeros((total, m)), np.arange(m)
-        read = np.abs(modal.read(np.zeros(m, int), outputs)[0])
+        read = np.abs(modal.output_coefficients(np.zeros(m, int), outputs)[0])
         for k, sigma in enumerate(modal.sigma[0]):
             grid = Grid(np.array([sigma.imag]), np.array([-sigma.real / sigma.imag]))
             oscillator = Oscillators(grid, self.loads, self.time)

@@ -9,7 +9,7 @@ import numpy as np
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dual.blocks import Block, Centre, sharpest
+from alphacut.frame.dual.blocks import Block, Centre, narrowest_block
 from alphacut.frame.dual.pencil import form_variation
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
@@ -168,7 +168,9 @@ def _from_below(
         modes = _component(near > NEAR, free[:1], free)
         while True:
             enough = float(doubts[modes].min())
-            if (found := sharpest(modes, rotation(centre, modes), centre, enough)) is not None:
+            if (
+                found := narrowest_block(modes, rotation(centre, modes), centre, enough)
+            ) is not None:
                 break
             outside = near[np.ix_(modes, free)] * ~np.isin(free, modes)
             inner, outer = np.unravel_index(int(outside.argmax()), outside.shape)

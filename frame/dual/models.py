@@ -37,13 +37,13 @@ class Models:
     along: int | None
 
     def within(self, low: Array, high: Array) -> Models:
-        """The same over a part of the box, low ≤ u ≤ high."""
+        """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
         models = [x for mode in self.single for x in mode.models]
         models += [x for truncated in self.rests for x in (truncated.share, truncated.doubt)]
-        moved = all_within(models, low, high)
+        restricted = all_within(models, low, high)
         count = 4 * len(self.single)
-        single = [mode.on_part(moved[4 * k : 4 * k + 4]) for k, mode in enumerate(self.single)]
-        pairs = zip(self.rests, moved[count::2], moved[count + 1 :: 2], strict=True)
+        single = [mode.on_part(restricted[4 * k : 4 * k + 4]) for k, mode in enumerate(self.single)]
+        pairs = zip(self.rests, restricted[count::2], restricted[count + 1 :: 2], strict=True)
         rests = [replace(truncated, share=share, doubt=doubt) for truncated, share, doubt in pairs]
         return replace(self, single=single, rests=rests)
 

@@ -101,7 +101,7 @@ def rest_of_modes(
     other_modes = found.others
     if not len(other_modes):
         return None
-    sums = _of_all(found, *coordinates, max(x.block.norm.order for x in shares))
+    sums = _sums_over_modes(found, *coordinates, max(x.block.norm.order for x in shares))
     for of_block in shares:
         sums = sums.less(_of_block(of_block))
     low, high = float(found.low[other_modes].min()), float(found.high[other_modes].max())
@@ -134,8 +134,17 @@ def _known_by(
     return _least(structure, _bounds(sums, structure, found), ranges)
 
 
-def _of_all(found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int) -> _Sums:
-    """Sums over all modes of outputs `read` and sources, which may depend on the inputs."""
+def _sums_over_modes(
+    found: Subspaces, read: TaylorModel, excited: TaylorModel, order: int
+) -> _Sums:
+    """Σ a β, Σ a², Σ β² over all modes, and each over λ, in closed form (module docstring).
+
+    Args:
+        found: Enclosed modes, with M and K in the coordinates of the box's middle.
+        read: Rows r of the outputs in these coordinates, V = (m, n).
+        excited: Patterns v of the sources in them, V = (sources, n); may depend on the inputs.
+        order: Order of the Taylor models where the patterns are constant.
+    """
     centre, mass, stiffness = found.centre, found.centre.mass, found.centre.stiffness
     if len(excited.present()):
         order, d = excited.order, excited.inputs

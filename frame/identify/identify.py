@@ -233,7 +233,7 @@ def identify(
         RefutedError: No parameters in the priors agree with the measurement at the lowest level.
     """
     numbers = {k: x if isinstance(x, FuzzyNumber) else Crisp(float(x)) for k, x in prior.items()}
-    _refuse(frame, measured, numbers, alpha)
+    _require_input(frame, measured, numbers, alpha)
     evidence = Evidence(Chain(frame, tuple(numbers)), numbers, tuple(measured))
     levels = np.asarray(alpha, float)
     boxes, empty = _boxes(evidence, levels)
@@ -249,13 +249,17 @@ def identify(
     return Identified(evidence, levels, *ends, empty)
 
 
-def _refuse(
+def _require_input(
     frame: StoreyFrame,
     measured: Sequence[MeasuredMode],
     prior: Mapping[str, FuzzyNumber],
     alpha: Sequence[float],
 ) -> None:
-    """Refuses levels, modes, floors and priors without meaning for the frame."""
+    """Refuse levels, mode numbers, floors or priors that are not allowed for the frame.
+
+    Raises:
+        RefusedError: There is one.
+    """
     levels, floors = np.asarray(alpha, float), frame.floors
     rising = levels.ndim == 1 and len(levels) > 0 and bool((np.diff(levels) > 0).all())
     least = min(widest(number).lower for number in prior.values())

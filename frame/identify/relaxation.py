@@ -63,16 +63,16 @@ class LinearProgram:
         return self._proved(objective, multipliers)
 
     def empty(self) -> bool:
-        """True if it is proved that no point fulfils all rows."""
+        """True if it is proved that no x of the box satisfies A x <= b, by phase one."""
         size = self.rows.shape[0]
-        relaxed = LinearProgram(
+        phase_one = LinearProgram(
             csr_array(hstack([self.rows, csr_array(-np.ones((size, 1)))])),
             self.right,
             np.append(self.lower, 0.0),
             np.append(self.upper, 1e3),
         )
         cost = np.append(np.zeros(len(self.lower)), 1.0)
-        return relaxed.least(cost) > 0
+        return phase_one.least(cost) > 0
 
     def _proved(self, objective: Array, multipliers: Array) -> float:
         reduced_costs = objective - self.rows.T @ multipliers

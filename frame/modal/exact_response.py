@@ -68,18 +68,21 @@ class ExactResponse:
 
     def value_at(self, unit: Array, node: Rows, output: Rows) -> Array:
         """Values (N,) of one output at one node per point (N, d)."""
-        return self._sloped(unit, node, output, 0)[0]
+        return self._values_and_gradients(unit, node, output, 0)[0]
 
     def at(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array, Array]:
         """Values (N,) and gradients (N, d), exact; Hessians (N, d, d) of the polynomials, or 0."""
-        f, g = self._sloped(unit, node, output, 1)
+        f, g = self._values_and_gradients(unit, node, output, 1)
         if self.bent:
             return f, g, self.model.at(unit, node, output)[2]
         return f, g, np.zeros((*unit.shape, unit.shape[1]))
 
-    def _sloped(self, unit: Array, node: Rows, output: Rows, order: int) -> tuple[Array, Array]:
+    def _values_and_gradients(
+        self, unit: Array, node: Rows, output: Rows, order: int
+    ) -> tuple[Array, Array]:
+        """Values (N,) and, if `order` is 1 (else undefined), gradients (N, d) at points (N, d)."""
         f, g = np.empty(len(unit)), np.empty(unit.shape)
-        for rows, points, indices in pieces(unit):
+        for rows, points, indices in point_chunks(unit):
             modes = analyse(self.model.flow, self.model.boxes, points, order=order)
             f[rows], slope = self._at_modes(modes, indices, node[rows], output[rows])
             if order:
@@ -104,12 +107,17 @@ class ExactResponse:
         return f / scale, (g / scale).T
 
 
-def pieces(unit: Array) -> Iterator[tuple[Rows, Array, Rows]]:
-    """Rows that are treated together, their different points, and which of them each row has."""
+def point_chunks(unit: Array) -> Iterator[tuple[Rows, Array, Rows]]:
+    """Chunks of points (N, d), equal ones together, for one eigen-analysis of each distinct point.
+
+    Yields:
+        Rows of a chunk in `unit`, (n,), its distinct points, (k, d), and the index of the distinct
+        point of each row, (n,).
+    """
     order = np.lexsort(unit.T)  # equal points side by side
     size = max(64, PIECE // unit.shape[1])
     for start in range(0, len(unit), size):
         rows = order[start : start + size]
         points = unit[rows]
-        fresh = np.append(True, (points[1:] != points[:-1]).any(1))
-        yield rows, points[fresh], np.cumsum(fresh) - 1
+        is_distinct = np.append(True, (points[1:] != points[:-1]).any(1))
+        yield rows, points[is_distinct], np.cumsum(is_distinct) - 1

@@ -93,7 +93,7 @@ def best_of(
 
 
 def fresh_points(rng: np.random.Generator, lower: Array, upper: Array, size: int) -> Array:
-    """Random points of a box, many with coordinates on or near faces, shape (size, d)."""
+    """Random points of a box, shape (size, d), some with coordinates on faces or near them."""
     pool = rng.uniform(lower, upper, (size, len(lower)))
     faces = rng.random(pool.shape) < rng.choice([0.0, 0.3, 0.6], (size, 1))
     nearest = np.where(rng.random(pool.shape) < 0.5, lower, upper)

@@ -7,7 +7,7 @@ at the slope s, to a₁ (piecewise linear load: Clough, Penzien 1993, chapter 7)
 
 and so are its derivatives by σ. Nodes lie anywhere, samples need not be nodes. All responses to a
 record are walked by the one kernel here: at all nodes for each σ, from rest at the first node or at
-each window's beginning, or at a named node for each row of σ. Rounding is bounded beside the values
+each window's beginning, or at a given node for each row of σ. Rounding is bounded beside the values
 (running error analysis: Higham 2002, section 3.3).
 
 A load g(t) sin θ(t), θ = Ω (t − start) + phase, is walked as g at two exponents:
@@ -94,14 +94,14 @@ def walk(history: History, time: Array) -> Walk:
 
 
 def impulses(history: History, time: Array) -> Array:
-    """Bounds of ∫ |f| up to each node, shape (T,)."""
+    """Bounds of ∫₀ᵗ |f| at nodes t, shape (T,)."""
     path = walk(history, time)
     sizes = np.cumsum(np.maximum(np.abs(path.first), np.abs(path.last)) * path.step)
     return np.asarray(sizes[path.interval])
 
 
 def absolute_moments(decay: float, history: History, time: Array) -> Array:
-    """Bounds of ∫ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes for n = 0 … 4, shape (5, T)."""
+    """Bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, shape (5, T); g = `decay`."""
     path = walk(history, time)
     sizes = np.maximum(np.abs(path.first), np.abs(path.last))
     since = path.phases[path.phase] + path.doubt
@@ -159,10 +159,10 @@ def responses_at_nodes(
     return _with_sine(walked, sigma, history, time[:, None])
 
 
-def responses_at_named_nodes(
+def responses_at_given_nodes(
     sigma: Array, history: History, time: Array, node: Rows, derivatives: int
 ) -> tuple[Array, Array]:
-    """ρ with derivatives by σ, shape (1 + derivatives, S, n), for σ (S, n) at node (S,) of `time`.
+    """ρ and derivatives by σ, (1 + derivatives, S, n): σ (S, n), each row at its node of `time`.
 
     Returns:
         The responses, and bounds of the rounding of ρ, shape (S, n).
@@ -176,7 +176,7 @@ def responses_at_named_nodes(
         out = np.empty((1 + derivatives, *sigma.shape), complex)
         error = np.empty(sigma.shape)
         with PARALLEL_LOOP:
-            _walk_to_named(shifted, walk(history, time), (0,) * derivatives, node, out, error)
+            _walk_to_given(shifted, walk(history, time), (0,) * derivatives, node, out, error)
         return out, error
 
     return _with_sine(walked, sigma, history, time[node][:, None])
@@ -239,7 +239,7 @@ def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Ar
 
 
 @njit(cache=True, parallel=True)
-def _walk_to_named(
+def _walk_to_given(
     sigma: Array, walk: Walk, orders: Orders, node: Rows, out: Array, error: Array
 ) -> None:
     """Walks each σ (S, n) to the node of its row and writes `out` (…, S, n) and `error`."""

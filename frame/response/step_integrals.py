@@ -55,7 +55,7 @@ def require_in_range(sigma: Array, step: float, duration: float) -> None:
 
 @njit(cache=True)
 def step_integrals(sigma: complex, h: float, out: Array) -> None:
-    """Writes J_n, n = 0 … 3, to `out`, for σ h in the range of `require_in_range`."""
+    """Write J_n = ∫₀ʰ τⁿ exp(σ τ) dτ, n = 0 … 3, to `out` (4,); see `require_in_range` for σ h."""
     z = sigma * h
     if abs(z) < FROM_RECURRENCE:
         for n in range(4):

@@ -22,7 +22,7 @@ def state_matrix(m: Matrices) -> Jet:
 
 
 DOUBLE = 1e-6
-"""Distance of two eigenvalues, as a share of their size, below which they count as one."""
+"""Relative distance of two eigenvalues below which they count as equal."""
 
 
 class ModalError(FailedError):
@@ -44,13 +44,13 @@ class Modes:
     loads: tuple[Jet, ...]
 
     def map(self, change: Callable[[Jet], Jet]) -> Modes:
-        """All of them changed alike."""
+        """Modes with `change` applied to each jet."""
         loads = tuple(change(load) for load in self.loads)
         return Modes(change(self.eigenvalue), change(self.coefficient), loads)
 
 
 def joined(parts: Sequence[Modes]) -> Modes:
-    """Those of several sets of parameters."""
+    """Modes at the parameter sets of all parts, one part after the other."""
     return Modes(
         concatenate([part.eigenvalue for part in parts], -2),
         concatenate([part.coefficient for part in parts], -3),
@@ -121,7 +121,9 @@ def oscillating(rate: Array) -> Array:
 
 
 def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
-    """Eigenvalues (upper, real, lower, by |λ|), right and left vectors, V = (S, 2n, 2n).
+    """Eigenvalues, V = (S, 2n), right and left eigenvectors, V = (S, 2n, 2n) each, of A.
+
+    Eigenvalues with Im λ > 0 come first, then real ones, then those with Im λ < 0, each by |λ|.
 
     With X(p) = X(p0) Z(p), Z(p0) = I and diag Z = I, second-order perturbation in the eigenbasis
     gives all derivatives.

@@ -25,9 +25,10 @@ that everything is computed in.
 
 
 def degrees(system: LinearSystem, box: Box) -> dict[str, int]:
-    """Degree of M, K, start, observation rows and D in each parameter, to round-off.
+    """Degree in each parameter of M, K, D, initial state and observation rows, to round-off.
 
-    Of a damping ratio of all modes it is the degree of the ratio.
+    Modal damping is no polynomial: a parameter that is a damping ratio has the degree of the
+    ratio itself, 1.
 
     Args:
         system: The structure.
@@ -70,9 +71,11 @@ def _of_storey_frame(system: StoreyFrame, box: Box) -> dict[str, int]:
     degree = dict.fromkeys(box, 1)
     degree |= {name: inverse_cube_degree(*ends) for name, ends in box.items() if name[0] == "l"}
     if accelerations(system):  # forces over masses; forces hold the masses too where weights press
-        own = 1 if system.gravity else 0
+        gravity_degree = 1 if system.gravity else 0
         masses = {name: ends for name, ends in box.items() if name[0] == "m"}
-        degree |= {name: own + inverse_cube_degree(*ends) for name, ends in masses.items()}
+        degree |= {
+            name: gravity_degree + inverse_cube_degree(*ends) for name, ends in masses.items()
+        }
     return degree
 
 
@@ -105,7 +108,7 @@ def _require_dissipation(factor: float, array: Array) -> None:
 
 
 def inverse_cube_degree(lower: float, upper: float) -> int:
-    """Degree at which the series of x⁻³ on a positive interval is round-off, of x⁻¹ too.
+    """Degree from which the Chebyshev series of x⁻³ and of x⁻¹ on [lower, upper] is round-off.
 
     Inside the Bernstein ellipse with semi-axes sum ρ > 1 the function stays below M, and what
     follows after degree N is at most 2 M ρ^−N / (ρ − 1) (Trefethen, Approximation Theory and

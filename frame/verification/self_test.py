@@ -283,10 +283,10 @@ class _Check:
         return f"{self.envelope.alpha[level]:g}"
 
     def _require(self, excess: Array, bound: Array, words: str, stride: int = 1) -> None:
-        """Refuse numbers (…, m) above zero, or that are none, at every `stride`-th time.
+        """Refuse an excess (…, m) over bounds that is positive or NaN, at every `stride`-th time.
 
         Raises:
-            ContradictionError: There is one; the largest is named.
+            ContradictionError: There is one; the message gives the largest.
         """
         if bool((excess <= 0).all()):
             return
@@ -321,7 +321,7 @@ def _within_steps(upper: Array, between: Array) -> Array:
 
 
 def _corners(low: Array, high: Array) -> Iterator[Array]:
-    """Corners of a box; of more than `CORNERS` two opposite ones and some at random."""
+    """Corners (d,) of a box: all, or of more than `CORNERS` two opposite and others at random."""
     if 2.0 ** len(low) <= CORNERS:
         yield from map(np.array, product(*zip(low, high, strict=True)))
         return

@@ -115,12 +115,20 @@ def _from_reference(bounds: Envelope, flow: LagrangianFlow, points: Array) -> Ar
         at = ", ".join(f"{x} = {y:.6g}" for x, y in zip(flow.names, points[worst], strict=True))
         what = f"step: {flow.step:g} s is too coarse where a bound is attained, at {at}: there"
         what += f" {flow.outputs[output]} is off by {off[worst, :, output].max():.3g}"
-        raise StepError(what, _enough(flow, points[worst : worst + 1], truth[worst : worst + 1]))
+        raise StepError(
+            what, _sufficient_step(flow, points[worst : worst + 1], truth[worst : worst + 1])
+        )
     return np.asarray(off.max(0))
 
 
-def _enough(flow: LagrangianFlow, point: Array, truth: Array) -> str:
-    """The step that keeps a trajectory, shape (1, T, m), near the truth, in words."""
+def _sufficient_step(flow: LagrangianFlow, point: Array, truth: Array) -> str:
+    """Cure in words: the largest halved step whose trajectory is within COARSE / 10 of the peaks.
+
+    Args:
+        flow: The trajectories by the refused step.
+        point: Parameters, shape (1, d), in SI units.
+        truth: Reference response there, shape (1, T, m).
+    """
     fine, parts = flow, 1
     while parts < FINEST:
         fine, parts = fine.finer()[0], 2 * parts

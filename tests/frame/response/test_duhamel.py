@@ -9,7 +9,7 @@ import pytest
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.response.duhamel import (
-    responses_at_named_nodes,
+    responses_at_given_nodes,
     responses_at_nodes,
     responses_in_windows,
     walk,
@@ -134,7 +134,7 @@ def test_responses_are_off_by_their_rounding_at_most(case):
         for s in range(3)
     ]
     assert IDLE <= np.max(shares) <= 1
-    named = responses_at_named_nodes(np.tile(sigma, (8, 1)), ground, time, nodes, 2)
+    named = responses_at_given_nodes(np.tile(sigma, (8, 1)), ground, time, nodes, 2)
     assert np.allclose(named[0], value[:, nodes], rtol=1e-13, atol=0)
     assert np.allclose(named[1], error[nodes], rtol=1e-9, atol=0)
 
@@ -178,4 +178,4 @@ def test_exponents_out_of_range_are_refused(sigma):
     with pytest.raises(UnprovedError, match="take a shorter step of the record"):
         responses_at_nodes(np.array([-1 + 2j, sigma]), ground, time, 0)
     with pytest.raises(UnprovedError, match="allowed: 1e"):
-        responses_at_named_nodes(np.array([[sigma]]), ground, time, np.array([2]), 1)
+        responses_at_given_nodes(np.array([[sigma]]), ground, time, np.array([2]), 1)
