@@ -35,7 +35,7 @@ from alphacut.frame.verification.step_error import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.progress_bar import Progress, showing
+from alphacut.fuzzy.progress_bar import Progress, share, showing
 from alphacut.fuzzy.refused import chosen, require
 
 FIRST_STEPS = 3
@@ -116,12 +116,17 @@ def envelope(
     folder = None if store is None else Path(store)
     flow = replace(problem.flow, relative=relative, store=folder, interruptible=interruptible)
     steps = step_error(flow)
+    proof = _proof_beside(problem.method, flow)
     with showing(progress) as tick:
-        bounds = problem.method.run(flow, tick)
-    bounds = _with_proof(with_step_error(bounds, flow, steps), flow, problem.method)
-    bounds = with_node_deviation(bounds, flow)
-    if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
-        bounds = with_motions_tested(bounds, model)
+        bounds = problem.method.run(flow, share(tick, 0.0, 0.5) if proof else tick)
+        bounds = with_step_error(bounds, flow, steps)
+        if proof:
+            bounds = _with_proof(bounds, flow, proof, share(tick, 0.5, 1.0))
+        bounds = with_node_deviation(bounds, flow)
+        if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
+            bounds = with_motions_tested(bounds, model)
+        if tick:
+            tick(1.0)
     return _on_levels(bounds, problem.alpha, problem.rows)
 
 
@@ -202,27 +207,32 @@ def require_envelope(
             problem.method.forecast(exact_flow(problem.flow.flow), problem.flow.boxes)
 
 
-def _with_proof(followed: Envelope, over: UnitFlow, method: Method) -> Envelope:
-    """The envelope of a follower with the proof of the same motion beside it, if it is affordable.
+def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
+    """The proof of the motion that a method follows, if it is affordable."""
+    if not isinstance(method, GraphFollower | ImprovedFollower):
+        return None
+    if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > MAX_INPUTS:
+        return None
+    return Proof(gap=method.tolerance / 4, boxes=1000)
+
+
+def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
+    """The envelope of a follower with a proof of the same motion beside it, if there is one.
 
     Its error is then the largest distance from the proved bounds and from those that the proof
     attains, between which the true ones lie.
     """
-    if not isinstance(method, GraphFollower | ImprovedFollower):
-        return followed
-    if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > MAX_INPUTS:
-        return followed
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
-        proof = Proof(gap=method.tolerance / 4, boxes=1000).run(exact)
+        proved = proof.run(exact, tick)
     except (UnprovedError, ModalError):
         return followed
-    gaps = [np.abs(followed.upper - ends.upper) for ends in (proof.proved, proof.attained)]
-    gaps += [np.abs(followed.lower - ends.lower) for ends in (proof.proved, proof.attained)]
+    gaps = [np.abs(followed.upper - ends.upper) for ends in (proved.proved, proved.attained)]
+    gaps += [np.abs(followed.lower - ends.lower) for ends in (proved.proved, proved.attained)]
     error = np.max(gaps, axis=0)
     largest = float((error / over.scale).max())
-    facts = {**followed.facts, "gap": proof.facts["gap"], "estimated_error": largest}
-    return replace(followed, outer=proof.proved, between=proof.between, error=error, facts=facts)
+    facts = {**followed.facts, "gap": proved.facts["gap"], "estimated_error": largest}
+    return replace(followed, outer=proved.proved, between=proved.between, error=error, facts=facts)
 
 
 def _method(

@@ -9,7 +9,6 @@ more than an explicit tolerance.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -21,6 +20,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
 from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress, share
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Nature
 
@@ -85,7 +85,7 @@ class GraphFollower:
         )
         real("tolerance", self.tolerance, positive=True)
 
-    def run(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Envelope:
+    def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Envelope of all outputs on all levels.
 
         Its error is what the models still promise, and twice what an independent sample finds
@@ -93,8 +93,8 @@ class GraphFollower:
         attained, no more.
         """
         start_time = time.perf_counter()
-        followed = self.follow(flow, progress)
-        missed, count = independent_excess(flow, followed.bounds)
+        followed = self.follow(flow, share(progress, 0.0, 0.8))
+        missed, count = independent_excess(flow, followed.bounds, share(progress, 0.8, 1.0))
         is_parted = needs_parting(followed.storage.steepest, followed.bounds[0])
         error = followed.left.max(-1) + SAFETY * missed[:, None]
         return flow.envelope(
@@ -108,7 +108,7 @@ class GraphFollower:
             facts={"order": self.order, "gain": self.tolerance},
         )
 
-    def follow(self, flow: UnitFlow, progress: Callable[[float], None] | None = None) -> Followed:
+    def follow(self, flow: UnitFlow, progress: Progress | None = None) -> Followed:
         """Follows the graphs on all levels of `flow.boxes`."""
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
@@ -117,23 +117,20 @@ class GraphFollower:
         best, guess, new = (np.full(shape, start) for start in (0, 0, -1))
         out = Followed(np.empty(shape), best, np.zeros(shape), guess, new, storage)
         for done, level in enumerate(reversed(range(levels))):
-            self._sweep(out, level, progress, done / levels)
+            self._sweep(out, level, share(progress, done / levels, (done + 1) / levels))
             # post-processing: the best of all graphs at every node (Fig. 24)
             out.bounds[level], out.best[level] = storage.top, storage.best
         return out
 
-    def _sweep(
-        self, out: Followed, level: int, progress: Callable[[float], None] | None, start: float
-    ) -> None:
+    def _sweep(self, out: Followed, level: int, progress: Progress) -> None:
         storage, box = out.storage, out.storage.flow.boxes.unit(level)
         if not (box[1] > box[0]).any():
             return
-        levels, nodes = out.bounds.shape[:2]
+        nodes = out.bounds.shape[1]
         promise, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
         self._ask(storage, tuple(np.indices(promise.shape).reshape(3, -1)), box, promise, target)
         for node in range(nodes):
-            if progress and node % 100 == 0:
-                progress(start + node / nodes / levels)
+            progress(node / nodes)
             out.guess[level, node] = storage.best[node]
             points = self._new(out, level, node, promise, target)
             if points:

@@ -82,8 +82,8 @@ class ImprovedFollower:
         trajectories part there is none, and the bounds are attained, no more.
         """
         start_time, second_pass = time.perf_counter(), replace(self, seed=self.seed + 1)
-        first = self.pursue(flow, progress=share(progress, 0.0, 0.5))
-        second = second_pass.pursue(flow, progress=share(progress, 0.5, 1.0))
+        first = self.pursue(flow, share(progress, 0.0, 0.4))
+        second = second_pass.pursue(flow, share(progress, 0.4, 0.8))
         better = second.bounds > first.bounds
         bounds = np.where(better, second.bounds, first.bounds)
         where = np.where(better[..., None], second.where, first.where)
@@ -92,7 +92,7 @@ class ImprovedFollower:
         open_ = [np.where(x.left > limit, x.left, 0.0) for x in (first, second)]
         promised = np.maximum(*closed) + np.maximum(*open_)
         gap = around(np.abs(second.bounds - first.bounds).max(-1))
-        missed, count = independent_excess(flow, bounds)
+        missed, count = independent_excess(flow, bounds, share(progress, 0.8, 1.0))
         small = self.tolerance / 2 * flow.scale
         error = SAFETY * (promised.max(-1) + small + gap + missed[:, None])
         parts = needs_parting(
@@ -111,7 +111,7 @@ class ImprovedFollower:
             notes=notes * bool(np.any(open_)),
         )
 
-    def pursue(self, flow: UnitFlow, *, progress: Progress | None = None) -> Pursued:
+    def pursue(self, flow: UnitFlow, progress: Progress) -> Pursued:
         """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
         levels, storage = len(flow.boxes.alpha), Storage(flow)
         d, places = len(flow.boxes.names), storage.top.size // 2
@@ -120,13 +120,13 @@ class ImprovedFollower:
         at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             search = _Level(storage, flow.boxes.unit(level), self.tolerance)
-            limit = self.budget * (done + 1) // levels
+            tick = share(progress, done / levels, (done + 1) / levels)
+            limit, first = self.budget * (done + 1) // levels, len(storage)
             points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // at_once)):
                     search.ask(storage.add(chunk))
-                if progress:
-                    progress(min(1.0, len(storage) / self.budget))
+                    tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
                 points = search.proposals(min(BATCH, limit - len(storage)))
             # post-processing of the level
             out.bounds[level], out.where[level] = storage.top, storage.points[storage.best]

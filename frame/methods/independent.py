@@ -7,6 +7,7 @@ import numpy as np
 from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points, corners
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.progress_bar import Progress
 
 SAMPLES = 64
 """Points of a kind on each level."""
@@ -17,18 +18,20 @@ MAX_RATIO = 8.0
 trajectories part."""
 
 
-def independent_excess(flow: UnitFlow, bounds: Array) -> tuple[Array, int]:
+def independent_excess(flow: UnitFlow, bounds: Array, progress: Progress) -> tuple[Array, int]:
     """How far a sample of each level leaves the bounds (A, T, m, 2), shape (A, m), and its size."""
     missed, count = np.zeros((len(bounds), len(flow.outputs))), 0
     for level in range(len(bounds)):
         lower, upper = flow.boxes.unit(level)
         points = (lower + upper) / 2 + (upper - lower) / 2 * sample(len(lower), level)
         count += len(points)
-        for chunk in np.array_split(points, -(-len(points) // 32)):
+        chunks = np.array_split(points, -(-len(points) // 32))
+        for number, chunk in enumerate(chunks, start=1):
             values = flow.values(chunk)
             above, below = bounds[level, ..., 1], bounds[level, ..., 0]
             off = np.maximum(values.max(0) - above, -values.min(0) - below)
             missed[level] = np.maximum(missed[level], off.max(0))
+            progress((level + number / len(chunks)) / len(bounds))
     return missed, count
 
 

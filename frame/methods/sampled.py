@@ -59,10 +59,11 @@ class Sampled:
             if level + 1 < levels:
                 bounds[level], at[level] = bounds[level + 1], at[level + 1]
             points = self.points(*flow.boxes.unit(level))
-            for chunk in np.array_split(points, -(-len(points) // at_once)):
+            chunks = np.array_split(points, -(-len(points) // at_once))
+            for count, chunk in enumerate(chunks, start=1):
                 take(flow.values(chunk), chunk, bounds[level], at[level])
-            if progress:
-                progress((done + 1) / levels)
+                if progress:
+                    progress((done + count / len(chunks)) / levels)
         return flow.envelope(
             bounds,
             at,

@@ -23,6 +23,7 @@ from __future__ import annotations
 import copy
 import time
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -110,6 +111,8 @@ class Search:
         if not isinstance(flow.flow, LinearFlow):
             raise ModalError("search: the system is not linear; take the Graph Follower")
         model = fit_modes(flow.flow, flow.boxes, tolerance=SMALL * tolerance, scale=flow.scale)
+        fitting, searching = share(progress, 0.0, 0.1), share(progress, 0.1, 1.0)
+        fitting(0.5)
         rough = _rough(model, flow)
         exact = ExactResponse.from_model(model, flow.scale, bent=not rough)
         # what leads: polynomials where they are as good as is asked for, or the exact motions
@@ -121,13 +124,14 @@ class Search:
             scale=flow.scale,
             degree=model.degree - 1,
         )
+        fitting(1.0)
         searches = (
             _IndependentSearch(exact.model if enough else exact, self.seed, 0),
             _IndependentSearch(_leading(second, flow, enough=enough), self.seed, 1),
         )
         levels, solved = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
-            tick = share(progress, done / levels, (done + 1) / levels)
+            tick = share(searching, done / levels, (done + 1) / levels)
             narrower = solved[-1][0] if solved else None
             ends = flow.boxes.unit(level)
             solved.append(self._level(searches, *ends, tolerance, narrower, tick))
@@ -165,20 +169,21 @@ class Search:
     ) -> tuple[Optima, Array]:
         """Optima in a box, and what they may miss, shape (N,)."""
         box = lower, upper, SMALL * tolerance
-        for search in searches:
-            search.start(*box)
-        tick(0.4)
+        for number, search in enumerate(searches):
+            search.start(*box, share(tick, 0.2 * number, 0.2 * (number + 1)))
         first, second = searches
         if not (upper > lower).any():
             return first.optima, np.zeros(len(first.optima.value))
         most = self.passes or (8 if len(lower) <= MANY else 5)
         for count in range(most):
-            for search in searches:
-                search.improve(count)
-            best, difference = _compared(first.response, first.optima, second.optima, box)
+            # half of what is left to each pass: the number of passes is not known
+            done = [1 - 0.6 * 0.5 ** (count + number / 3) for number in range(4)]
+            ticks = [share(tick, *ends) for ends in pairwise(done)]
+            first.improve(count, ticks[0])
+            second.improve(count, ticks[1])
+            best, difference = _compared(first.response, first.optima, second.optima, box, ticks[2])
             if narrower is not None:
                 best.offer(first.response, narrower.point, np.arange(len(best.value)))
-            tick(0.4 + 0.6 * (1 - 0.6 ** (count + 1)))
             if difference.max() <= AGREEMENT * tolerance:
                 break
         outputs = len(first.response.outputs)
@@ -200,7 +205,7 @@ class _IndependentSearch:
         self.response, self.seed, self.number = response, seed, number
         self.narrower: Optima | None = None
 
-    def start(self, lower: Array, upper: Array, small: float) -> None:
+    def start(self, lower: Array, upper: Array, small: float, tick: Progress) -> None:
         """Find optima in a box from a sample of it, and from those of the box before."""
         self.box = lower, upper, small
         unit = None
@@ -208,24 +213,26 @@ class _IndependentSearch:
             rng = np.random.default_rng((self.seed, self.number))
             ends = np.ones(len(lower))
             unit = fresh_points(rng, -ends, ends, SAMPLES)
-        self.optima = first_optima(_polynomials(self.response), *self.box, unit)
+        first_tick = share(tick, 0.0, 0.3)
+        self.optima = first_optima(_polynomials(self.response), *self.box, unit, first_tick)
         rows = np.arange(len(self.optima.value))
         self.grid = rows.reshape(len(self.response.time), -1)  # node by node
         if isinstance(self.response, ExactResponse):
             self.optima.value[:] = -np.inf
             self.optima.offer(self.response, self.optima.point.copy(), rows)
-            refine(self.response, self.optima, rows, *self.box)
+            refine(self.response, self.optima, rows, *self.box, share(tick, 0.3, 0.5))
         if self.narrower is not None:
             self.optima.offer(self.response, self.narrower.point, rows)
         self.narrower = self.optima
         if (upper > lower).any():
-            self._follow(np.ones(len(rows), bool))
+            self._follow(np.ones(len(rows), bool), share(tick, 0.5, 1.0))
 
-    def improve(self, count: int) -> None:
+    def improve(self, count: int, tick: Progress) -> None:
         """Solve some bounds anew from fresh points, and follow what is better.
 
         Args:
             count: Passes so far; each draws twice as many bounds.
+            tick: Takes the share of the pass that is done.
         """
         optima, outputs = self.optima, len(self.response.outputs)
         rng = np.random.default_rng((self.seed, self.number, count, len(optima.value)))
@@ -237,33 +244,41 @@ class _IndependentSearch:
         rivals = [best_of(pool, values, nodes)]
         rivals += [best_of(pool, values, nodes, few, rng) for few in FEW]
         improved = np.zeros(len(optima.value), bool)
-        for rival in rivals:
-            _evaluate(self.response, rival, self.box)
+        for number, rival in enumerate(rivals):
+            _evaluate(self.response, rival, self.box, share(tick, number / 6, (number + 1) / 6))
             better = optima.offer(self.response, rival.point, self.grid[nodes].ravel())
             improved[better] = True
-        self._follow(improved)
+        self._follow(improved, share(tick, 0.5, 1.0))
 
-    def _follow(self, fresh: Mask) -> None:
+    def _follow(self, fresh: Mask, tick: Progress) -> None:
         """Try at every node what is fresh near by, and refine it, until nothing improves."""
-        for _ in range(ROUNDS):
-            better = _exchanged(self.response, self.optima, self.grid, fresh)
+        for done in range(ROUNDS):
+            ends = [(done + half) / ROUNDS for half in (0.0, 0.5, 1.0)]
+            ticks = [share(tick, *pair) for pair in pairwise(ends)]
+            better = _exchanged(self.response, self.optima, self.grid, fresh, ticks[0])
             if not len(better):
                 return
-            refine(self.response, self.optima, better, *self.box)
+            refine(self.response, self.optima, better, *self.box, ticks[1])
             fresh = np.zeros(len(self.optima.value), bool)
             fresh[better] = True
 
 
-def _evaluate(response: Response, optima: Optima, box: tuple[Array, Array, float]) -> None:
+def _evaluate(
+    response: Response, optima: Optima, box: tuple[Array, Array, float], tick: Progress
+) -> None:
     """Take the values of a response at the points of optima, and refine them on it."""
     rows = np.arange(len(optima.value))
     optima.value[:] = -np.inf
     optima.offer(response, optima.point.copy(), rows)
-    refine(response, optima, rows, *box)
+    refine(response, optima, rows, *box, tick)
 
 
 def _compared(
-    response: Response, first: Optima, second: Optima, box: tuple[Array, Array, float]
+    response: Response,
+    first: Optima,
+    second: Optima,
+    box: tuple[Array, Array, float],
+    tick: Progress,
 ) -> tuple[Optima, Array]:
     """The better of two sets of optima, and the differences of their values, shape (N,).
 
@@ -272,9 +287,10 @@ def _compared(
         first: Optima of one search.
         second: Optima of the other one.
         box: Lower and upper ends, and what Newton's method may leave.
+        tick: Takes the share done.
     """
     improved = copy.deepcopy(second)
-    _evaluate(response, improved, box)
+    _evaluate(response, improved, box, tick)
     better = improved.value > first.value
     best = replace(
         first,
@@ -303,13 +319,14 @@ def _polynomials(response: Response) -> ModalModel:
     return response.model if isinstance(response, ExactResponse) else response
 
 
-def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask) -> Rows:
+def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask, tick: Progress) -> Rows:
     """Try at each node the fresh points of nodes near by; problems that improved.
 
     Envelopes consist of segments of graphs (the idea of the Graph Follower).
     """
     better = []
-    for shift in SHIFTS:
+    for done, shift in enumerate(SHIFTS):
+        tick(done / len(SHIFTS))
         count = max(len(grid) - shift, 0)
         for here, there in ((shift, 0), (0, shift)):
             neighbours = grid[there : there + count].ravel()

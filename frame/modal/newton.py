@@ -9,6 +9,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
+from alphacut.fuzzy.progress_bar import Progress, share
 
 SAMPLES = 256
 """Trajectories of the model that the first optima begin at."""
@@ -27,7 +28,12 @@ ITERATIONS = 300
 
 
 def first_optima(
-    model: ModalModel, lower: Array, upper: Array, small: float, unit: Array | None = None
+    model: ModalModel,
+    lower: Array,
+    upper: Array,
+    small: float,
+    unit: Array | None = None,
+    progress: Progress | None = None,
 ) -> Optima:
     """Optima of all nodes, outputs and sides in the box [lower, upper], from a sample of it.
 
@@ -37,34 +43,49 @@ def first_optima(
         upper: Upper ends.
         small: What Newton's method may leave, in units of the outputs.
         unit: The sample in [−1, 1]^d, shape (n, d); the centre and Chebyshev points unless given.
+        progress: Takes the share done.
     """
     if unit is None:
         unit = np.vstack([np.zeros((1, len(lower))), chebyshev_points(len(lower), SAMPLES)])
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit
     optima = best_of(points, trajectories(model, points), np.arange(len(model.time)))
     if (upper > lower).any():
-        refine(model, optima, np.arange(len(optima.value)), lower, upper, small)
+        refine(model, optima, np.arange(len(optima.value)), lower, upper, small, progress)
     return optima
 
 
 def refine(
-    model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
+    model: Response,
+    optima: Optima,
+    which: Array,
+    lower: Array,
+    upper: Array,
+    small: float,
+    progress: Progress | None = None,
 ) -> None:
     """Newton's method in the box on `which`, until none promises more than `small`."""
     size = min(PIECE * 6 // max(lower.size, 6), max(LEAST, -(-len(which) // 2)))
     pieces = np.array_split(which, -(-len(which) // size) or 1)
-    for piece in pieces:
-        _newton(model, optima, piece, lower, upper, small)
+    for done, piece in enumerate(pieces):
+        tick = share(progress, done / len(pieces), (done + 1) / len(pieces))
+        _newton(model, optima, piece, lower, upper, small, tick)
 
 
 def _newton(
-    model: Response, optima: Optima, which: Array, lower: Array, upper: Array, small: float
+    model: Response,
+    optima: Optima,
+    which: Array,
+    lower: Array,
+    upper: Array,
+    small: float,
+    tick: Progress,
 ) -> None:
     """End a problem when its model, not held back by the trust region, promises at most `small`.
 
     What the models last promised is kept in `optima.left`.
     """
-    radius: Array = np.full(len(which), FIRST_RADIUS)
+    size = len(which)
+    radius: Array = np.full(size, FIRST_RADIUS)
     f, g, H = _signed(model, optima, optima.point[which], which)
     bend = np.zeros_like(H)  # what gradients have shown H to lack
     for count in range(ITERATIONS):
@@ -84,6 +105,7 @@ def _newton(
             which, radius, step, promised, g, H, bend = (
                 x[open_] for x in (which, radius, step, promised, g, H, bend)
             )
+        tick(1 - len(which) / max(size, 1))
         if not len(which):
             return
         trial = np.clip(optima.point[which] + step, lower, upper)

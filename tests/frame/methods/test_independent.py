@@ -15,7 +15,7 @@ METHODS = {graph_follower: GraphFollower(), improved_follower: ImprovedFollower(
 @pytest.mark.parametrize("module", METHODS)
 def test_what_an_independent_sample_reaches_beyond_the_bounds_counts_twice(monkeypatch, module):
     monkeypatch.setattr(
-        module, "independent_excess", lambda flow, bounds: (np.full((1, 2), 30.0), 5)
+        module, "independent_excess", lambda flow, bounds, progress: (np.full((1, 2), 30.0), 5)
     )
     inputs, motion = {"l": Interval(0.99, 1.01)}, {"duration": 0.5, "step": 0.05, "alpha": (0,)}
     error = envelope(pendulum(), inputs, method=METHODS[module], **motion).error
@@ -28,9 +28,10 @@ def test_bounds_that_are_too_narrow_are_left_by_as_much():
     ends = flow.values(np.linspace(*flow.boxes.unit(0), 200))
     bounds = np.stack([-ends.min(0), ends.max(0)], axis=-1)[None]
     size = 0.1 * np.ptp(ends, axis=(0, 1))
-    missed, _ = independent_excess(flow, bounds - size[:, None])
+    told: list[float] = []
+    missed, _ = independent_excess(flow, bounds - size[:, None], told.append)
     assert missed[0] == pytest.approx(size, rel=1e-2)
-    assert independent_excess(flow, bounds + size[:, None])[0].max() == 0
+    assert independent_excess(flow, bounds + size[:, None], told.append)[0].max() == 0
 
 
 @pytest.mark.parametrize(("start", "nature"), [(2.9, Nature.ESTIMATED), (3.14, Nature.ATTAINED)])

@@ -179,9 +179,9 @@ def test_two_searches_share_nothing_and_their_difference_counts_four_times(monke
         best, difference = compare(*args)
         return best, difference + 0.01
 
-    def seen(model, lower, upper, small, unit=None):
+    def seen(model, lower, upper, small, unit, tick):
         starts.append((model.degree, unit))
-        return first_optima(model, lower, upper, small, unit)
+        return first_optima(model, lower, upper, small, unit, tick)
 
     def found():
         method = frame.Search(1e-3, passes=1)
@@ -198,6 +198,17 @@ def test_two_searches_share_nothing_and_their_difference_counts_four_times(monke
     assert degree != other
     assert points is None
     assert len(others) > 100
+
+
+@pytest.mark.parametrize("name", ["search", "graph-follower", "improved-graph-follower",
+                                  "quasi-monte-carlo"])  # fmt: skip
+def test_progress_rises_to_one(name):
+    told = []
+    system, inputs = KINDS["matrices"]
+    envelope(system, inputs, method=name, **{**MOTION, "progress": told.append})
+    assert (np.diff(told) >= 0).all()
+    assert len(set(told)) > 10
+    assert told[-1] == 1.0
 
 
 def test_a_pendulum_is_followed_to_its_error():
