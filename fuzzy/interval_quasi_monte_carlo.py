@@ -4,8 +4,8 @@ Each quasi-random probability u becomes, per α, the interval of quantiles that 
 allow; the model is bounded over these intervals and the cuts of the other fuzzy inputs. Averages
 over u bound the mean, the distribution and every quantile of the response.
 
-The points come in eight independent scramblings of Sobol's sequence (Owen, 1995). The averages over
-each of them scatter, which gives the t-interval of their mean.
+The points come in eight independent scramblings of Sobol's sequence (Owen, 1995). The scatter
+of the averages over each of them gives the t-interval of their mean.
 """
 
 from __future__ import annotations
@@ -61,19 +61,19 @@ class RandomInput:
         for level in (grid := sorted({0.0, *alpha, 1.0})):
             corners = product(*(number.cut(level) for number in numbers.values()))
             rows.append([self.quantile(u, **dict(zip(numbers, x, strict=True))) for x in corners])
-        low = np.maximum.accumulate(np.min(rows, axis=1))  # nested to round-off
+        low = np.maximum.accumulate(np.min(rows, axis=1))  # nested despite round-off
         high = np.maximum(np.minimum.accumulate(np.max(rows, axis=1)), low[-1])
         return PiecewiseLinear(tuple(grid), tuple(low), tuple(high))
 
 
 class Estimate(NamedTuple):
-    """Bounds of an average over the random inputs.
+    """Bounds of an average over the random inputs, on each level.
 
     Args:
-        lower: Lower ends, shape (levels, …).
-        upper: Upper ends, same shape.
-        lower_error: Half the width of the 95 % t-interval of the lower ends.
-        upper_error: The same of the upper ends.
+        lower: Lower bounds, shape (levels, …).
+        upper: Upper bounds, same shape.
+        lower_error: Half-width of the 95 % t-interval of each lower bound, same shape.
+        upper_error: Half-width of the 95 % t-interval of each upper bound, same shape.
     """
 
     lower: Array
@@ -99,47 +99,49 @@ class IntervalResponse:
 
     @property
     def nature(self) -> Nature:
-        """The weakest of the points; averages have the error of quasi-Monte Carlo besides."""
+        """The weakest nature at any point; it leaves out the error of quasi-Monte Carlo."""
         return Nature.weakest(bounds.nature for bounds in self.bounds)
 
     def mean(self, output: str = "y") -> Estimate:
         """Bounds of the mean on every level, arrays of shape (levels,)."""
-        return self._estimate(output, lambda ends: np.asarray(ends.mean(axis=0)))
+        return self._estimate(output, lambda bounds: np.asarray(bounds.mean(axis=0)))
 
     def p_box(self, at: ArrayLike, output: str = "y") -> Estimate:
         """Bounds of the distribution function at responses `at` (m,), arrays (levels, m)."""
         responses = np.atleast_1d(np.asarray(at, float))
 
-        def share(ends: Array) -> Array:
-            return np.asarray((ends[..., None] <= responses).mean(axis=0))
+        def cdf(bounds: Array) -> Array:
+            return np.asarray((bounds[..., None] <= responses).mean(axis=0))
 
-        lower, upper, lower_error, upper_error = self._estimate(output, share)
-        return Estimate(upper, lower, upper_error, lower_error)  # large responses are exceeded less
+        lower, upper, lower_error, upper_error = self._estimate(output, cdf)
+        # the distribution function of the upper bounds of the response is the lower one
+        return Estimate(upper, lower, upper_error, lower_error)
 
     def quantile(self, probability: ArrayLike, output: str = "y") -> Estimate:
         """Bounds of quantiles at probabilities (m,), arrays (levels, m)."""
         at = np.atleast_1d(np.asarray(probability, float))
 
-        def quantiles(ends: Array) -> Array:
-            return np.asarray(np.quantile(ends, at, axis=0).T)
+        def quantiles(bounds: Array) -> Array:
+            return np.asarray(np.quantile(bounds, at, axis=0).T)
 
         return self._estimate(output, quantiles)
 
     def _estimate(self, output: str, average: Callable[[Array], Array]) -> Estimate:
-        """Bounds of an average of the ends at every point, with its t-interval.
+        """Bounds of an average over the points, with the half-widths of their t-intervals.
 
         Args:
             output: Name of the output.
-            average: From ends at points, shape (n, levels), to an average, shape (levels, …).
+            average: From lower or upper bounds at n points, shape (n, levels), to their average,
+                shape (levels, …).
         """
         from scipy.stats import t
 
-        ends = np.array([bounds.bounds(output) for bounds in self.bounds])  # (points, 2, levels)
-        parts = np.split(ends, SCRAMBLINGS)
+        bounds = np.array([x.bounds(output) for x in self.bounds])  # (points, 2, levels)
+        by_scrambling = np.split(bounds, SCRAMBLINGS)
         factor = t.ppf((1 + CONFIDENCE) / 2, SCRAMBLINGS - 1) / np.sqrt(SCRAMBLINGS)
-        values = [average(ends[:, side]) for side in (0, 1)]
+        values = [average(bounds[:, side]) for side in (0, 1)]
         errors = [
-            factor * np.std([average(part[:, side]) for part in parts], axis=0, ddof=1)
+            factor * np.std([average(x[:, side]) for x in by_scrambling], axis=0, ddof=1)
             for side in (0, 1)
         ]
         return Estimate(*values, *errors)
@@ -204,14 +206,14 @@ class IntervalQuasiMonteCarlo:
         )
         results = []
         for u in self._probabilities(len(random)):
-            drawn = {
+            quantiles = {
                 name: number.at(p, alpha)
                 for (name, number), p in zip(random.items(), u, strict=True)
             }
             results.append(
                 propagate(
                     function,
-                    {**drawn, **inputs},
+                    {**quantiles, **inputs},
                     self.method,
                     alpha=alpha,
                     knowledge=knowledge,

@@ -1,8 +1,8 @@
-"""Section on forces: their course over time, and their amplitudes by floor."""
+"""Section on forces: their time history, and their amplitudes by floor or degree of freedom."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Self
 
@@ -27,12 +27,13 @@ HISTORY = (
 
 @dataclass(frozen=True)
 class ForceCourse:
-    """Course of a force, and what its amplitudes are.
+    """Time history of a force, and the unit of its amplitudes.
 
     Args:
-        history: The course; None of an impulse.
-        unit: SI unit of amplitudes; empty of a factor.
-        size: Size of an amplitude of 1 in SI: of a file with a unit its largest magnitude.
+        history: The time history; None of an impulse.
+        unit: SI unit of the amplitudes; empty where they are factors.
+        size: SI value of an amplitude of 1: the largest magnitude in a file that has a unit, else
+            1.
     """
 
     history: History | None
@@ -41,7 +42,7 @@ class ForceCourse:
 
 
 def _course(value: object, info: ValidationInfo) -> ForceCourse:
-    """The course of a text such as "harmonic, 1.5 Hz, from 2 s"."""
+    """Parse a time history such as "harmonic, 1.5 Hz, from 2 s"."""
     kind, *words = (word.strip() for word in str(value).split(","))
     static = [word for word in words if word == "static"]
     starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
@@ -65,6 +66,7 @@ def _course(value: object, info: ValidationInfo) -> ForceCourse:
 
 
 def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceCourse:
+    """Time history in a file, scaled to a largest magnitude of 1 where it has a unit."""
     try:
         path = case_file(name, info)
     except RefusedError as error:
@@ -76,7 +78,7 @@ def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> 
 
 
 def _amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
-    """Number in SI, and its SI unit."""
+    """Amplitude in SI, and its SI unit."""
     for unit in ("N", "N*s", ""):
         try:
             return quantity.fuzzy(value, unit), unit
@@ -111,7 +113,7 @@ class ForceSection(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        """Refuses amplitudes of another unit."""
+        """Refuses amplitudes whose unit is not that of the time history."""
         require(bool(self.amplitude), "force.amplitude", value=None, allowed="one floor or more")
         quantity_name, example = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
@@ -122,7 +124,7 @@ class ForceSection(Section):
 
 
 def _scaled(number: FuzzyNumber, factor: float) -> FuzzyNumber:
-    """A number of crisp corners times a positive factor."""
+    """The number times a positive factor: its corners are scaled."""
     corners = (getattr(number, field.name) for field in fields(number))  # type: ignore[arg-type]
     return type(number)(*(factor * corner for corner in corners))
 
@@ -130,7 +132,12 @@ def _scaled(number: FuzzyNumber, factor: float) -> FuzzyNumber:
 def with_forces(
     structure: Structure, sections: Sequence[ForceSection], unknowns: Sequence[str]
 ) -> Structure:
-    """The structure with the forces of a case; `unknowns` are the names of those of matrices.
+    """The structure with the forces of a case.
+
+    Args:
+        structure: Structure without forces.
+        sections: Sections on forces.
+        unknowns: Names of the degrees of freedom of a structure from matrices.
 
     Raises:
         RefusedError: It takes no forces, or has no such floor.
@@ -140,40 +147,44 @@ def with_forces(
     model = structure.linear
     if model is None:
         raise RefusedError("force", "on a pendulum", "beside [frame] or [matrices]")
-    pairs = [
+    forces = [
         (unknown, number, section.history.history)
         for section in sections
         for unknown, number in section.amplitudes.items()
     ]
     if isinstance(model, StoreyFrame):
-        moved: StoreyFrame | MatrixStructure = _on_floors(model, pairs)
-        names = moved.force_names  # type: ignore[union-attr]
+        loaded: StoreyFrame | MatrixStructure = _with_floor_forces(model, forces)
+        names = loaded.force_names  # type: ignore[union-attr]
     else:
-        names = tuple(f"F{number}" for number in range(1, len(pairs) + 1))
-        moved = _on_unknowns(model, pairs, names, unknowns)
-    numbers = {name: number for name, (_, number, _) in zip(names, pairs, strict=True)}
-    return replace(structure, model=moved, numbers={**structure.numbers, **numbers})
+        names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
+        loaded = _with_forces_on_unknowns(model, forces, names, unknowns)
+    numbers = {name: number for name, (_, number, _) in zip(names, forces, strict=True)}
+    return replace(structure, model=loaded, numbers={**structure.numbers, **numbers})
 
 
-Placed = Sequence[tuple[str, FuzzyNumber, History | None]]
+NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
+"""Floor or degree of freedom, amplitude in SI, and time history (None: impulse) of each force."""
 
 
-def _on_floors(model: StoreyFrame, pairs: Placed) -> StoreyFrame:
+def _with_floor_forces(model: StoreyFrame, forces: NodalForces) -> StoreyFrame:
+    """The frame with forces on its floors, at their modal amplitudes."""
     floors = {str(floor): floor for floor in range(1, model.floors + 1)}
-    for unknown, _, _ in pairs:
-        chosen("force.amplitude", unknown, floors)
-    loads = [Force(floors[unknown], number.modal, course) for unknown, number, course in pairs]
+    for floor, _, _ in forces:
+        chosen("force.amplitude", floor, floors)
+    loads = [Force(floors[floor], number.modal, history) for floor, number, history in forces]
     return replace(model, loads=loads)
 
 
-def _on_unknowns(
-    model: MatrixStructure, pairs: Placed, names: Sequence[str], unknowns: Sequence[str]
+def _with_forces_on_unknowns(
+    model: MatrixStructure, forces: NodalForces, names: Sequence[str], unknowns: Sequence[str]
 ) -> MatrixStructure:
-    for unknown, _, _ in pairs:
+    """The structure with forces on its degrees of freedom; `names` are those of the amplitudes."""
+    for unknown, _, _ in forces:
         chosen("force.amplitude", unknown, tuple(unknowns))
-    rows: list[Array] = [
-        np.array([float(x == unknown) for x in unknowns]) for unknown, _, _ in pairs
-    ]
-    loads = [Force(row, name, x[2]) for row, name, x in zip(rows, names, pairs, strict=True)]
-    modal: Mapping[str, float] = {name: x[1].modal for name, x in zip(names, pairs, strict=True)}
+    loads: list[Force] = []
+    modal: dict[str, float] = {}
+    for name, (unknown, number, history) in zip(names, forces, strict=True):
+        direction: Array = np.array([float(x == unknown) for x in unknowns])
+        loads.append(Force(direction, name, history))
+        modal[name] = number.modal
     return replace(model, loads=loads, parameters={**model.parameters, **modal})

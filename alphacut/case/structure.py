@@ -57,17 +57,17 @@ class MaterialDamping:
     """Damping ratio by the loss factor of the cell's material, independent of frequency.
 
     Args:
-        joints: Damping ratio of joints besides.
+        joints: Damping ratio of the joints, which is added.
     """
 
     joints: FuzzyNumber = ZERO
 
     def ratio(self, loss: FuzzyNumber, energy_share: float = 1.0) -> FuzzyNumber:
-        """ζ = sin(½ arctan η) of a mode that oscillates freely, and the joints' besides.
+        """Damping ratio ζ = sin(½ arctan(w η)) of a mode in free oscillation, plus the joints'.
 
         Args:
-            loss: Loss factor of the material's Young's modulus.
-            energy_share: Share of the mode's strain energy in the material; η is that of the loss.
+            loss: Loss factor η of the material's Young's modulus.
+            energy_share: w, the fraction of the mode's strain energy that is in the material.
         """
         if loss.support.width == 0 and self.joints.support.width == 0:
             return Crisp(_ratio_of_loss(loss.modal * energy_share) + self.joints.modal)
@@ -84,11 +84,12 @@ class MaterialDamping:
 
 
 def _ratio_of_loss(loss: float) -> float:
+    """Damping ratio of a freely oscillating mode with a loss factor."""
     return math.sin(math.atan(loss) / 2)
 
 
 def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...]:
-    """A damping ratio, that of the material, or one of each mode."""
+    """Parse a damping ratio, that of the material, or one for each mode."""
     if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
         ratios = map(RATIO.read, value)
         return tuple(ratio for ratio in ratios if isinstance(ratio, FuzzyNumber))
@@ -317,6 +318,7 @@ class Frame(Section):
         return Structure(model, {name: numbers[name] for name in model.parameters}, heights)
 
     def _model(self, modulus: FuzzyNumber | None, ratios: list[float]) -> StoreyFrame:
+        """The frame at modal values, with a Young's modulus in Pa and damping ratios."""
         return StoreyFrame(
             self._modal(self.masses),
             self._modal(self.lengths),
@@ -338,7 +340,7 @@ class Frame(Section):
         return tuple(x.modal for x in self.per_floor(values))
 
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
-        """Numbers but damping ratios by their parameters; some are none of this frame's."""
+        """Fuzzy inputs by parameter without damping ratios; the frame does not take all of them."""
         numbers: dict[str, FuzzyNumber] = {
             "E": modulus or STAND_IN,
             "rayleigh_mass": self.rayleigh_mass,

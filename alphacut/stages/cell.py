@@ -33,17 +33,17 @@ from alphacut.stochastic import gauss_rule
 
 GPA = 1e9
 SHARE = 0.4
-"""Of the tolerance, for the series at each θ and again for its rule in θ."""
+"""Fraction of the tolerance for the series at each θ, and again for the quadrature in θ."""
 SPHERES = 1e-5
-"""Relative error of E of spheres where no tolerance is named: 1e-9 takes seconds near r = 0.97."""
+"""Default tolerance of E of spheres, relative: 1e-9 takes seconds near a reduced radius of 0.97."""
 SLACK = 5e-3
-"""Relative distance of E from the bounds that is allowed: packings meet a fraction to 0.5 %."""
+"""Allowed relative distance of E outside its bounds: packings meet a fraction to 0.5 %."""
 AnyCell = RoundCell | MeshedCell
 AnySample = Cell | MeshedSample
 Solve = Callable[[Sequence[Any]], list[HomogenisedStiffness]]
-"""A model of the cell: one result for each sample; cells share all but their inclusion."""
+"""A model of the cell: a result for each sample; the cells differ in their inclusion alone."""
 AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
-"""Averages of a plane stiffness in words."""
+"""Averages of a plane stiffness by their names in a case, in words."""
 
 
 def averaged(model: Solve, cells: Sequence[AnySample]) -> list[HomogenisedStiffness]:
@@ -54,14 +54,14 @@ def averaged(model: Solve, cells: Sequence[AnySample]) -> list[HomogenisedStiffn
 def solve_cells(
     model: Callable[..., list[HomogenisedStiffness]], cells: Sequence[Cell]
 ) -> list[HomogenisedStiffness]:
-    """One result for each cell; they share all but their inclusion."""
+    """Result of each cell; the cells differ in their inclusion alone."""
     first = cells[0]
-    ring = () if first.interphase is None else (first.interphase,)
-    return model(first.radius, first.matrix, [cell.inclusion for cell in cells], *ring)
+    interphase = () if first.interphase is None else (first.interphase,)
+    return model(first.radius, first.matrix, [cell.inclusion for cell in cells], *interphase)
 
 
 def meaning(cell: AnyCell, modulus: ModulusSection) -> str:
-    """Average that E and ν are of: eq. 16, isotropic or spheres."""
+    """Average of the stiffness that gives E and ν: "eq. 16", "isotropic" or "spheres"."""
     return "spheres" if cell.particles == "spheres" else AVERAGES[modulus.average]
 
 
@@ -88,6 +88,7 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: obj
 def _model(
     cell: AnyCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
 ) -> Solve:
+    """`model_of` without the average of the plane stiffness."""
     if isinstance(cell, MeshedCell):
         from alphacut.rve.prism.model import PrismModel
 
@@ -119,8 +120,8 @@ def _model_of_particle(
 
 def inputs_of(radius: AnyRadius | ThetaSection, cell: AnyCell) -> dict[str, FuzzyNumber]:
     """Inputs of the cell by name, crisp or fuzzy, in SI."""
-    of_map = radius.numbers if isinstance(radius, AnyRadius) else {}
-    return of_map | cell.constants
+    map_inputs = radius.numbers if isinstance(radius, AnyRadius) else {}
+    return map_inputs | cell.constants
 
 
 def cell_at(
@@ -136,11 +137,11 @@ def particle_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell)
     """The cell with one particle at crisp values of the inputs, in SI."""
     matrix = Phase(values["matrix_modulus"], values["matrix_poisson"])
     inclusion = cell.stiffness or Phase(values["inclusion_modulus"], values["inclusion_poisson"])
-    ring = None
+    interphase = None
     if cell.interphase_thickness is not None:
         phase = Phase(values["interphase_modulus"], values["interphase_poisson"])
-        ring = Interphase(values["interphase_thickness"], phase)
-    return Cell(matrix, inclusion, radius.at(values), cell.outline or circle, ring)
+        interphase = Interphase(values["interphase_thickness"], phase)
+    return Cell(matrix, inclusion, radius.at(values), cell.outline or circle, interphase)
 
 
 def modal_cell(radius: AnyRadius, cell: RoundCell) -> Cell:
@@ -158,61 +159,64 @@ def solve(radius: AnyRadius | ThetaSection, cell: AnyCell, model: Solve) -> Homo
 def references(
     radius: AnyRadius | ThetaSection, cell: AnyCell, stated: float | None = None
 ) -> Document:
-    """Fraction of the particles, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E in GPa.
-
-    They are of the modal inputs; the fraction alone of particles that are not isotropic, none of a
-    mesh from a file.
+    """Particle fraction, Hashin–Shtrikman bounds and Mori–Tanaka estimate of E at modal inputs.
 
     Args:
-        radius: Random radius.
+        radius: Random radius, or law of θ of a mesh from a file.
         cell: Phases.
-        stated: Fraction that the case states, of which bounds and estimate are; None: that of the
-            map.
+        stated: Particle fraction for the bounds and the estimate; None: the mean fraction of the
+            radius map.
+
+    Returns:
+        `fraction` (mean of the map), `fraction_of_case` (as stated), `hashin_shtrikman_E_GPa`
+        (lower, upper) and, of round particles, `mori_tanaka_E_GPa`. Only `fraction` of anisotropic
+        phases or with an interphase; empty for a mesh from a file.
     """
     if isinstance(cell, MeshedCell):
         return {}
     modal = modal_cell(cast("AnyRadius", radius), cell)
-    map_of, matrix, inclusion = modal.radius, modal.matrix, modal.inclusion
-    rule, spheres = gauss_rule(map_of.distribution, points=40), cell.particles == "spheres"
-    radii = map_of(rule.nodes)
-    shares = volume_fraction(radii) if spheres else modal.fraction(rule.nodes)
-    share = np.asarray(rule.mean(shares))
+    radius_map, matrix, inclusion = modal.radius, modal.matrix, modal.inclusion
+    rule, spheres = gauss_rule(radius_map.distribution, points=40), cell.particles == "spheres"
+    radii = radius_map(rule.nodes)
+    fractions = volume_fraction(radii) if spheres else modal.fraction(rule.nodes)
+    mean_fraction = float(np.asarray(rule.mean(fractions)))
     if not isinstance(matrix, Phase) or not isinstance(inclusion, Phase) or modal.interphase:
-        return {"fraction": float(share)}
-    beside = {} if stated is None else {"fraction_of_case": stated}
-    fraction, share = float(share), share if stated is None else np.asarray(stated)
+        return {"fraction": mean_fraction}
+    of_case = {} if stated is None else {"fraction_of_case": stated}
+    fraction = np.asarray(mean_fraction if stated is None else stated)
     if spheres:
-        ends = space_bounds.hashin_shtrikman(share, matrix, inclusion).T
-        limits = [_young(*k) / GPA for k in ends]
-        estimate = _young(*space_bounds.mori_tanaka(share, matrix, inclusion))
+        moduli = space_bounds.hashin_shtrikman(fraction, matrix, inclusion).T
+        young_bounds = [_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli]
+        estimate = _young(*space_bounds.mori_tanaka(fraction, matrix, inclusion))
     else:
-        fractions = np.array([1 - share, share])
-        limits = isotropic_bounds(fractions, [matrix.stiffness, inclusion.stiffness])
-        bulk, _, shear = bounds.mori_tanaka(share, matrix, inclusion)
-        estimate = _across(bulk / 2, shear)
-    found = {"fraction": fraction, **beside, "hashin_shtrikman_E_GPa": limits}
-    # the estimate is of round particles
-    return found | ({"mori_tanaka_E_GPa": estimate / GPA} if modal.square or spheres else {})
+        phase_fractions = np.array([1 - fraction, fraction])
+        young_bounds = isotropic_bounds(phase_fractions, [matrix.stiffness, inclusion.stiffness])
+        bulk, _, shear = bounds.mori_tanaka(fraction, matrix, inclusion)
+        estimate = _transverse_young(bulk / 2, shear)
+    numbers = {"fraction": mean_fraction, **of_case, "hashin_shtrikman_E_GPa": young_bounds}
+    return numbers | ({"mori_tanaka_E_GPa": estimate / GPA} if modal.square or spheres else {})
 
 
 def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> list[float]:
-    """Hashin and Shtrikman's bounds of E of an isotropic plane in GPa, from those of K and G.
+    """Lower and upper Hashin–Shtrikman bound of the transverse Young's modulus in GPa.
+
+    They are its values at the lower and at the upper bounds of the plane moduli K and G.
 
     Args:
-        fractions: Of area of the phases, shape (phases,).
-        stiffness: Of the phases in Pa, (3, 3) each.
+        fractions: Area fractions of the phases, shape (phases,).
+        stiffness: Plane stiffness of each phase in Pa, shape (3, 3) each.
     """
-    ends = bounds.hashin_shtrikman_of_phases(fractions, stiffness).T
-    return [_across(*end) / GPA for end in ends]
+    moduli = bounds.hashin_shtrikman_of_phases(fractions, stiffness).T
+    return [_transverse_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli]
 
 
-def _across(bulk: float, shear: float) -> float:
-    """Young's modulus of eq. 16 of an isotropic plane, in Pa."""
+def _transverse_young(bulk: float, shear: float) -> float:
+    """Transverse Young's modulus in Pa of an isotropic plane with moduli K and G in Pa (eq. 16)."""
     return effective_modulus(2 * STRAIN * float(bulk), 2 * STRAIN * float(shear))[0]
 
 
 def _young(bulk: float, shear: float) -> float:
-    """Young's modulus of an isotropic material, in Pa."""
+    """Young's modulus in Pa of an isotropic material with moduli K and G in Pa."""
     return float(hill_average(np.array([bulk, shear, shear]))[0])
 
 
@@ -246,7 +250,7 @@ def document(result: HomogenisedStiffness) -> Document:
 
 
 def fibres(result: HomogenisedStiffness) -> Document:
-    """Constants of fibres with their declared errors, moduli in GPa; none of other particles."""
+    """Constants of fibres with their declared errors, moduli in GPa; empty for other particles."""
     cell = result.cell
     if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square or cell.interphase:
         return {}
@@ -287,14 +291,16 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
     return {"E_GPa": modulus / GPA, "nu": nu, "stress_GPa": {"s11": s11 / GPA, "s12": s12 / GPA}}
 
 
-def require_bounds(ends: tuple[float, float], references: Document, particles: str) -> None:
+def require_bounds(
+    modulus_bounds: tuple[float, float], references: Document, particles: str
+) -> None:
     """Requires E of spheres within the Hashin–Shtrikman bounds of the fraction that a case states.
 
-    A map may hold another fraction, where cells as tight as no cube are cut off, and an average
-    over cells of unlike spheres is no bound either.
+    E may lie outside: the map has another fraction where cells denser than any cube are cut off,
+    and the mean over cells with different spheres need not obey them.
 
     Args:
-        ends: Least and greatest E at the modal inputs, in Pa.
+        modulus_bounds: Lower and upper bound of E at the modal inputs, in Pa.
         references: Bounds and fractions, as function `references` gives them.
         particles: Of the cell.
 
@@ -303,10 +309,12 @@ def require_bounds(ends: tuple[float, float], references: Document, particles: s
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
-    low, high = (GPA * end for end in references["hashin_shtrikman_E_GPa"])
+    low, high = (GPA * bound for bound in references["hashin_shtrikman_E_GPa"])
     fraction = references["fraction_of_case"]
-    if ends[1] < low * (1 - SLACK) or ends[0] > high * (1 + SLACK):
-        value = f"{ends[0] / GPA:.5g} GPa, of a map that holds {references['fraction']:.4g}"
+    if modulus_bounds[1] < low * (1 - SLACK) or modulus_bounds[0] > high * (1 + SLACK):
+        value = (
+            f"{modulus_bounds[0] / GPA:.5g} GPa, of a map that holds {references['fraction']:.4g}"
+        )
         limits = f"Hashin–Shtrikman's {low / GPA:.5g} … {high / GPA:.5g} GPa at {fraction:g}"
         cure = f"set cell.fraction = {fraction:g} in place of [microstructure] or [radius]"
         raise RefusedError("E of spheres", value, limits, cure)

@@ -26,11 +26,11 @@ from alphacut.records.uff import ENDINGS, uff_mode_rows
 def learned(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
 ) -> tuple[Document, Structure]:
-    """The inputs that [identify] learns, in SI, and the structure with them.
+    """Numbers of the inputs identified from measured modes, in SI, and the updated structure.
 
     Args:
-        section: Measured modes, and the inputs.
-        structure: The frame with its priors.
+        section: Measured modes, and the names of the inputs.
+        structure: The frame with its prior inputs.
         alpha: Levels, above 0.
 
     Raises:
@@ -39,20 +39,20 @@ def learned(
     rows, used, prior = require_learnable(section, structure, alpha)
     assert structure.frame is not None
     try:
-        after = identify(structure.frame, prior, used, alpha=alpha)
+        posterior = identify(structure.frame, prior, used, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
     modes = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
-    predicted = [_predicted(rows[mode], after.predictions()) for mode in modes]
-    document = {**_document(after), "held_out": predicted}
+    predicted = [_predicted(rows[mode], posterior.predictions()) for mode in modes]
+    document = {**_document(posterior), "held_out": predicted}
     document["prior"] = {name: list(widest(number)) for name, number in prior.items()}
-    return document, replace(structure, numbers={**structure.numbers, **after.numbers})
+    return document, replace(structure, numbers={**structure.numbers, **posterior.numbers})
 
 
 def require_learnable(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
 ) -> tuple[dict[int, ModeRows], list[MeasuredMode], dict[str, FuzzyNumber]]:
-    """Measurements by mode, those that are learned from, and the inputs before.
+    """Measurements by mode, the measured modes that identify, and the prior inputs.
 
     Raises:
         RefusedError: The file of modes is wrong, or an input cannot be learned.
@@ -82,6 +82,7 @@ def _rows(section: Identify) -> tuple[ModeRows, ...]:
 
 
 def _measured(section: Identify, row: ModeRows) -> MeasuredMode:
+    """Mode as measured; the section's deviations where its file has none."""
     shapes = {floor: [*map(float, values)] for floor, values in row.amplitudes.items()}
     return measured_mode(
         row.mode,
@@ -92,20 +93,22 @@ def _measured(section: Identify, row: ModeRows) -> MeasuredMode:
     )
 
 
-def _document(after: Identified) -> Document:
-    ends = zip(after.names, after.lower.T, after.upper.T, strict=True)
+def _document(posterior: Identified) -> Document:
+    """Posterior inputs as numbers: their α-cuts in SI, each of shape (levels,)."""
+    cuts = zip(posterior.names, posterior.lower.T, posterior.upper.T, strict=True)
     return {
-        "alpha": after.alpha,
-        "inputs": {name: {"lower": low, "upper": high} for name, low, high in ends},
-        "narrowed": dict(after.narrowed),
-        "units": {name: of_storey_frame(name).unit for name in after.names},
-        "empty_from": after.empty,
-        "claim": str(after.claim),
+        "alpha": posterior.alpha,
+        "inputs": {name: {"lower": lower, "upper": upper} for name, lower, upper in cuts},
+        "narrowed": dict(posterior.narrowed),
+        "units": {name: of_storey_frame(name).unit for name in posterior.names},
+        "empty_from": posterior.empty,
+        "claim": str(posterior.claim),
     }
 
 
-def _predicted(row: ModeRows, all_ends: Ends) -> Document:
-    low, high = (float(ends[0, row.mode - 1]) for ends in all_ends)
+def _predicted(row: ModeRows, frequencies: Ends) -> Document:
+    """Measured frequency of a mode, and its predicted bounds on the lowest level, in Hz."""
+    low, high = (float(bounds[0, row.mode - 1]) for bounds in frequencies)
     measured = float(row.frequencies.mean())
     inside = low <= measured <= high
     return {"mode": row.mode, "measured": measured, "predicted": [low, high], "inside": inside}

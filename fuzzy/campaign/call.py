@@ -152,6 +152,7 @@ class Call:
         return [_outcome(output) for output in outputs]
 
     def _outputs(self, points: Array) -> Sequence[Any]:
+        """Output of the function at each point (n, inputs), by its calling convention."""
         if self.vectorised:
             return self._split(points)
         named = [named_point(self.names, point) for point in points]
@@ -174,6 +175,7 @@ def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
 
 
 def _outcome(output: Any) -> Outcome:
+    """Sample of an output; a failure of an exception, or of an output that is no numbers."""
     if isinstance(output, Exception):
         return Failure(f"{type(output).__name__}: {output}")
     try:

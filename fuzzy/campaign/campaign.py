@@ -218,6 +218,7 @@ class _Batch:
         return point_key(self.campaign.call.names, self.points[row])
 
     def _take_stored(self) -> None:
+        """Takes the samples of the points that the store has."""
         campaign = self.campaign
         if campaign.store is None:
             return

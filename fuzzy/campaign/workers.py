@@ -20,16 +20,16 @@ from alphacut.fuzzy.refused import FailedError, real
 
 P = ParamSpec("P")
 T = TypeVar("T")
-Task = tuple[list[int], Array]  # rows of the design, and their points
+Task = tuple[list[int], Array]  # rows of the design and their points, evaluated by one call
 _PARENT_PERIOD = 0.2  # seconds between two checks that the parent process runs
-_BATCH_SECONDS = 0.1  # of work in a batch of quick calls: less, and sending them costs more
+_BATCH_SECONDS = 0.1  # of work in a batch of quick calls: with less, sending it costs more
 _MAX_BATCH = 1024  # calls in a batch
 _GROUP_SIGNALS = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on Windows
 
 
 @contextmanager
 def pool(workers: int) -> Iterator[Executor | None]:
-    """Pool of `workers` processes; None for one, which is this process.
+    """Executor of `workers` processes; None for one worker, which is this process.
 
     Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
     says. Functions go to the processes by value where they cannot be imported.
@@ -46,16 +46,17 @@ def pool(workers: int) -> Iterator[Executor | None]:
         with _processes(int(workers)) as executor:
             try:
                 yield executor
-            except BaseException:  # nobody waits for what they do any more
+            except BaseException:  # no results are awaited any more
                 executor.shutdown(kill_workers=True)  # type: ignore[call-arg]
                 raise
 
 
 def _processes(workers: int) -> Executor:
-    """Pool of processes of this machine that end when this process ends."""
+    """Executor of `workers` processes of this machine, which end when this process ends."""
     from joblib.externals.loky import ProcessPoolExecutor
 
-    # loky's tracker of semaphores begins here and inherits what is blocked: it must outlive this
+    # loky starts its semaphore tracker here. The tracker inherits the mask of blocked signals, so
+    # that a hang-up of the process group does not end it before it has freed the semaphores
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _GROUP_SIGNALS) if _GROUP_SIGNALS else None
     try:
         executor: Executor = ProcessPoolExecutor(
@@ -71,10 +72,7 @@ def _end_with_parent(parent: int) -> None:
     """End this process when its parent has ended: a killed campaign leaves no orphans."""
     from threading import Thread
 
-    for number in (
-        signal.SIGINT,
-        *_GROUP_SIGNALS,
-    ):  # which reach the whole group; the parent decides
+    for number in (signal.SIGINT, *_GROUP_SIGNALS):  # sent to all; the parent decides
         signal.signal(number, signal.SIG_IGN)
 
     def watch() -> None:
@@ -99,14 +97,14 @@ def submitted(
 def completed(
     call: Call, tasks: Iterable[Task], executor: Executor | None
 ) -> Iterator[tuple[list[int], list[Outcome]]]:
-    """Rows and outcomes of the tasks in the order in which they end.
+    """Rows and outcomes of each task, in the order in which tasks end.
 
-    At most two batches for each slot of the executor are submitted at a time.
+    Tasks are sent in batches; at most two batches for each worker are submitted at a time.
 
     Args:
-        call: The function with the way it is called.
-        tasks: Rows and points of each call; taken from the iterable only when there is room.
-        executor: Any `concurrent.futures` executor; None runs here, one after the other.
+        call: The function with its calling convention.
+        tasks: Rows and points of each call, read from the iterable as batches are submitted.
+        executor: Any `concurrent.futures` executor; None: this process, one after another.
 
     Raises:
         FailedError: A worker process died, or the function cannot be sent to one.
@@ -114,24 +112,23 @@ def completed(
     if executor is None:
         yield from ((rows, call(points)) for rows, points in tasks)
         return
-    queue, size, most = iter(tasks), 1, 2 * slots(executor)
-    waiting: dict[Future[tuple[list[list[Outcome]], float]], list[Task]] = {}
+    queue, batch_size, max_pending = iter(tasks), 1, 2 * n_workers(executor)
+    pending: dict[Future[tuple[list[list[Outcome]], float]], list[Task]] = {}
     try:
         while True:
-            while len(waiting) < most and (batch := list(islice(queue, size))):
-                waiting[executor.submit(_run, call, [points for _, points in batch])] = batch
-            if not waiting:
+            while len(pending) < max_pending and (batch := list(islice(queue, batch_size))):
+                pending[executor.submit(_run, call, [points for _, points in batch])] = batch
+            if not pending:
                 return
-            for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                batch = waiting.pop(future)
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                batch = pending.pop(future)
                 outcomes, seconds = _result(future, f" at or near {_sample_words(call, batch)}")
-                size = int(
-                    min(max(_BATCH_SECONDS * len(batch) / max(seconds, 1e-9), 1), _MAX_BATCH)
-                )
+                fitting = _BATCH_SECONDS * len(batch) / max(seconds, 1e-9)
+                batch_size = int(min(max(fitting, 1), _MAX_BATCH))
                 pairs = zip(batch, outcomes, strict=True)
                 yield from ((rows, results) for (rows, _), results in pairs)
     finally:
-        for future in waiting:
+        for future in pending:
             future.cancel()
 
 
@@ -144,17 +141,20 @@ def _sample_words(call: Call, batch: list[Task]) -> str:
 
 
 def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
-    """Outcomes of a batch of calls, and the wall time that they took."""
+    """Outcomes of each call of a batch, and their wall time in s."""
     start = perf_counter()
     return [call(points) for points in batch], perf_counter() - start
 
 
 def _result(future: Future[T], at: str = "") -> T:
-    """Result of a batch; its calls raise nothing themselves.
+    """Result of the future of a batch.
 
     Args:
-        future: The batch.
+        future: The batch, whose calls catch their own exceptions.
         at: Words on the samples that it computes, for the message.
+
+    Raises:
+        FailedError: A worker process died, or the function cannot be sent to one.
     """
     try:
         return future.result()
@@ -167,10 +167,10 @@ def _result(future: Future[T], at: str = "") -> T:
         raise FailedError(what, cure) from error
 
 
-def slots(executor: Executor) -> int:
-    """Calls that an executor runs at once; the number of cores where it does not say."""
+def n_workers(executor: Executor) -> int:
+    """Number of calls that an executor runs concurrently; that of cores if it does not tell."""
     client = getattr(executor, "_client", None)  # dask
     if client is not None and (threads := sum(client.nthreads().values())):
         return int(threads)
-    says = getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0)
-    return int(says or os.cpu_count() or 1)
+    stated = getattr(executor, "_max_workers", 0) or getattr(executor, "num_workers", 0)
+    return int(stated or os.cpu_count() or 1)
