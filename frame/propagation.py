@@ -222,6 +222,7 @@ def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress
     Its error is then the largest distance from the proved bounds and from those that the proof
     attains, between which the true ones lie.
     """
+    assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
     try:
         proved = proof.run(exact, tick)

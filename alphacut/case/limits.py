@@ -76,7 +76,7 @@ def parse_limit(value: object) -> Limit:
         raise RefusedError("", value, allowed, str(error)) from None
     is_signed = side in ("max ", "min ")
     require(number > 0 or is_signed, "", value=value, allowed=allowed)
-    return Limit(f"{side}{name}", -number if side == "min " else number, share, str(value))
+    return Limit(f"{side}{name}", 0.0 - number if side == "min " else number, share, str(value))
 
 
 def _number(text: str, unit: str) -> float:

@@ -170,11 +170,12 @@ def by_output(peaks: Peaks) -> Document:
 
 
 def peaks_of(document: Document, alpha: Sequence[float]) -> Peaks:
-    """Peaks from the document of `by_output`, where what is not finite is None."""
+    """Peaks from the document of `by_output`, where an infinite bound is None."""
 
     def ends(name: str) -> Array:
+        unknown = -np.inf if name in ("lower", "reached", "least_proved") else np.inf
         rows = [peak[name] for peak in document.values()]
-        return np.array([[np.inf if x is None else x for x in row] for row in rows]).T
+        return np.array([[unknown if x is None else x for x in row] for row in rows]).T
 
     return Peaks(
         alpha=np.array(alpha),

@@ -323,8 +323,11 @@ def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing
     possible = tuple(max(x.possibility[k] for x in passings) for k in (0, 1))
     least = max(x.necessity[0] for x in passings)
     surely_kept = all(x.possibility[1] < 1 for x in passings)  # by all motions of the highest cut
-    sizes = {name: max(abs(limit), 1e-300) for name, limit in limits.items()}
-    margin = np.min([x.margin / sizes[name] for name, x in answers.items()], axis=0)
+    shares = [  # of a limit of 0 all is left, or none
+        x.margin / abs(limits[name]) if limits[name] else np.sign(x.margin)
+        for name, x in answers.items()
+    ]
+    margin = np.min(shares, axis=0)
     nature = Nature.weakest(x.nature for x in passings)
     necessary = least, 0.0 if surely_kept else 1.0
     return Passing((possible[0], possible[1]), necessary, margin, passings[0].lowest, nature)

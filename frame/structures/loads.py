@@ -94,7 +94,7 @@ class History:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Bounds of |f| and of |f′| between jumps."""
+        """Bounds of ``|f|`` and of ``|f′|`` between jumps."""
         size = float(np.abs(self.samples).max())
         slope = float(np.abs(np.diff(self.samples)).max()) / self.step
         return size, slope + self.frequency * size

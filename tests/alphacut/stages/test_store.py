@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import FunctionType
 
+import numpy as np
 import pytest
 import xarray
 
@@ -15,7 +16,10 @@ import alphacut
 from alphacut.case.content import Content
 from alphacut.case.load import Case, load
 from alphacut.entry import main
+from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy.refused import FailedError, RefusedError
+from alphacut.fuzzy.result import Nature
+from alphacut.io.files import as_json
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary, require_same_run
 from alphacut.stages import envelope, modulus
@@ -211,3 +215,23 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
         (folder / "summary.json").write_text(text)
         with pytest.raises(RefusedError, match="damaged"):
             read_summary(ResultsFolder.opened(folder))
+
+
+def test_peaks_pass_through_a_document_with_their_infinite_bounds():
+    """An unknown bound never excludes a peak: of "max q1" the least one may be −∞."""
+    row = np.array([[1.0, 2.0]])
+    peaks = Peaks(
+        alpha=np.array([0.0]),
+        outputs=("q1", "max q1"),
+        lower=row,
+        upper=np.array([[3.0, np.inf]]),
+        error=0 * row,
+        reached=np.array([[2.0, -np.inf]]),
+        least_proved=np.array([[0.5, -np.inf]]),
+        least_reached=np.array([[1.5, np.inf]]),
+        natures=(Nature.GUARANTEED, Nature.ATTAINED),
+    )
+    document = json.loads(as_json(envelope.by_output(peaks)))
+    again = envelope.peaks_of(document, [0.0])
+    for name in ("lower", "upper", "error", "reached", "least_proved", "least_reached"):
+        assert getattr(again, name).tolist() == getattr(peaks, name).tolist(), name
