@@ -8,8 +8,8 @@ from alphacut.frame.questions.peaks import verdict_words
 from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.question import limit_words
-from alphacut.report.results import Row, Table
+from alphacut.questions.question import Row, limit_words
+from alphacut.report.results import Table
 
 HEAD = ("at the lowest α", "first", "second", "second over first")
 

@@ -20,10 +20,10 @@ from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import damaged, dataset_of, read_summary, require_same_run
 from alphacut.io.problem import InputProblem
 from alphacut.questions.all import QUESTIONS
+from alphacut.questions.question import Row
 from alphacut.report.results import (
     ANSWERS,
     MEANING,
-    Row,
     Table,
     answers,
     drivers,

@@ -9,8 +9,8 @@ from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, between
 from alphacut.questions.all import QUESTIONS
+from alphacut.questions.question import Row
 
-Row = tuple[str, ...]
 Table = tuple[Row, list[Row]]
 """Titles of the columns, and the rows."""
 MATERIAL = ("material", "most plausible", "range at α = 0", "nature", "± error")

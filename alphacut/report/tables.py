@@ -15,9 +15,9 @@ from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
 from alphacut.io.quantity import MINUS, ends, engineering
 from alphacut.questions.all import QUESTIONS
+from alphacut.questions.question import Row
 from alphacut.report.results import (
     MEANING,
-    Row,
     Table,
     answers,
     drivers,

@@ -27,14 +27,12 @@ class Models:
         rests: Modes that are known by sums: those of a block, and all that are not enclosed.
         added: Bound of what couples the oscillators of blocks, shape (T, m).
         strays: Bound of how far blocks of several stray from straight lines between nodes, (T, m).
-        along: Input whose bisection helps to enclose more modes; None where all wanted are.
     """
 
     single: list[Oscillator]
     rests: list[Rest]
     added: Array
     strays: Array
-    along: int | None
 
     def within(self, low: Array, high: Array) -> Models:
         """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
@@ -75,7 +73,7 @@ class Models:
         rows = structure.start.like(structure.rows) @ centre.basis
         shares = [BlockShares.of(block, rows, excited, used) for block in found.blocks]
         nothing = np.zeros((len(excitation[1]), len(structure.order)))
-        models = cls([], [], nothing, nothing, found.along)
+        models = cls([], [], nothing, nothing)
         for of_block in shares:
             models = models.with_block(structure, of_block, found, excitation, allowed)
         truncated = rest_of_modes(structure, found, shares, (rows, excited), excitation)
