@@ -178,7 +178,12 @@ def _refined(frame: Frame, chance: Chance) -> Frame:
 
 
 def _in_units(frame: Frame, chance: Chance) -> Frame:
-    return replace(frame, powers=tuple(map(int, chance.integers(-12, 13, 3))))
+    """Other units by powers of two, even ones of mass: its square root is then exact, too.
+
+    With odd ones the dual proof rounds otherwise, takes other steps and ends at another bound.
+    """
+    length, time, mass = map(int, chance.integers(-12, 13, 3))
+    return replace(frame, powers=(length, time, 2 * (mass // 2)))
 
 
 RELATIONS = (
