@@ -255,9 +255,9 @@ def _error(
     least = np.where(modal.is_alike[point][:, None, None], 0.0, np.inf)
     cap = least + np.maximum(anywhere[:, :, None], anywhere[:, None])
     diagonal = np.eye(n, dtype=bool)
-    difference_quotient = np.minimum(
-        (e[:, :, None] + e[:, None]) / np.where(gaps > 0, gaps, 1e-300), cap
-    )
+    unlimited = np.full_like(gaps, np.inf)
+    quotient = np.divide(e[:, :, None] + e[:, None], gaps, out=unlimited, where=gaps > 0)
+    difference_quotient = np.minimum(quotient, cap)
     difference_quotient = np.where(diagonal, wave.slope[:, None], difference_quotient)
     couplings = modal.stiffness_error[point] * difference_quotient
     error += np.einsum("sj,sjk,sk->s", r, couplings, c, optimize=True)

@@ -106,7 +106,7 @@ class History:
         return begin + [(self.end, abs(float(self.samples[-1])))] * (not self.is_held)
 
     def values(self, time: Array) -> Array:
-        """F at times, the same shape."""
+        """Values of f at times, the same shape."""
         return self.envelope(np.asarray(time, float)) * self.wave(np.asarray(time, float))
 
     def wave(self, time: Array) -> Array:
@@ -116,7 +116,7 @@ class History:
         return np.asarray(np.sin(self.frequency * (time - self.start) + self.phase))
 
     def envelope(self, time: Array, side: float = 1.0) -> Array:
-        """G at times, after jumps (`side` 1) or before them (−1)."""
+        """Values of g at times, after jumps (`side` 1) or before them (−1)."""
         n, position = len(self.samples), (time - self.start) / self.step
         position = np.where(
             np.abs(position - np.round(position)) < 1e-9, np.round(position), position
