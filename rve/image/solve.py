@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from threading import Event
 
+from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
 from alphacut.rve.image.fields.element import airy_element, displacement_element
@@ -26,6 +27,23 @@ class ImageSolution:
     bounds: StiffnessBounds
     upper: SideSolution
     lower: SideSolution
+
+
+def solve_image(
+    bulk: Array,
+    shear: Array,
+    *,
+    aspect: float = 1.0,
+    solver: ConjugateGradient | None = None,
+    division: int = 1,
+) -> ImageSolution:
+    """Proved bounds of the effective stiffness of the periodic image, as by `solve_between`.
+
+    The plane-strain bulk modulus K + G/3 and the shear modulus of each pixel have the shape (rows,
+    columns) and are in Pa; row 0 is at the bottom, y rises with rows.
+    """
+    images = ModuliImages((bulk, bulk), (shear, shear))
+    return solve_between(images, aspect=aspect, solver=solver, division=division)
 
 
 def solve_between(

@@ -24,16 +24,11 @@ from alphacut.rve.image.fields.side import (
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
 from alphacut.rve.image.phase_energies import phase_energies
-from alphacut.rve.image.phase_images import ModuliImages, moduli_images
-from alphacut.rve.image.solve import solve_between
+from alphacut.rve.image.phase_images import moduli_images
+from alphacut.rve.image.solve import solve_image
 from alphacut.stochastic import HermiteMap
 
 TIGHT = ConjugateGradient(accuracy=1e-11)
-
-
-def solve_image(bulk, shear, **options):
-    """Both bounds of one image, by its moduli K + G/3 and G (rows, columns)."""
-    return solve_between(ModuliImages((bulk, bulk), (shear, shear)), **options)
 
 
 def stiffness(bulk, shear):
