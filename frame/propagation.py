@@ -35,7 +35,7 @@ from alphacut.frame.verification.step_error import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.progress_bar import Progress, share, showing
+from alphacut.fuzzy.progress_bar import Progress, showing, subprogress
 from alphacut.fuzzy.refused import chosen, require
 
 FIRST_STEPS = 3
@@ -118,10 +118,10 @@ def envelope(
     steps = step_error(flow)
     proof = _proof_beside(problem.method, flow)
     with showing(progress) as tick:
-        bounds = problem.method.run(flow, share(tick, 0.0, 0.5) if proof else tick)
+        bounds = problem.method.run(flow, subprogress(tick, 0.0, 0.5) if proof else tick)
         bounds = with_step_error(bounds, flow, steps)
         if proof:
-            bounds = _with_proof(bounds, flow, proof, share(tick, 0.5, 1.0))
+            bounds = _with_proof(bounds, flow, proof, subprogress(tick, 0.5, 1.0))
         bounds = with_node_deviation(bounds, flow)
         if not isinstance(model, LagrangianSystem) and np.isfinite(bounds.proved.upper).all():
             bounds = with_motions_tested(bounds, model)

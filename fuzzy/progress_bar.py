@@ -15,7 +15,7 @@ _WIDTH = 30  # letters of the bar
 _FORETOLD = 0.05  # share of the work from which the time left is told; less foretells nothing
 
 
-def share(progress: Progress | None, first: float, last: float) -> Progress:
+def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
     """Progress of a part of a task: from the share `first` of the task to `last`."""
     if progress is None:
         return lambda done: None

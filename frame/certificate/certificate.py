@@ -15,7 +15,7 @@ from alphacut.frame.modal.ground_response import Direct
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.newton import first_optima
 from alphacut.frame.modal.optima import Optima
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 LOG = logging.getLogger(__name__)
 
@@ -83,7 +83,7 @@ def certify(
         )
     levels, done = len(model.boxes.alpha), list[tuple[Optima, Array, int]]()
     for level in reversed(range(levels)):
-        tick = share(progress, len(done) / levels, (len(done) + 1) / levels)
+        tick = subprogress(progress, len(done) / levels, (len(done) + 1) / levels)
         lower, upper = model.boxes.unit(level)
         optima = first_optima(model, lower, upper, LEFT * slack)
         if done:  # what the level inside attains is attained here too

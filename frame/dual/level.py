@@ -20,7 +20,7 @@ from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.waves import Grid, Oscillators, spanned
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 FINE = 0.07
 """Distance of the points of a mode's table along ω and g, as a share of its decay."""
@@ -182,7 +182,7 @@ class Level:
                     for problem, effort in zip(problems, efforts, strict=True)
                     for nodes in _blocks(problem.left(loose))
                 ]
-                advance = share(tick, *WORK_OF_PASSES[number : number + 2])
+                advance = subprogress(tick, *WORK_OF_PASSES[number : number + 2])
                 for done, job in enumerate(jobs, start=1):
                     job.result()
                     advance(done / len(jobs))

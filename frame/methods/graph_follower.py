@@ -20,7 +20,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
 from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import real, require
 from alphacut.fuzzy.result import Nature
 
@@ -93,8 +93,8 @@ class GraphFollower:
         attained, no more.
         """
         start_time = time.perf_counter()
-        followed = self.follow(flow, share(progress, 0.0, 0.8))
-        missed, count = independent_excess(flow, followed.bounds, share(progress, 0.8, 1.0))
+        followed = self.follow(flow, subprogress(progress, 0.0, 0.8))
+        missed, count = independent_excess(flow, followed.bounds, subprogress(progress, 0.8, 1.0))
         is_parted = needs_parting(followed.storage.steepest, followed.bounds[0])
         error = followed.left.max(-1) + SAFETY * missed[:, None]
         return flow.envelope(
@@ -117,7 +117,7 @@ class GraphFollower:
         best, guess, new = (np.full(shape, start) for start in (0, 0, -1))
         out = Followed(np.empty(shape), best, np.zeros(shape), guess, new, storage)
         for done, level in enumerate(reversed(range(levels))):
-            self._sweep(out, level, share(progress, done / levels, (done + 1) / levels))
+            self._sweep(out, level, subprogress(progress, done / levels, (done + 1) / levels))
             # post-processing: the best of all graphs at every node (Fig. 24)
             out.bounds[level], out.best[level] = storage.top, storage.best
         return out

@@ -22,7 +22,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Places, Storage
 from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
@@ -82,8 +82,8 @@ class ImprovedFollower:
         trajectories part there is none, and the bounds are attained, no more.
         """
         start_time, second_pass = time.perf_counter(), replace(self, seed=self.seed + 1)
-        first = self.pursue(flow, share(progress, 0.0, 0.4))
-        second = second_pass.pursue(flow, share(progress, 0.4, 0.8))
+        first = self.pursue(flow, subprogress(progress, 0.0, 0.4))
+        second = second_pass.pursue(flow, subprogress(progress, 0.4, 0.8))
         better = second.bounds > first.bounds
         bounds = np.where(better, second.bounds, first.bounds)
         where = np.where(better[..., None], second.where, first.where)
@@ -92,7 +92,7 @@ class ImprovedFollower:
         open_ = [np.where(x.left > limit, x.left, 0.0) for x in (first, second)]
         promised = np.maximum(*closed) + np.maximum(*open_)
         gap = around(np.abs(second.bounds - first.bounds).max(-1))
-        missed, count = independent_excess(flow, bounds, share(progress, 0.8, 1.0))
+        missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
         small = self.tolerance / 2 * flow.scale
         error = SAFETY * (promised.max(-1) + small + gap + missed[:, None])
         parts = needs_parting(
@@ -120,7 +120,7 @@ class ImprovedFollower:
         at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             search = _Level(storage, flow.boxes.unit(level), self.tolerance)
-            tick = share(progress, done / levels, (done + 1) / levels)
+            tick = subprogress(progress, done / levels, (done + 1) / levels)
             limit, first = self.budget * (done + 1) // levels, len(storage)
             points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):

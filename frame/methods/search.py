@@ -39,7 +39,7 @@ from alphacut.frame.modal.optima import Optima, Response, best_of, fresh_points,
 from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import real
 from alphacut.fuzzy.result import Nature
 
@@ -111,7 +111,7 @@ class Search:
         if not isinstance(flow.flow, LinearFlow):
             raise ModalError("search: the system is not linear; take the Graph Follower")
         model = fit_modes(flow.flow, flow.boxes, tolerance=SMALL * tolerance, scale=flow.scale)
-        fitting, searching = share(progress, 0.0, 0.1), share(progress, 0.1, 1.0)
+        fitting, searching = subprogress(progress, 0.0, 0.1), subprogress(progress, 0.1, 1.0)
         fitting(0.5)
         rough = _rough(model, flow)
         exact = ExactResponse.from_model(model, flow.scale, bent=not rough)
@@ -131,7 +131,7 @@ class Search:
         )
         levels, solved = len(flow.boxes.alpha), list[tuple[Optima, Array]]()
         for done, level in enumerate(reversed(range(levels))):
-            tick = share(searching, done / levels, (done + 1) / levels)
+            tick = subprogress(searching, done / levels, (done + 1) / levels)
             narrower = solved[-1][0] if solved else None
             ends = flow.boxes.unit(level)
             solved.append(self._level(searches, *ends, tolerance, narrower, tick))
@@ -170,7 +170,7 @@ class Search:
         """Optima in a box, and what they may miss, shape (N,)."""
         box = lower, upper, SMALL * tolerance
         for number, search in enumerate(searches):
-            search.start(*box, share(tick, 0.2 * number, 0.2 * (number + 1)))
+            search.start(*box, subprogress(tick, 0.2 * number, 0.2 * (number + 1)))
         first, second = searches
         if not (upper > lower).any():
             return first.optima, np.zeros(len(first.optima.value))
@@ -178,7 +178,7 @@ class Search:
         for count in range(most):
             # half of what is left to each pass: the number of passes is not known
             done = [1 - 0.6 * 0.5 ** (count + number / 3) for number in range(4)]
-            ticks = [share(tick, *ends) for ends in pairwise(done)]
+            ticks = [subprogress(tick, *ends) for ends in pairwise(done)]
             first.improve(count, ticks[0])
             second.improve(count, ticks[1])
             best, difference = _compared(first.response, first.optima, second.optima, box, ticks[2])
@@ -213,19 +213,19 @@ class _IndependentSearch:
             rng = np.random.default_rng((self.seed, self.number))
             ends = np.ones(len(lower))
             unit = fresh_points(rng, -ends, ends, SAMPLES)
-        first_tick = share(tick, 0.0, 0.3)
+        first_tick = subprogress(tick, 0.0, 0.3)
         self.optima = first_optima(_polynomials(self.response), *self.box, unit, first_tick)
         rows = np.arange(len(self.optima.value))
         self.grid = rows.reshape(len(self.response.time), -1)  # node by node
         if isinstance(self.response, ExactResponse):
             self.optima.value[:] = -np.inf
             self.optima.offer(self.response, self.optima.point.copy(), rows)
-            refine(self.response, self.optima, rows, *self.box, share(tick, 0.3, 0.5))
+            refine(self.response, self.optima, rows, *self.box, subprogress(tick, 0.3, 0.5))
         if self.narrower is not None:
             self.optima.offer(self.response, self.narrower.point, rows)
         self.narrower = self.optima
         if (upper > lower).any():
-            self._follow(np.ones(len(rows), bool), share(tick, 0.5, 1.0))
+            self._follow(np.ones(len(rows), bool), subprogress(tick, 0.5, 1.0))
 
     def improve(self, count: int, tick: Progress) -> None:
         """Solve some bounds anew from fresh points, and follow what is better.
@@ -245,16 +245,18 @@ class _IndependentSearch:
         rivals += [best_of(pool, values, nodes, few, rng) for few in FEW]
         improved = np.zeros(len(optima.value), bool)
         for number, rival in enumerate(rivals):
-            _evaluate(self.response, rival, self.box, share(tick, number / 6, (number + 1) / 6))
+            _evaluate(
+                self.response, rival, self.box, subprogress(tick, number / 6, (number + 1) / 6)
+            )
             better = optima.offer(self.response, rival.point, self.grid[nodes].ravel())
             improved[better] = True
-        self._follow(improved, share(tick, 0.5, 1.0))
+        self._follow(improved, subprogress(tick, 0.5, 1.0))
 
     def _follow(self, fresh: Mask, tick: Progress) -> None:
         """Try at every node what is fresh near by, and refine it, until nothing improves."""
         for done in range(ROUNDS):
             ends = [(done + half) / ROUNDS for half in (0.0, 0.5, 1.0)]
-            ticks = [share(tick, *pair) for pair in pairwise(ends)]
+            ticks = [subprogress(tick, *pair) for pair in pairwise(ends)]
             better = _exchanged(self.response, self.optima, self.grid, fresh, ticks[0])
             if not len(better):
                 return

@@ -9,7 +9,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
-from alphacut.fuzzy.progress_bar import Progress, share
+from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 SAMPLES = 256
 """Trajectories of the model that the first optima begin at."""
@@ -67,7 +67,7 @@ def refine(
     size = min(PIECE * 6 // max(lower.size, 6), max(LEAST, -(-len(which) // 2)))
     pieces = np.array_split(which, -(-len(which) // size) or 1)
     for done, piece in enumerate(pieces):
-        tick = share(progress, done / len(pieces), (done + 1) / len(pieces))
+        tick = subprogress(progress, done / len(pieces), (done + 1) / len(pieces))
         _newton(model, optima, piece, lower, upper, small, tick)
 
 
