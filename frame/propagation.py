@@ -35,6 +35,7 @@ from alphacut.frame.verification.step_error import (
 )
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
+from alphacut.fuzzy.blas import on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, showing, subprogress
 from alphacut.fuzzy.refused import chosen, require
 
@@ -61,6 +62,7 @@ METHODS: dict[str, type[Any]] = {
 """The methods by the words that a case file has for them."""
 
 
+@on_one_blas_thread
 def envelope(
     model: LinearSystem | LagrangianSystem,
     inputs: Mapping[str, FuzzyNumber | float],

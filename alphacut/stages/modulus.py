@@ -22,6 +22,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.blas import on_one_blas_thread
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Bounds, Nature
@@ -100,6 +101,7 @@ class CellTask:
     crisp: Mapping[str, float]
     losses: LossCuts | None = None
 
+    @on_one_blas_thread
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
         """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
         cells = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]

@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from alphacut.frame.verification.self_test import ContradictionError
+from alphacut.fuzzy.blas import on_one_blas_thread
 from alphacut.fuzzy.progress_bar import Progress, showing
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.columns import columns_text
@@ -104,6 +105,11 @@ class Stage:
         """Fingerprint of inputs, source and libraries."""
         return fingerprint(self.inputs, self.packages)
 
+    @on_one_blas_thread
+    def run(self, work: Work) -> StageResult:
+        """The result, computed."""
+        return self.compute(work)
+
 
 @dataclass(frozen=True)
 class StageStore:
@@ -148,7 +154,7 @@ class StageStore:
         stale = [stage for stage in stages if stage.name not in results]
         if executor is None or self.folder is None or len(stale) == 1:
             return results | {stage.name: self._computed(stage) for stage in stale}
-        under_way = {executor.submit(stage.compute, Work()): stage for stage in stale}
+        under_way = {executor.submit(stage.run, Work()): stage for stage in stale}
         with showing(self.shown) as tick:
             for done, future in enumerate(as_completed(under_way), start=1):
                 stage = under_way[future]
@@ -188,14 +194,14 @@ class StageStore:
         LOG.info("stage %s is computed", stage.name)
         if self.folder is None:
             with showing(self.shown) as tick:
-                result = stage.compute(Work(workers=self.workers, tick=tick))
+                result = stage.run(Work(workers=self.workers, tick=tick))
             return replace(result, document=json.loads(as_json(result.document)))
         self.folder.require_free(f"{stage.name}.json")
         self.folder.require_free(f"{stage.name}.nc")
         samples = self._samples(self.folder) if stage.has_samples else None
         with TemporaryDirectory() as scratch, self._parts(self.folder, stage) as parts:
             with showing(self.shown) as tick, self._reported(stage):
-                result = stage.compute(Work(Path(scratch), samples, self.workers, tick, parts))
+                result = stage.run(Work(Path(scratch), samples, self.workers, tick, parts))
             return self._put(stage, result, Path(scratch))
 
     @contextmanager

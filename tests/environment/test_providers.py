@@ -44,6 +44,7 @@ DIRECT = {
     "scipy": "python3-scipy",
     "skimage": "python3-skimage",
     "sympy": "python3-sympy",
+    "threadpoolctl": "python3-threadpoolctl",
     "ufl": "python3-dolfinx",
     "xarray": "python3-xarray",
 }

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from alphacut import frame
-from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
+from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods import search
 from alphacut.fuzzy import Interval, Triangular
@@ -263,3 +264,19 @@ def test_what_has_no_meaning_is_refused(changes, message):
     call = {**MOTION, "inputs": {"E": Interval(24e9, 26e9)}, "model": FRAME, **changes}
     with pytest.raises((RefusedError, FailedError, ValueError), match=message):
         envelope(call.pop("model"), call.pop("inputs"), **call)
+
+
+def test_blas_threads_do_not_change_a_bit():
+    """Fails without one thread: the fit of the modes has products that BLAS shares out."""
+    record = Accelerogram(0.01, np.random.default_rng(1).normal(size=2000).cumsum() * 0.01)
+    springs = {"stiffness": [6e7] * 8, "rayleigh": (0.5, 2.5e-3), "ground": record}
+    building = StoreyFrame(masses=[4e4] * 8, outputs=("q8", "drift1", "base_shear"), **springs)
+    inputs = {"k1": Interval(5.5e7, 6.5e7), "m8": Interval(3.6e4, 4.4e4)}
+    inputs["rayleigh_mass"] = Interval(0.4, 0.6)
+    given = {"duration": 20, "step": 0.1, "alpha": (0,), "progress": False}
+    bounds = []
+    for threads in (1, 3):
+        with threadpool_limits(limits=threads, user_api="blas"):
+            bounds.append(envelope(building, inputs, Proof(), **given))
+    assert (bounds[0].upper == bounds[1].upper).all()
+    assert (bounds[0].lower == bounds[1].lower).all()
