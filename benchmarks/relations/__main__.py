@@ -15,14 +15,14 @@ import numpy as np
 
 from alphacut.fuzzy.refused import FailedError, RefusedError
 from benchmarks.relations import cases, frames, functions, materials
-from benchmarks.relations.relation import Chance, Relation, Subject, checked
+from benchmarks.relations.relation import Chance, Kind
 
-KINDS: dict[str, tuple[type[Subject], tuple[Relation, ...]]] = {
-    "frames": (frames.Frame, frames.RELATIONS),
-    "functions": (functions.Propagation, functions.RELATIONS),
-    "cells": (materials.RoundCell, materials.CELLS),
-    "images": (materials.Image, materials.IMAGES),
-    "packings": (materials.Sections, materials.PACKINGS),
+KINDS: dict[str, Kind] = {
+    "frames": frames.KIND,
+    "functions": functions.KIND,
+    "cells": materials.CELLS,
+    "images": materials.IMAGES,
+    "packings": materials.PACKINGS,
 }
 PAIRS = 3
 """Pairs of relations that are checked of each random problem."""
@@ -32,9 +32,9 @@ def of_random(kind: str, seed: int, count: int) -> Iterator[tuple[str, list[str]
     """Relations of random problems of a kind with the contradictions found."""
     for number in range(count):
         chance = np.random.default_rng([seed, number])
-        subject = KINDS[kind][0].drawn(chance)
+        problem = KINDS[kind].drawn(chance)
         try:
-            for name, lines in checked(subject, KINDS[kind][1], chance, pairs=PAIRS):
+            for name, lines in KINDS[kind].checked(problem, chance, pairs=PAIRS):
                 yield f"{kind} {seed}-{number}, {name}", lines
         except (FailedError, RefusedError) as error:
             print(f"  {kind} {seed}-{number} has no result: {str(error)[:120]}")
@@ -43,25 +43,23 @@ def of_random(kind: str, seed: int, count: int) -> Iterator[tuple[str, list[str]
 def of_cases(names: list[str], chance: Chance, rows: int) -> Iterator[tuple[str, list[str]]]:
     """Ways to run cases with the differences found, and relations with the contradictions."""
     for name in names:
-        path = Path(name)
-        if path.suffix != ".toml":
-            path = cases.ROOT / "cases" / f"{name}.toml"
-        plain = cases.CaseRun(path, cases.QUICK.get(path.stem, ()))
-        for way, lines in cases.ways_checked(plain, cases.pairwise(chance)[:rows], chance):
+        path = Path(name) if name.endswith(".toml") else cases.ROOT / "cases" / f"{name}.toml"
+        case = cases.problem(path)
+        for way, lines in cases.ways_checked(case, cases.pairwise(chance)[:rows], chance):
             yield f"{name} with {way}", lines
-        if cases.load(plain.case, plain.changes).content.envelope is not None:
-            for relation, lines in checked(plain, cases.RELATIONS, chance, pairs=2):
+        if cases.load(path, case["changes"]).content.envelope is not None:
+            for relation, lines in cases.ENVELOPES.checked(case, chance, pairs=2):
                 yield f"{name}, {relation}", lines
 
 
 def options() -> argparse.Namespace:
     """The options of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, prog="python -m benchmarks.relations")
-    every = sorted(path.stem for path in (cases.ROOT / "cases").glob("*.toml"))
+    shipped = sorted(path.stem for path in (cases.ROOT / "cases").glob("*.toml"))
     parser.add_argument("--seed", type=int, help="of everything left to chance; free if left out")
     parser.add_argument("--count", type=int, default=200, help="random problems of a kind")
     parser.add_argument("--kinds", nargs="*", default=[*KINDS], choices=[*KINDS], help="of them")
-    parser.add_argument("--cases", nargs="*", default=every, help="names or files")
+    parser.add_argument("--cases", nargs="*", default=shipped, help="names or files")
     parser.add_argument("--rows", type=int, default=99, help="most ways in which a case is run")
     return parser.parse_args()
 

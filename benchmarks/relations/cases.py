@@ -12,8 +12,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import combinations, product, zip_longest
 from pathlib import Path
 from typing import Any
@@ -23,12 +21,14 @@ import xarray as xr
 from alphacut.case.load import load
 from alphacut.case.motion import EnvelopeSection
 from alphacut.fuzzy.refused import FailedError
-from benchmarks.relations.relation import Chance, Relation
-from benchmarks.relations.stated import Stated
+from benchmarks.relations.relation import Chance, Kind, Problem, Relation
+from benchmarks.relations.stated import of_dataset
 
 ROOT = Path(__file__).parents[2]
 FREE = {"seconds", "command", "versions", "figures"}
 """Keys of a summary that may differ from run to run."""
+Way = Mapping[str, str]
+"""Value of each factor of `WAYS`."""
 WAYS: dict[str, tuple[str, ...]] = {
     "workers": ("1", "2", "5"),
     "start": ("plain", "mpi") if shutil.which("mpirun") else ("plain",),
@@ -49,87 +49,57 @@ QUICK = {
     "paper-literal": ("envelope.alpha=[0, 1]", "envelope.duration=5 ms"),
 }
 """Changes of the shipped cases that make them quick, by name."""
-LANGUAGES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def command(case: Path, changes: tuple[str, ...], out: Path, way: Mapping[str, str]) -> list[str]:
-    """The command that runs a case in a way, its results in a folder."""
+def problem(case: Path) -> Problem:
+    """A case file and the changes of its keys, as of `--set`."""
+    return {"case": case, "changes": QUICK.get(case.stem, ())}
+
+
+def start(case: Problem, out: Path, way: Way = PLAIN) -> subprocess.Popen[str]:
+    """Starts a run of a case in a way, with its results in a folder."""
     python = [sys.executable, *(["-O"] if way["assertions"] == "off" else [])]
     if way["start"] == "mpi":
         python = [*["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "2"], *python]
         python += ["-m", "mpi4py.futures"]
     options = [f"--out={out}", f"--workers={way['workers']}", "--quiet"]
-    options += [f"--set={change}" for change in changes]
+    options += [f"--set={change}" for change in case["changes"]]
     options += ["--no-figures"] if way["figures"] == "no" else []
-    return [*python, "-m", "alphacut", "run", str(case.resolve()), *options]
-
-
-def surroundings(way: Mapping[str, str]) -> dict[str, str]:
-    """Variables of the environment of a way."""
-    threads = dict.fromkeys(LANGUAGES, way["threads"])
     others = {"PYTHONHASHSEED": way["hash seed"], "LC_ALL": way["locale"], "PYTHONPATH": str(ROOT)}
-    return {**os.environ, **threads, **others}
+    return subprocess.Popen(
+        [*python, "-m", "alphacut", "run", str(case["case"].resolve()), *options],
+        cwd=way["folder"],
+        env={**os.environ, **dict.fromkeys(THREADS, way["threads"]), **others},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
 
 
-def killed_after(seconds: float, words: list[str], given: Mapping[str, Any]) -> bool:
-    """Starts a command and kills it with its workers; whether it was still running."""
-    started = subprocess.Popen(words, stderr=subprocess.DEVNULL, **given)
+def was_killed(started: subprocess.Popen[str], seconds: float) -> bool:
+    """Whether a run had not ended after so many seconds; it is killed then with its workers."""
     with suppress(subprocess.TimeoutExpired):
-        started.wait(seconds)
-    was_running = started.poll() is None
+        started.communicate(timeout=seconds)
+        return False
     with suppress(ProcessLookupError):
         os.killpg(started.pid, signal.SIGKILL)
-    started.wait()
-    return was_running
+    started.communicate()
+    return True
 
 
-@dataclass(frozen=True, eq=False)
-class CaseRun:
-    """A case with changes, and the way that it is run.
+def summary_of(started: subprocess.Popen[str], out: Path) -> dict[str, Any]:
+    """The summary of a run, when it has ended.
 
-    Args:
-        case: The case file.
-        changes: Changes of keys, as of `--set`.
-        way: Value of each factor of `WAYS`.
-        moment: Share of the plain run's time after which a killed run is killed.
+    Raises:
+        FailedError: The run ends with an error.
     """
-
-    case: Path
-    changes: tuple[str, ...] = ()
-    way: Mapping[str, str] = field(default_factory=lambda: PLAIN)
-    moment: float = 0.5
-
-    def run(self, out: Path, seconds: float = 10.0) -> dict[str, Any]:
-        """The summary of a run with results in a folder.
-
-        Args:
-            out: The folder.
-            seconds: What the plain run took.
-
-        Raises:
-            FailedError: The run ends with an error.
-        """
-        words = command(self.case, self.changes, out, self.way)
-        given: dict[str, Any] = {"cwd": self.way["folder"], "env": surroundings(self.way)}
-        given["start_new_session"] = True
-        if self.way["killed"] == "yes":
-            killed_after(self.moment * seconds, words, given)
-        done = subprocess.run(words, capture_output=True, text=True, check=False, **given)
-        if done.returncode:
-            raise FailedError(f"exit status {done.returncode}: {done.stderr.strip()[-300:]}")
-        summary: dict[str, Any] = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-        return summary
-
-    def stated(self) -> Stated:
-        """Statements of all envelopes; outputs are named with their study."""
-        with tempfile.TemporaryDirectory() as folder:
-            self.run(Path(folder))
-            parts = []
-            for path in sorted(Path(folder).glob("envelope_*.nc")):
-                data = Stated.of_dataset(xr.load_dataset(path)).data
-                names = [f"{path.stem.partition('_')[2]} {name}" for name in data.output.values]
-                parts.append(data.assign_coords(output=names))
-        return Stated(xr.concat(parts, "output", join="outer"))
+    said = started.communicate()[1]
+    if started.returncode:
+        raise FailedError(f"exit status {started.returncode}: {said.strip()[-300:]}")
+    summary: dict[str, Any] = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    return summary
 
 
 def numbers(value: Any, path: str = "") -> list[str]:
@@ -158,11 +128,10 @@ def pairwise(chance: Chance, ways: Mapping[str, tuple[str, ...]] = WAYS) -> list
     }
     rows = []
     while missing:
-        drawn = [{key: str(chance.choice(values)) for key, values in ways.items()}]
-        for _ in range(30):
-            (a, x), (b, y) = min(missing)
-            more = {key: str(chance.choice(values)) for key, values in ways.items()}
-            drawn.append(more | {a: x, b: y})
+        drawn = [
+            {key: str(chance.choice(values)) for key, values in ways.items()} | dict(min(missing))
+            for _ in range(30)
+        ]
         best = max(drawn, key=lambda row: len(missing & set(combinations(row.items(), 2))))
         missing -= set(combinations(best.items(), 2))
         rows.append(best)
@@ -170,38 +139,57 @@ def pairwise(chance: Chance, ways: Mapping[str, tuple[str, ...]] = WAYS) -> list
 
 
 def ways_checked(
-    plain: CaseRun, rows: list[dict[str, str]], chance: Chance
+    case: Problem, rows: list[dict[str, str]], chance: Chance
 ) -> Iterator[tuple[str, list[str]]]:
     """Ways in words with the differences of their summaries from the plain run's."""
     with tempfile.TemporaryDirectory() as folder:
-        begun = time.monotonic()
-        expected = numbers(plain.run(Path(folder, "plain")))
+        begun, out = time.monotonic(), Path(folder, "plain")
+        expected = numbers(summary_of(start(case, out), out))
         seconds = time.monotonic() - begun
         for number, row in enumerate(rows):
-            other = replace(plain, way=row, moment=float(chance.uniform(0.1, 0.9)))
+            out = Path(folder, str(number))
+            if row["killed"] == "yes":
+                was_killed(start(case, out, row), float(chance.uniform(0.1, 0.9)) * seconds)
             name = ", ".join(f"{key} {x}" for key, x in row.items() if x != PLAIN[key])
             try:
-                found = numbers(other.run(Path(folder, str(number)), seconds))
+                found = numbers(summary_of(start(case, out, row), out))
                 yield name, differences(expected, found)
             except FailedError as error:
                 yield name, [str(error)]
 
 
-def _changed(
-    key: str, value: Callable[[EnvelopeSection], str], case: CaseRun, _: Chance
-) -> CaseRun:
+def stated(case: Problem) -> xr.Dataset:
+    """Statement of all envelopes; outputs are named with their study."""
+    with tempfile.TemporaryDirectory() as folder:
+        summary_of(start(case, Path(folder)), Path(folder))
+        parts = []
+        for path in sorted(Path(folder).glob("envelope_*.nc")):
+            data = of_dataset(xr.load_dataset(path))
+            names = [f"{path.stem.partition('_')[2]} {name}" for name in data.output.values]
+            parts.append(data.assign_coords(output=names))
+    return xr.concat(parts, "output", join="outer")
+
+
+def of_envelope(name: str, key: str, value: Callable[[EnvelopeSection], str]) -> Relation:
     """The case with one key of [envelope] changed."""
-    section = load(case.case, case.changes).content.envelope
-    assert section is not None
-    others = [change for change in case.changes if not change.startswith(f"envelope.{key}=")]
-    return replace(case, changes=(*others, f"envelope.{key}={value(section)}"))
+
+    def changed(case: Problem, chance: Chance) -> Problem:
+        section = load(case["case"], case["changes"]).content.envelope
+        assert section is not None
+        others = [x for x in case["changes"] if not x.startswith(f"envelope.{key}=")]
+        return {"changes": (*others, f"envelope.{key}={value(section)}")}
+
+    return Relation(name, changed)
 
 
-CHANGES: dict[str, tuple[str, Callable[[EnvelopeSection], str]]] = {
-    "inputs in another order": ("fuzzy", lambda x: json.dumps([*x.fuzzy][::-1])),
-    "one level": ("alpha", lambda x: f"[{x.alpha[0]}]"),
-    "half the duration": ("duration", lambda x: f"{x.duration / 2} s"),
-    "half the step": ("step", lambda x: f"{x.step / 2} s"),
-}
-RELATIONS = tuple(Relation(name, partial(_changed, *change)) for name, change in CHANGES.items())
-"""Relations of envelopes of cases."""
+ENVELOPES = Kind(
+    problem,  # type: ignore[arg-type]
+    stated,
+    (
+        of_envelope("inputs in another order", "fuzzy", lambda x: json.dumps([*x.fuzzy][::-1])),
+        of_envelope("one level", "alpha", lambda x: f"[{x.alpha[0]}]"),
+        of_envelope("half the duration", "duration", lambda x: f"{x.duration / 2} s"),
+        of_envelope("half the step", "step", lambda x: f"{x.step / 2} s"),
+    ),
+)
+"""Envelopes of cases, which are not drawn but named."""

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Protocol, Self
+from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from benchmarks.relations.stated import Stated, contradictions
+from benchmarks.relations.stated import contradictions
 
 ROUNDED = 1e-6
 """Share of an output's size by which numbers may differ that are the same but for rounding."""
 Chance = np.random.Generator
-
-
-class Subject(Protocol):
-    """A problem that gives its results in one frame of reference, however it is said."""
-
-    @classmethod
-    def drawn(cls, chance: Chance) -> Self:
-        """A random problem."""
-
-    def stated(self) -> Stated:
-        """What its result states."""
+Problem = dict[str, Any]
+"""Numbers of a problem by name, however it is said."""
 
 
 @dataclass(frozen=True)
@@ -33,49 +25,66 @@ class Relation:
 
     Args:
         name: In words.
-        said: The problem said otherwise; None where it does not apply.
+        changed: Numbers of the problem that are said otherwise; None where it does not apply.
         within: Share of an output's size within which every number stays; None where it need not.
     """
 
     name: str
-    said: Callable[[Any, Chance], Any]
+    changed: Callable[[Problem, Chance], Problem | None]
     within: float | None = None
 
 
-def shuffled(subject: Any, chance: Chance) -> Any:
-    """The problem with its fuzzy inputs in another order."""
-    order = map(str, chance.permutation([*subject.fuzzy]))
-    return replace(subject, fuzzy={name: subject.fuzzy[name] for name in order})
+SHUFFLED = Relation(
+    "inputs in another order",
+    lambda x, chance: {"fuzzy": {str(k): x["fuzzy"][k] for k in chance.permutation([*x["fuzzy"]])}},
+)
+ONE_LEVEL = Relation("one level", lambda x, chance: {"alpha": (float(chance.choice(x["alpha"])),)})
+ONE_OUTPUT = Relation("one output", lambda x, chance: {"outputs": x["outputs"][:1]})
 
 
-def one_level(subject: Any, chance: Chance) -> Any:
-    """The problem on one of its levels."""
-    return replace(subject, alpha=(float(chance.choice(subject.alpha)),))
+@dataclass(frozen=True)
+class Kind:
+    """Problems of a kind: how one is drawn at random, what its result states, its relations."""
 
+    drawn: Callable[[Chance], Problem]
+    stated: Callable[[Problem], xr.Dataset]
+    relations: Sequence[Relation]
 
-def checked(
-    subject: Subject, relations: Sequence[Relation], chance: Chance, *, pairs: int = 0
-) -> Iterator[tuple[str, list[str]]]:
-    """Names of the relations that apply with the contradictions found, a failure among them.
+    def checked(
+        self,
+        problem: Problem,
+        chance: Chance,
+        relations: Sequence[Relation] = (),
+        pairs: int = 0,
+    ) -> Iterator[tuple[str, list[str]]]:
+        """Names of the relations that apply with the contradictions found, a failure among them.
 
-    Args:
-        subject: The problem.
-        relations: Ways to say it otherwise, checked one at a time.
-        chance: Source of chance.
-        pairs: Number of pairs of relations that are checked as well, drawn at random.
-    """
-    plain, both = subject.stated(), list(combinations(relations, 2))
-    drawn = chance.permutation(len(both))[:pairs]
-    for row in [*((x,) for x in relations), *(both[k] for k in drawn)]:
-        said: Any = subject
+        Args:
+            problem: The problem.
+            chance: Source of chance.
+            relations: Those that are checked, one at a time; all, if none is given.
+            pairs: Number of pairs of relations that are checked as well, drawn at random.
+        """
+        plain, single = self.stated(problem), relations or self.relations
+        both = list(combinations(single, 2))
+        rows = [*((x,) for x in single), *(both[k] for k in chance.permutation(len(both))[:pairs])]
+        for row in rows:
+            said = self._said(problem, row, chance)
+            if said is None:
+                continue
+            shares = [relation.within for relation in row]
+            within = None if None in shares else max(share or 0.0 for share in shares)
+            try:
+                lines = contradictions(plain, self.stated(said), within=within)
+            except Exception as error:
+                lines = [f"{type(error).__name__}: {error}"]
+            yield " and ".join(relation.name for relation in row), lines
+
+    def _said(self, problem: Problem, row: Sequence[Relation], chance: Chance) -> Problem | None:
+        """The problem said otherwise by all relations of a row; None where one does not apply."""
         for relation in row:
-            said = said and relation.said(said, chance)
-        if said is None:
-            continue
-        shares = [relation.within for relation in row]
-        within = None if None in shares else max(share or 0.0 for share in shares)
-        try:
-            lines = contradictions(plain, said.stated(), within=within)
-        except Exception as error:
-            lines = [f"{type(error).__name__}: {error}"]
-        yield " and ".join(relation.name for relation in row), lines
+            changes = relation.changed(problem, chance)
+            if changes is None:
+                return None
+            problem = problem | changes
+        return problem

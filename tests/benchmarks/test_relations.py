@@ -3,7 +3,7 @@
 import os
 import random
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +13,7 @@ import xarray as xr
 from alphacut.fuzzy import Interval, Knowledge, Signed, propagate
 from benchmarks.relations import cases, frames, functions
 from benchmarks.relations.__main__ import KINDS
-from benchmarks.relations.relation import checked
-from benchmarks.relations.stated import Stated, contradictions
+from benchmarks.relations.stated import contradictions, of_dataset, of_values
 
 CASE = """title = "Packings and a frame"
 stages = ["microstructure", "modulus", "envelope"]
@@ -66,18 +65,22 @@ OTHERWISE = {
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_random_problem_said_otherwise_gives_no_contradiction(kind):
-    chance = np.random.default_rng(60)
-    relations = [x for x in KINDS[kind][1] if "processes" not in x.name]
-    drawn = [relations[k] for k in chance.permutation(len(relations))[:3]]
-    found = dict(checked(KINDS[kind][0].drawn(chance), drawn, chance))
+    chance, of = np.random.default_rng(60), KINDS[kind]
+    relations = [x for x in of.relations if "processes" not in x.name]
+    chosen = [relations[k] for k in chance.permutation(len(relations))[:3]]
+    found = dict(of.checked(of.drawn(chance), chance, chosen))
     assert not {name: lines for name, lines in found.items() if lines}
+
+
+def small_case(folder):
+    (folder / "small.toml").write_text(CASE, encoding="utf-8")
+    return cases.problem(folder / "small.toml")
 
 
 @pytest.mark.slow
 def test_a_case_has_one_set_of_numbers_however_it_is_run(tmp_path):
-    case = tmp_path / "small.toml"
-    case.write_text(CASE, encoding="utf-8")
-    (found,) = cases.ways_checked(cases.CaseRun(case), [OTHERWISE], np.random.default_rng(1))
+    rng = np.random.default_rng(1)
+    (found,) = cases.ways_checked(small_case(tmp_path), [OTHERWISE], rng)
     assert found[1] == [], found
 
 
@@ -90,20 +93,16 @@ def arrays_of(folder):
 def test_runs_killed_at_random_times_are_taken_up_to_the_bit(tmp_path):
     seed = int(os.environ.get("SEED", random.randrange(10**9)))
     print("seed", seed)
-    draw, case = random.Random(seed), tmp_path / "small.toml"
-    case.write_text(CASE, encoding="utf-8")
-    way = cases.PLAIN | {"figures": "yes"}
-    begun = time.monotonic()
-    summary = cases.CaseRun(case, way=way).run(tmp_path / "plain")
-    seconds, plain, kills = time.monotonic() - begun, arrays_of(tmp_path / "plain"), 0
+    draw, case, plain_out = random.Random(seed), small_case(tmp_path), tmp_path / "plain"
+    way, begun = cases.PLAIN | {"figures": "yes"}, time.monotonic()
+    summary = cases.summary_of(cases.start(case, plain_out, way), plain_out)
+    seconds, plain, kills = time.monotonic() - begun, arrays_of(plain_out), 0
     for trial in range(20):
-        out, workers = tmp_path / str(trial), draw.choice(["1", "2"])
-        other = cases.CaseRun(case, way=way | {"workers": workers})
-        words = cases.command(case, (), out, other.way)
-        given = {"env": cases.surroundings(other.way), "start_new_session": True}
+        out, otherwise = tmp_path / str(trial), way | {"workers": draw.choice(["1", "2"])}
         for _ in range(draw.randint(1, 3)):
-            kills += cases.killed_after(draw.uniform(0.1, 1.0) * seconds, words, given)
-        found = other.run(out)
+            started = cases.start(case, out, otherwise)
+            kills += cases.was_killed(started, draw.uniform(0.1, 1.0) * seconds)
+        found = cases.summary_of(cases.start(case, out, otherwise), out)
         assert not cases.differences(*map(cases.numbers, (summary, found))), trial
         assert [*arrays_of(out)] == [*plain]
         assert all(data.equals(plain[name]) for name, data in arrays_of(out).items()), trial
@@ -129,17 +128,17 @@ def test_summaries_differ_by_a_bit_or_an_order_but_not_by_times():
 
 
 def ends(low, high, inner):
-    """Statements of guaranteed bounds that are attained up to a share."""
+    """Statement of guaranteed bounds that are attained up to a share."""
     inputs = {"x": Interval(low, high)}
     made = propagate(lambda x: x, inputs, Signed(), knowledge=Knowledge({"x": 1}), progress=False)
-    return Stated.of_bounds(made).data.assign(attained=lambda x: inner * x.bound)
+    return of_dataset(made.to_dataset()).assign(attained=lambda x: inner * x.bound)
 
 
 def test_what_leaves_a_guarantee_or_both_errors_is_seen():
-    wide, narrow = (Stated(ends(-x, x, 0.95)) for x in (1.0, 0.9))
+    wide, narrow = (ends(-x, x, 0.95) for x in (1.0, 0.9))
     assert not contradictions(wide, wide)
     assert "attained leaves what is proved: y by 0.05" in contradictions(wide, narrow)[0]
-    one, near, far = (Stated.of_values({"E": (x, 0.1)}) for x in (1.0, 1.19, 1.21))
+    one, near, far = (of_values({"E": (x, 0.1)}) for x in (1.0, 1.19, 1.21))
     assert not contradictions(one, near)
     assert contradictions(one, far)
     assert contradictions(one, near, within=1e-6)
@@ -155,19 +154,19 @@ class ByPosition(functions.Waves):
 
 
 def test_an_order_of_inputs_that_matters_is_seen():
-    inputs = {"x1": (0.0, 0.1, 0.2), "x2": (0.5, 0.6, 1.0)}
-    waves = ByPosition(np.array([[1.0, 0.3]]), np.zeros(1), dict.fromkeys(inputs, 1.0))
-    subject = functions.Propagation(waves, inputs, "automatic")
-    other = replace(subject, fuzzy=dict(reversed(inputs.items())))
-    assert contradictions(subject.stated(), other.stated())
+    fuzzy = {"x1": (0.0, 0.1, 0.2), "x2": (0.5, 0.6, 1.0)}
+    waves = ByPosition(np.array([[1.0, 0.3]]), np.zeros(1), dict.fromkeys(fuzzy, 1.0))
+    plain = functions.problem(waves, fuzzy, "automatic")
+    other = plain | {"fuzzy": dict(reversed(fuzzy.items()))}
+    assert contradictions(functions.stated(plain), functions.stated(other))
 
 
 def test_a_tolerance_in_metres_is_seen():
-    frame = frames.Frame(
-        *(np.array([1e7]), np.array([1e4]), (0.5, 1e-3), {"k1": 0.1}, ("q1",)),
-        *(np.sin(np.arange(30.0)), 0.02, 20, 0.04),
-        tolerance=1e-4,
-        relative=False,
-    )
-    smaller = replace(frame, powers=(8, 0, 0))
-    assert contradictions(frame.stated(), smaller.stated(), within=1e-6)
+    frame = frames.PLAIN | {
+        **{"stiffness": np.array([1e7]), "masses": np.array([1e4]), "damping": (0.5, 1e-3)},
+        **{"fuzzy": {"k1": 0.1}, "outputs": ("q1",), "record": np.sin(np.arange(30.0))},
+        **{"sampling": 0.02, "nodes": 20, "step": 0.04, "method": "proof"},
+        **{"tolerance": 1e-4, "relative": False},
+    }
+    smaller = frames.stated(frame | {"powers": (8, 0, 0)})
+    assert contradictions(frames.stated(frame), smaller, within=1e-6)
