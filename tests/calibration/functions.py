@@ -126,7 +126,7 @@ def rising(rng, n):
 
 FAMILIES = [smooth, hills, jump, kink]
 SINGLE = [rising, one_humped]
-SEVERAL = [sines, rastrigin, schwefel, resonance, kink, spike, jump]
+SEVERAL = [smooth, hills, sines, rastrigin, schwefel, resonance, kink, spike, jump]
 
 
 def monotone(rng, n):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy import (
-    Automatic,
     Knowledge,
     Nature,
     Reduced,
@@ -20,9 +19,6 @@ from tests.calibration import functions
 from tests.calibration.declared import Calibration, free_seed
 
 ALPHA = (0.0, 0.5)
-PLANS = {
-    "automatic": (Automatic(), 100),
-}
 
 
 def bounded(function, inputs, plan, **options):
@@ -30,36 +26,6 @@ def bounded(function, inputs, plan, **options):
     return propagate(
         named, inputs, plan, alpha=ALPHA, vectorised=True, budget=10**6, progress=False, **options
     )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PLANS)
-def test_errors_cover_or_bounds_are_called_attained(name):
-    """Functions of one to three inputs, smooth ones and ones with hills, kinks and jumps."""
-    plan, count = PLANS[name]
-    seed, estimated = free_seed(name), dict.fromkeys(functions.FAMILIES, 0)
-    table = Calibration(f"functions by {name}: declared over true", seed)
-    for number in range(count):
-        for kind, family in enumerate(functions.FAMILIES):
-            rng = np.random.default_rng([seed, number, kind])
-            function, inputs = family(rng, n := int(rng.integers(1, 4))), functions.numbers(rng, n)
-            result = bounded(function, inputs, plan)
-            if result.nature is not Nature.ESTIMATED:
-                continue
-            estimated[family] += 1
-            for level, alpha in enumerate(ALPHA):
-                low, high = functions.true_ends(function, inputs, alpha)
-                lacks = np.array([result.lower[level, 0] - low, high - result.upper[level, 0]])
-                table.estimated(
-                    family.__name__,
-                    result.error[level, 0],
-                    np.maximum(lacks, 0),
-                    size=max(abs(low), abs(high), high - low),
-                    least=1e-3 * (high - low),
-                    case=(number, alpha),
-                )
-    print({family.__name__: f"{k} of {count} estimated" for family, k in estimated.items()})
-    table.judge()
 
 
 def wide(rng, n):

@@ -4,7 +4,7 @@ import argparse
 import ast
 import os
 
-from tests.environment import house, words
+from tests.environment import house
 
 ANY = 18  # public functions with Any, for FEniCSx, Gmsh and keywords of Matplotlib
 TREES = {file: ast.parse(file.read_text(encoding="utf-8")) for file in house.package_files()}
@@ -34,15 +34,9 @@ def test_no_public_signature_has_any():
 
 
 def test_what_the_counts_look_for_would_be_seen():
-    tree = ast.parse("def f(x: dict[str, Any]) -> int:\n    'What f is.'\n    found = x\n")
-    assert signatures_with_any(tree) == ["f"]
-    assert words.vague_names(tree) == ["found"]
-    assert words.odd_docstrings(tree) == ["What f is."]
-    assert (
-        house.raising(ast.parse("raise ValueError(1)\nraise\nInputProblem('a')\nrequire(x)\n")) == 3
-    )
-    long = "One word " + "and more " * 20 + "ends. Short one."
-    assert [words.words(text) for text in words.sentences(long)] == [43, 2]
+    assert signatures_with_any(ast.parse("def f(x: dict[str, Any]) -> int: ...")) == ["f"]
+    raising = "raise ValueError(1)\nraise\nInputProblem('a')\nrequire(x)\n"
+    assert house.raising(ast.parse(raising)) == 3
 
 
 def test_help_fits_on_one_screen():

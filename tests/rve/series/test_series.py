@@ -163,14 +163,6 @@ def test_model_on_the_paper_case():
     assert modal.stiffness[2, 2] * 0.02 == pytest.approx(modal.curve.mean[1], rel=1e-14)
 
 
-def test_rule_in_theta_declares_its_error():
-    radius_map = HermiteMap(0.1337, 0.3145, 0.8663, 0.001)
-    exact = SeriesModel().solve(radius_map, MATRIX, [Phase(80e9)])[0]
-    coarse = SeriesModel(points=6).solve(radius_map, MATRIX, [Phase(80e9)])[0]
-    true = abs(coarse.modulus / exact.modulus - 1)
-    assert 1e-8 < true < coarse.error["theta"] < 1e4 * true
-
-
 @pytest.mark.parametrize("model", [SeriesModel(), SeriesModel(points=40), SlicesModel()])
 def test_a_map_that_jumps_is_refused(model):
     with pytest.raises(RefusedError, match=r"r at θ = 0.29.* is 0.40.* and 0.70.* side by side"):
