@@ -55,7 +55,15 @@ class RandomInput:
     parameters: Mapping[str, FuzzyNumber | float]
 
     def at(self, u: float, alpha: Sequence[float]) -> PiecewiseLinear:
-        """Quantiles at a probability that the cuts of the parameters allow, as a fuzzy number."""
+        """Return the fuzzy number of quantiles at probability u, from the cuts of the parameters.
+
+        Each cut is spanned by the quantiles at the corners of the box of parameters, since the
+        quantile is monotone in each of them.
+
+        Args:
+            u: Probability in (0, 1).
+            alpha: Levels in [0, 1] of the cuts, beside 0 and 1.
+        """
         numbers = fuzzy_inputs(self.parameters)
         rows = []
         for level in (grid := sorted({0.0, *alpha, 1.0})):
@@ -107,7 +115,7 @@ class IntervalResponse:
         return self._estimate(output, lambda bounds: np.asarray(bounds.mean(axis=0)))
 
     def p_box(self, at: ArrayLike, output: str = "y") -> Estimate:
-        """Bounds of the distribution function at responses `at` (m,), arrays (levels, m)."""
+        """Return bounds of the distribution function at the responses `at` (m,), (levels, m)."""
         responses = np.atleast_1d(np.asarray(at, float))
 
         def cdf(bounds: Array) -> Array:
@@ -118,7 +126,7 @@ class IntervalResponse:
         return Estimate(upper, lower, upper_error, lower_error)
 
     def quantile(self, probability: ArrayLike, output: str = "y") -> Estimate:
-        """Bounds of quantiles at probabilities (m,), arrays (levels, m)."""
+        """Return bounds of the quantiles at probabilities (m,), arrays of shape (levels, m)."""
         at = np.atleast_1d(np.asarray(probability, float))
 
         def quantiles(bounds: Array) -> Array:
@@ -127,7 +135,7 @@ class IntervalResponse:
         return self._estimate(output, quantiles)
 
     def _estimate(self, output: str, average: Callable[[Array], Array]) -> Estimate:
-        """Bounds of an average over the points, with the half-widths of their t-intervals.
+        """Return bounds of an average over the points, with the half-widths of their t-intervals.
 
         Args:
             output: Name of the output.
@@ -185,7 +193,7 @@ class IntervalQuasiMonteCarlo:
         alpha: Sequence[float],
         knowledge: Knowledge | None = None,
     ) -> IntervalResponse:
-        """Bound the response at every point and level.
+        """Return the bounds of the response at every quasi-random point, on every level.
 
         Args:
             function: Gets random and fuzzy inputs by name.
@@ -223,7 +231,7 @@ class IntervalQuasiMonteCarlo:
         return IntervalResponse(results)
 
     def _probabilities(self, inputs: int) -> Array:
-        """Points of independent scramblings one after another, shape (points, inputs)."""
+        """Return Sobol points of the unit cube, one scrambling after another, (points, inputs)."""
         from scipy.stats import qmc
 
         return np.concatenate(

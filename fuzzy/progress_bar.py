@@ -16,7 +16,10 @@ _FORETOLD = 0.05  # share of the work from which the time left is told; less for
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Progress of a part of a task: from the share `first` of the task to `last`."""
+    """Return a function that reports a part of a task, which runs from fraction `first` to `last`.
+
+    It takes the fraction of the part that is done and calls `progress` with that of the task.
+    """
     if progress is None:
         return lambda done: None
     return lambda done: progress(first + (last - first) * done)
@@ -24,11 +27,11 @@ def subprogress(progress: Progress | None, first: float, last: float) -> Progres
 
 @contextmanager
 def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """Function that takes the share done.
+    """Context manager whose value reports progress; it takes the completed fraction, 0 to 1.
 
     Args:
-        progress: The caller's function; None (or True) for a bar on a terminal, and a line now and
-            then where standard error is none; False for nothing.
+        progress: The caller's function. None or True: a bar on a terminal, or a line every ten
+            seconds where standard error is no terminal. False: nothing, and the value is None.
     """
     if callable(progress) or progress is False:
         yield progress if callable(progress) else None

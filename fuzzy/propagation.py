@@ -52,7 +52,7 @@ def propagate(
     identity: Identity | None = None,
     progress: Progress | bool | None = None,
 ) -> Bounds:
-    """Fuzzy outputs of a function of fuzzy inputs.
+    """Return the range of each output of a function of fuzzy inputs, on every α-level.
 
     ``propagate(lambda x, y: x * y, {"x": Triangular(1, 2, 4), "y": Interval(3, 5)})`` is enough.
 
@@ -80,10 +80,12 @@ def propagate(
         store: Path of a file that keeps every sample: a call that was stopped goes on from there.
         identity: What a sample depends on besides its inputs (case, options, versions), as JSON. A
             store needs it, as it cannot see that the function changed.
-        progress: Called with the share done; a bar on a terminal if not given, False for none.
+        progress: Called with the completed fraction; a bar on a terminal if not given, False for
+            none.
 
     Returns:
-        Range and nature of every output on every level.
+        Lower and upper ends of every output on every level, where they are reached, and their
+        nature: attained, estimated or guaranteed.
 
     Raises:
         RefusedError: An argument is wrong, or the budget does not carry the method.
@@ -124,7 +126,7 @@ def propagate(
 
 
 def _checked(method: Plan, on_failure: str) -> Plan:
-    """The method, which must have a method `run`."""
+    """Return the method unchanged; refuse one without a method `run(campaign, domain)`."""
     runs = hasattr(method, "run") and not isinstance(method, type)
     runs = runs and len(signature(method.run).parameters) == 2  # campaign and domain
     cure = "IntervalQuasiMonteCarlo().run(…) takes random inputs besides"
@@ -140,7 +142,7 @@ def _checked(method: Plan, on_failure: str) -> Plan:
 
 
 def _without_failed(bounds: Bounds, failed: int) -> Bounds:
-    """The bounds, attained only where samples were left out."""
+    """Return the bounds as they are, or as attained ones with a note if samples were left out."""
     if not failed:
         return bounds
     note = f"{failed} samples failed and were left out: the true range may reach further there"
@@ -156,7 +158,7 @@ def _without_failed(bounds: Bounds, failed: int) -> Bounds:
 
 
 def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
-    """Unit of each output; an entry of an array has its array's."""
+    """Return the unit of each output, "" where none is given; entries of an array share one."""
     names = {name.partition("[")[0] for name in outputs}.union(outputs)
     for name in units:
         chosen("unit of", name, sorted(names))
@@ -167,13 +169,13 @@ def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """Effect of each input, or group of inputs, on the width of a fuzzy result (Figs. 34, 35).
+    """Contribution of each input, or group of inputs, to the width of a result (Figs. 34, 35).
 
     Args:
         names: Inputs or groups.
         width: Width with all inputs fuzzy, shape (…, outputs).
-        reduction: Reduction of the width when an input is fixed, shape (names, …, outputs).
-            Reductions need not add up to the width: effects overlap.
+        reduction: Reduction of the width when an input is fixed at its modal value, shape
+            (names, …, outputs). Reductions need not add up to the width: effects overlap.
     """
 
     names: tuple[str, ...]
@@ -182,10 +184,9 @@ class Shares:
 
     @property
     def share(self) -> Array:
-        """Reduction over width, shape (names, …, outputs); 0 where there is no width.
+        """Reduction over width, shape (names, …, outputs); 0 where the width is 0.
 
-        A negative share says that the bounds are wrong by that much at least: a narrower input
-        cannot widen the true answer.
+        A narrower input cannot widen the true range: a negative value is an error of the bounds.
         """
         share: Array = np.zeros_like(self.reduction)
         return np.divide(self.reduction, self.width, out=share, where=self.width > 0)
@@ -197,7 +198,7 @@ def width_shares(
     *,
     groups: Mapping[str, Sequence[str]] | None = None,
 ) -> Shares:
-    """Shares of the inputs in the width of a fuzzy result: each is fixed in turn.
+    """Return how much of the width of a fuzzy result each input causes, by fixing one at a time.
 
     Args:
         propagation: From fuzzy inputs to bounds, as `lambda inputs: propagate(function, inputs)`,

@@ -15,7 +15,7 @@ LEAST_SHOWN = 20
 
 
 def printable(value: object, most: int = LONGEST) -> str:
-    """A value on one line without control characters, and at most `most` characters of it."""
+    """Return a value as one line of printable characters, cut off after `most` of them."""
     try:
         text = str(value)[: 4 * most]
     except ValueError:  # of an integer longer than Python writes
@@ -25,13 +25,13 @@ def printable(value: object, most: int = LONGEST) -> str:
 
 
 def fitted(value: str, allowed: str, line: Callable[[str, str], str], cure: str = "") -> str:
-    """A message of at most `LONGEST` characters.
+    """Return a message of at most `LONGEST` characters, whose cure is never cut off.
 
     Args:
-        value: The value, which is cut first.
-        allowed: Allowed values, which are cut next.
-        line: The message but its cure, from the two.
-        cure: The cure, which is added as it is.
+        value: Refused value, which is cut off first.
+        allowed: Allowed values, which are cut off next.
+        line: Function from the two to the message without its cure.
+        cure: Advice that is appended after a semicolon.
     """
     end = f"; {cure}" if cure else ""
     room = max(LONGEST - len(end), LEAST_SHOWN)
@@ -97,10 +97,10 @@ def real(
     least: float = -inf,
     most: float = inf,
 ) -> float:
-    """The value as a finite number; True and False are refused.
+    """Return a finite real number as a float; True and False are refused.
 
     Args:
-        key: Name of the argument.
+        key: Name of the argument, for the message.
         value: The value as the caller gave it.
         positive: Whether it must be greater than 0.
         whole: Whether it must be an integer, 0 or more.
@@ -126,7 +126,7 @@ def real(
 
 
 def require_numbers(name: str, values: object) -> None:
-    """Refuse values that are not a sequence of finite real numbers.
+    """Refuse values that are not a list, tuple or array of finite real numbers.
 
     Raises:
         RefusedError: They are a text or a single number, or contain something else.
@@ -140,7 +140,7 @@ def require_numbers(name: str, values: object) -> None:
 
 
 def chosen(key: str, value: object, names: Iterable[str]) -> None:
-    """Refuse a value that is not among the names.
+    """Refuse a value that is not one of the allowed names.
 
     Raises:
         RefusedError: It is not.
@@ -152,7 +152,7 @@ def chosen(key: str, value: object, names: Iterable[str]) -> None:
 def require(
     holds: bool | np.bool_, key: str, *, value: object, allowed: str, cure: str = ""
 ) -> None:
-    """Refuse a value unless a condition holds; the other arguments are those of `RefusedError`.
+    """Raise `RefusedError`(key, value, allowed, cure) unless the condition `holds`.
 
     Raises:
         RefusedError: The condition does not hold.

@@ -58,16 +58,19 @@ class Nature(StrEnum):
 
 
 def rounded(value: float, side: str, nature: Nature, digits: int = 4) -> float:
-    """The lower or upper end of a range: attained ends inwards, others outwards.
+    """Return the lower or upper end of a range, rounded to some significant digits.
 
-    Rounding in the tenth digit counts as none.
+    Attained ends are rounded towards the inside of the range, estimated and guaranteed ones towards
+    the outside, so that they stay true. A difference in the tenth digit is taken for round-off.
     """
     if value == 0 or not math.isfinite(value):
         return value
-    up = (side == "upper") != (nature is Nature.ATTAINED)
+    is_upward = (side == "upper") != (nature is Nature.ATTAINED)
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(abs(value))))
-    slack = 1e-10 * abs(value) * scale
-    return (math.ceil(value * scale - slack) if up else math.floor(value * scale + slack)) / scale
+    round_off = 1e-10 * abs(value) * scale
+    if is_upward:
+        return math.ceil(value * scale - round_off) / scale
+    return math.floor(value * scale + round_off) / scale
 
 
 class Ends(NamedTuple):
@@ -156,19 +159,17 @@ class Bounds:
         self._check_proof()
 
     def _check_shapes(self) -> None:
+        """Refuse arrays whose shapes do not fit the levels, times, outputs and inputs."""
         middle = () if self.time is None else (len(self.time),)
         shape = (len(self.alpha), *middle, len(self.outputs))
-        points = (*shape, len(self.inputs))
-        ends = [end for pair in (self.inner, self.outer) for end in pair or ()]
-        by_output = [words for words in (self.natures, self.units) if words]
         for name in ("lower", "upper", "error"):
             _require_shape(name, getattr(self, name).shape, shape)
         for name in ("lower_at", "upper_at"):
-            _require_shape(name, getattr(self, name).shape, points)
-        for end in ends:
+            _require_shape(name, getattr(self, name).shape, (*shape, len(self.inputs)))
+        for end in (*(self.inner or ()), *(self.outer or ())):
             _require_shape("inner and outer", end.shape, shape)
-        for words in by_output:
-            _require_shape("natures, units", (len(words),), shape[-1:])
+        for texts in filter(None, (self.natures, self.units)):
+            _require_shape("natures, units", (len(texts),), shape[-1:])
 
     def _check_values(self) -> None:
         finite = np.isfinite(self.lower) & np.isfinite(self.upper)
@@ -179,26 +180,28 @@ class Bounds:
         )
 
     def _check_proof(self) -> None:
-        """Raise if bounds contradict each other by more than their error and rounding."""
-        near = self._near
-        estimated = np.where(self._guaranteed, 0.0, np.nan_to_num(self.error))
-        wide = near + np.nan_to_num(self.error)
-        neighbours = (wide[1:] + wide[:-1])[: len(wide) - 1]
+        """Raise `FailedError` if cuts are not nested or attained bounds lie outside proved ones.
+
+        Differences within the stated errors and round-off are allowed.
+        """
+        round_off, error = self._round_off, np.nan_to_num(self.error)
+        estimated = np.where(self._guaranteed, 0.0, error)
+        of_levels = 2 * round_off + error[1:] + error[:-1]
         inner, outer = self.attained, self.proved
         for what, excess in (
-            ("lower bounds lie above upper ones", self.lower - self.upper - near - estimated),
-            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - neighbours),
-            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - neighbours),
-            ("attained bounds lie outside the proved ones", outer.lower - inner.lower - near),
-            ("attained bounds lie outside the proved ones", inner.upper - outer.upper - near),
+            ("lower bounds lie above upper ones", self.lower - self.upper - round_off - estimated),
+            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - of_levels),
+            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - of_levels),
+            ("attained bounds lie outside the proved ones", outer.lower - inner.lower - round_off),
+            ("attained bounds lie outside the proved ones", inner.upper - outer.upper - round_off),
         ):
             if (excess > 0).any():
                 worst = self.outputs[int(np.nanargmax(excess) % len(self.outputs))]
                 raise FailedError(f"{what}: of {worst}, by up to {np.nanmax(excess):.3g}")
 
     @property
-    def _near(self) -> Array:
-        """Differences due to rounding, shape (m,)."""
+    def _round_off(self) -> Array:
+        """Largest difference due to rounding of each output, shape (m,)."""
         axes = tuple(range(self.lower.ndim - 1))
         size = np.maximum(np.abs(self.lower), np.abs(self.upper)).max(axis=axes)
         return np.asarray(ROUND_OFF * size)
@@ -210,9 +213,9 @@ class Bounds:
 
     @cached_property
     def attained(self) -> Ends:
-        """Ends that the true range reaches at least; NaN where nothing attained is known.
+        """Ends of the ranges that some inputs are known to reach; NaN where none are known.
 
-        Bounds that are not guaranteed are taken less their error.
+        The stated error of bounds that are not guaranteed is subtracted from them.
         """
         blank = np.full(self.lower.shape, np.nan)
         inner = self.inner or Ends(blank, blank)
@@ -221,7 +224,7 @@ class Bounds:
 
     @cached_property
     def proved(self) -> Ends:
-        """Ends that the true range is proved to lie inside; infinite where nothing is proved."""
+        """Ends that no value of the output exceeds, by proof; infinite where nothing is proved."""
         wide = np.full(self.lower.shape, np.inf)
         outer = self.outer or Ends(-wide, wide)
         lower = np.where(self._guaranteed, self.lower, outer.lower)
@@ -233,10 +236,12 @@ class Bounds:
         return JointClaim.from_inputs(self.inputs, self.nature)
 
     def number(self, output: str = "y") -> Stepwise | Claimed:
-        """One output as a fuzzy number: between two levels the wider α-cut holds.
+        """Return one output as a fuzzy number; between two levels the wider α-cut holds.
+
+        It is a `Claimed` number if the inputs carry a claim of coverage.
 
         Raises:
-            RefusedError: The levels do not reach from 0 to 1, and nothing is claimed.
+            RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim.
         """
         steps = outer_steps(self.alpha, *self.bounds(output))
         if (claim := self.claim.claim) is not None:
@@ -251,7 +256,7 @@ class Bounds:
         return steps
 
     def column(self, output: str = "y") -> int:
-        """Index of an output.
+        """Return the index of an output on the last axis of `lower` and `upper`.
 
         Raises:
             RefusedError: There is no such output.
@@ -270,7 +275,10 @@ class Bounds:
         return self.natures[column] if self.natures else self.nature
 
     def __str__(self) -> str:
-        """Nature and cost; bounds of the first outputs, a line for each level; notes."""
+        """Return a text: nature, basis and cost, a line for each level of each output, the notes.
+
+        Of more than 25 lines only the first outputs are shown.
+        """
         count = max(1, _MAX_LINES // len(self.alpha))
         shown = range(len(self.outputs))[:count]
         lines = [line for column in shown for line in self._lines(column)]
@@ -292,12 +300,15 @@ class Bounds:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Outputs with their units."""
+        """Name of each output with its unit, as "q1 [m]"."""
         pairs = zip(self.outputs, self.units or ("",) * len(self.outputs), strict=True)
         return tuple(f"{name} [{unit}]" if unit else name for name, unit in pairs)
 
     def _lines(self, column: int) -> Iterator[str]:
-        """A line for each level of an output, with the extremes over time where there is one."""
+        """Yield a line of text for each level of an output: range, error and nature if it differs.
+
+        Of an output over time it shows the extremes over time.
+        """
         low, high, error = (x[..., column] for x in (self.lower, self.upper, self.error))
         if self.time is not None:
             low, high, error = low.min(axis=1), high.max(axis=1), error.max(axis=1)
@@ -312,17 +323,12 @@ class Bounds:
             yield f"{head}, {words} {_digits(miss)}{differs}"
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: Any) -> Axes:
-        """Draws an output on Matplotlib's axes, new ones if none are given.
-
-        Without time its membership as a line; over time the α-cuts as bands, darker with α.
+        """Draw an output and return the axes: its membership function, or its α-cuts over time.
 
         Args:
-            axes: The axes.
+            axes: Axes of Matplotlib; new ones if not given.
             output: Name of the output; the first if left out.
             line: Keywords of `Axes.plot`, or of `Axes.fill_between` over time.
-
-        Returns:
-            The axes.
         """
         output = output or self.outputs[0]
         if self.time is None:
@@ -334,7 +340,12 @@ class Bounds:
         return axes
 
     def to_dataset(self) -> xarray.Dataset:
-        """Bounds over (alpha, time, output), where they are attained over (…, parameter)."""
+        """Return the bounds as an xarray dataset.
+
+        Returns:
+            lower, upper and error over (alpha, time, output), the inputs `lower_at` and `upper_at`
+            that reach them over a further axis parameter, and nature and label of each output.
+        """
         import xarray
 
         middle = {} if self.time is None else {"time": self.time}

@@ -42,7 +42,7 @@ class Values:
         )
 
     def output(self, name: str) -> Array:
-        """One output at all points, shape (n, …)."""
+        """Return the values of an output at all points, shape (n, *shape of the output)."""
         names, shapes = zip(*self.layout, strict=True)
         chosen("output", name, names)
         ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
@@ -116,6 +116,7 @@ class Call:
     vectorised: bool = False
 
     def __post_init__(self) -> None:
+        """Refuse what cannot be called, and calling conventions that exclude each other."""
         shown = repr(self.function)
         require(callable(self.function), "function", value=shown, allowed="what can be called")
         single = not (self.shared and self.vectorised)
@@ -126,7 +127,12 @@ class Call:
             chosen("shared input", name, self.names)
 
     def tasks(self, points: Array) -> Iterator[list[int]]:
-        """Rows of the points that go into one call each; the same whatever the workers."""
+        """Yield the rows of the points (n, inputs) that are evaluated by one call of the function.
+
+        Args:
+            points: Shape (n, inputs). They are grouped by equal shared inputs, or in batches of
+                1024 for a vectorised function; else each point is a call.
+        """
         if self.shared:
             columns = [self.names.index(name) for name in self.shared]
             groups: dict[bytes, list[int]] = {}
@@ -139,7 +145,10 @@ class Call:
             yield list(range(start, min(start + size, len(points))))
 
     def __call__(self, points: Array) -> list[Outcome]:
-        """Outputs of one task; if it fails as a whole, each point is tried alone."""
+        """Return the sample or the failure at each of the points (n, inputs) of one call.
+
+        If the call fails, each point is evaluated by a call of its own.
+        """
         try:
             outputs = self._outputs(points)
             require(
@@ -152,7 +161,7 @@ class Call:
         return [_outcome(output) for output in outputs]
 
     def _outputs(self, points: Array) -> Sequence[Any]:
-        """Output of the function at each point (n, inputs), by its calling convention."""
+        """Return what the function returns at each point (n, inputs), not yet checked."""
         if self.vectorised:
             return self._split(points)
         named = [named_point(self.names, point) for point in points]
@@ -161,7 +170,7 @@ class Call:
         return [self.function(**point) for point in named]
 
     def _split(self, points: Array) -> Sequence[Any]:
-        """Outputs of a vectorised function, point by point."""
+        """Return the outputs of a vectorised function as a mapping of names to values per point."""
         outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
         named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
         arrays = {name: np.atleast_1d(np.asarray(value, float)) for name, value in named.items()}
@@ -175,7 +184,7 @@ def named_point(names: Sequence[str], point: Array) -> dict[str, float]:
 
 
 def _outcome(output: Any) -> Outcome:
-    """Sample of an output; a failure of an exception, or of an output that is no numbers."""
+    """Return the sample of a returned output, or a failure if it is an exception or no numbers."""
     if isinstance(output, Exception):
         return Failure(f"{type(output).__name__}: {output}")
     try:
@@ -185,7 +194,7 @@ def _outcome(output: Any) -> Outcome:
 
 
 def flatten(output: Output) -> tuple[Layout, Array]:
-    """One sample's outputs as a layout and a row of numbers.
+    """Return the layout (name and shape of each output) of a sample, and its numbers in a row (m,).
 
     Args:
         output: A number (named `y`), an array (`y[0]`, …) or a mapping of names to either.
@@ -205,7 +214,11 @@ def flatten(output: Output) -> tuple[Layout, Array]:
 
 
 def _numbers(name: str, value: ArrayLike | None) -> Array:
-    """Finite real numbers of an output, which may have no unit and no mask."""
+    """Return an output as an array of finite real numbers.
+
+    Raises:
+        RefusedError: A number is not real or not finite, is masked, or has a unit.
+    """
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
     plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
     real_numbers = plain and not hasattr(value, "units") and np.isfinite(array).all()

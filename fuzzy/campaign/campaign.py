@@ -121,13 +121,13 @@ class Campaign:
         return self._samples
 
     def __call__(self, points: Array) -> Values:
-        """Outputs at the points, shape (n, inputs), in their order; NaN where one was skipped.
+        """Return the outputs at the points (n, inputs), in their order; NaN where one failed.
 
-        A point that was seen before costs nothing.
+        Only points that were not evaluated before cost evaluations.
 
         Raises:
-            SpentError: The others would pass the budget; none is run.
-            CampaignError: Samples failed; raised after all others have run.
+            SpentError: New points exceed the budget; none of them is evaluated.
+            CampaignError: Samples failed; raised after all others have been evaluated.
         """
         keys = [point.tobytes() for point in points + 0.0]  # no -0.0
         fresh = [key for key in dict.fromkeys(keys) if key not in self._rows]
@@ -141,7 +141,12 @@ class Campaign:
         return Values(self.layout, np.array([self._rows[key] for key in keys]))
 
     def _run(self, points: Array) -> Array:
-        """Outputs at new points, shape (n, columns)."""
+        """Evaluate new points (n, inputs) and return their outputs (n, columns), NaN if failed.
+
+        Raises:
+            CampaignError: Samples failed and failures are not skipped, or all of the first batch
+                failed.
+        """
         batch = _Batch(self, points)
         batch.run()
         LOG.debug("%d samples, %d before", len(points), len(self))
@@ -163,14 +168,20 @@ class Campaign:
         return array if self._rows else self._arranged(array, batch.layouts)
 
     def _arranged(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
-        """The first batch with outputs in the order of its first row, whichever ended first."""
+        """Return the outputs (n, columns) of the first batch with columns in its first row's order.
+
+        Workers end in any order, so that another row may have set the order before.
+        """
         values = Values(self.layout, array)
         self.layout = layouts[min(layouts)]
         columns = [values.output(name).reshape(len(array), -1) for name, _ in self.layout]
         return np.concatenate(columns, axis=1)
 
     def in_order(self, outcome: Outcome) -> Outcome:
-        """The outcome with its outputs in the order of `layout`."""
+        """Return a sample with its outputs in the campaign's order, or a failure if they differ.
+
+        The first sample of the campaign sets names, shapes and order.
+        """
         if isinstance(outcome, Failure) or outcome.layout == self.layout:
             return outcome
         if not self.layout:
@@ -191,7 +202,16 @@ class Campaign:
 
 
 class _Batch:
-    """Evaluation of new points by the workers, with those that the store has."""
+    """Evaluation of new points by the store and the workers.
+
+    Args:
+        campaign: The campaign, which takes the layout of the outputs from the first sample.
+        points: Shape (n, inputs).
+
+    Attributes:
+        outcomes: Sample or failure by row of `points`.
+        layouts: Layout of each sample as the function returned it, by row.
+    """
 
     def __init__(self, campaign: Campaign, points: Array) -> None:
         self.campaign, self.points = campaign, points
@@ -201,7 +221,10 @@ class _Batch:
         self._written, self._cost = perf_counter(), 0.0
 
     def run(self) -> None:
-        """Read stored samples, evaluate the others, and store those even if one fails."""
+        """Set `outcomes`: read stored samples, evaluate the others, and store what was evaluated.
+
+        Samples are stored even if the evaluation is interrupted.
+        """
         campaign, count = self.campaign, len(self.points)
         self._take_stored()
         try:
@@ -218,7 +241,7 @@ class _Batch:
         return point_key(self.campaign.call.names, self.points[row])
 
     def _take_stored(self) -> None:
-        """Takes the samples of the points that the store has."""
+        """Set the outcomes of the points that are in the store."""
         campaign = self.campaign
         if campaign.store is None:
             return
@@ -228,7 +251,7 @@ class _Batch:
                 self._keep(row, sample)
 
     def _tasks(self) -> Iterator[Task]:
-        """Calls of the points that are not stored."""
+        """Yield rows and points of each call for the points that are not in the store."""
         for group in self.campaign.call.tasks(self.points):
             if rows := [row for row in group if row not in self.outcomes]:
                 yield rows, self.points[rows]
@@ -244,7 +267,7 @@ class _Batch:
             self._gathered[self._key(row)] = outcome
 
     def _write(self, *, now: bool = False) -> None:
-        """Write gathered samples: now, or if writing takes less than a tenth of the time."""
+        """Store gathered samples if `now`, or if storing has taken under a tenth of the time."""
         start, store = perf_counter(), self.campaign.store
         due = start - self._written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * self._cost)
         if store and self._gathered and (now or due):

@@ -29,10 +29,10 @@ _GROUP_SIGNALS = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []  # not on 
 
 @contextmanager
 def pool(workers: int) -> Iterator[Executor | None]:
-    """Executor of `workers` processes; None for one worker, which is this process.
+    """Context manager of an executor of `workers` processes; None for one worker, this process.
 
     Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
-    says. Functions go to the processes by value where they cannot be imported.
+    says. Functions are sent by value where the processes cannot import them.
     """
     real("workers", workers, positive=True, whole=True)
     if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
@@ -52,7 +52,7 @@ def pool(workers: int) -> Iterator[Executor | None]:
 
 
 def _processes(workers: int) -> Executor:
-    """Executor of `workers` processes of this machine, which end when this process ends."""
+    """Return an executor of `workers` processes on this machine, which end with this process."""
     from joblib.externals.loky import ProcessPoolExecutor
 
     # loky starts its semaphore tracker here. The tracker inherits the mask of blocked signals, so
@@ -69,7 +69,7 @@ def _processes(workers: int) -> Executor:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this process when its parent has ended: a killed campaign leaves no orphans."""
+    """Start a thread that ends this process when process `parent` has ended: no orphans remain."""
     from threading import Thread
 
     for number in (signal.SIGINT, *_GROUP_SIGNALS):  # sent to all; the parent decides
@@ -86,7 +86,7 @@ def _end_with_parent(parent: int) -> None:
 def submitted(
     executor: Executor | None, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
 ) -> Future[T]:
-    """Future of a call by the executor; without one the call is made at once."""
+    """Return the future of a call by the executor; without executor the call is made at once."""
     if executor is not None:
         return executor.submit(function, *args, **kwargs)
     done: Future[T] = Future()
@@ -97,7 +97,7 @@ def submitted(
 def completed(
     call: Call, tasks: Iterable[Task], executor: Executor | None
 ) -> Iterator[tuple[list[int], list[Outcome]]]:
-    """Rows and outcomes of each task, in the order in which tasks end.
+    """Yield rows and outcomes of each task, in the order in which the tasks end.
 
     Tasks are sent in batches; at most two batches for each worker are submitted at a time.
 
@@ -133,7 +133,7 @@ def completed(
 
 
 def _sample_words(call: Call, batch: list[Task]) -> str:
-    """The first sample of a batch by its number and inputs, for messages."""
+    """Return number and inputs of the first sample of a batch as a text for messages."""
     rows, points = batch[0]
     first = np.atleast_2d(points)[0]
     values = ", ".join(f"{x} = {y:.6g}" for x, y in zip(call.names, first, strict=False))
@@ -168,7 +168,7 @@ def _result(future: Future[T], at: str = "") -> T:
 
 
 def n_workers(executor: Executor) -> int:
-    """Number of calls that an executor runs concurrently; that of cores if it does not tell."""
+    """Return the number of calls that an executor runs concurrently; if unknown, that of cores."""
     client = getattr(executor, "_client", None)  # dask
     if client is not None and (threads := sum(client.nthreads().values())):
         return int(threads)

@@ -17,7 +17,7 @@ _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
 
 def levels(steps: int) -> tuple[float, ...]:
-    """The α-levels 0, 1/steps, …, 1: `steps` = 4 gives the paper's five.
+    """Return the equally spaced α-levels 0, 1/steps, …, 1; `steps` = 4 gives the paper's five.
 
     Example:
         >>> levels(4)
@@ -28,7 +28,7 @@ def levels(steps: int) -> tuple[float, ...]:
 
 
 def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """The inputs by name, a plain number as a crisp one.
+    """Return the inputs as fuzzy numbers by name; a plain number becomes a `Crisp` one.
 
     Raises:
         RefusedError: The inputs are not a mapping or empty, or a value is not a number, fuzzy or
@@ -95,21 +95,27 @@ class Domain:
         return np.array([number.modal for number in self.inputs.values()], float)
 
     def inside(self, points: Array) -> Mask:
-        """Mask of points, shape (n, inputs), in the cut of each level, shape (levels, n)."""
+        """Return which points (n, inputs) lie in the α-cut of each level, a mask (levels, n).
+
+        A point is in the cut if it is in the box of the cuts and fulfils all interactions there.
+        """
         lower, upper = self.boxes
-        slack = _ROUND_OFF * (upper[0] - lower[0])
-        above = (points >= (lower - slack)[:, None]).all(axis=2)
-        below = (points <= (upper + slack)[:, None]).all(axis=2)
-        room = np.array([self.slack(points, alpha) for alpha in self.alpha])
-        return np.asarray(above & below & (room >= -_ROUND_OFF))
+        tolerance = _ROUND_OFF * (upper[0] - lower[0])
+        above = (points >= (lower - tolerance)[:, None]).all(axis=2)
+        below = (points <= (upper + tolerance)[:, None]).all(axis=2)
+        interaction = np.array([self.slack(points, alpha) for alpha in self.alpha])
+        return np.asarray(above & below & (interaction >= -_ROUND_OFF))
 
     def slack(self, points: Array, alpha: float) -> Array:
-        """Least room that the interactions leave at points (n, inputs), shape (n,)."""
-        rooms = [interaction.slack(points, self.inputs, alpha) for interaction in self.interactions]
-        return np.asarray(np.min([np.full(len(points), np.inf), *rooms], axis=0))
+        """Return the least slack of all interactions at points (n, inputs), shape (n,).
+
+        It is negative where an interaction is violated and infinite without interactions.
+        """
+        slacks = [x.slack(points, self.inputs, alpha) for x in self.interactions]
+        return np.asarray(np.min([np.full(len(points), np.inf), *slacks], axis=0))
 
     def require_free(self, method: str) -> None:
-        """Refuse interactions for a method that cannot take them into account."""
+        """Refuse a domain with interactions, for a method that evaluates corners of boxes only."""
         kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
         cure = "take Automatic or Optimisation"
         require(

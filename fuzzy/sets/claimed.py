@@ -46,7 +46,10 @@ class Joint:
     named: bool = False
 
     def joined(self, beta: Array) -> Array:
-        """Joint level of the cuts at levels `beta`, any shape; 1 at most."""
+        """Return the level α of the joint cut made of the single cuts at levels `beta` (any shape).
+
+        For m claims: α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
+        """
         m = len(self.names)
         inside = np.minimum(beta, 1 - 1e-16)
         joint: Array = (
@@ -56,7 +59,7 @@ class Joint:
 
     @property
     def words(self) -> str:
-        """The rule in words."""
+        """Text that names the number of sources and their dependence; empty for a single source."""
         sources = "independent sources" if self.independent else "sources of unknown dependence"
         return f"{len(self.names)} {sources}" if len(self.names) > 1 else ""
 
@@ -87,19 +90,20 @@ class Claimed(FuzzyNumber):
 
     @property
     def cuts(self) -> Cuts:
-        """The cuts at all levels.
+        """The α-cuts at all levels.
 
         Raises:
-            RefusedError: Some are not decided by the values.
+            RefusedError: The measured values leave a cut at low α without a finite end.
         """
         self.cut(0.0)
         return self.number.cuts
 
     def cut(self, alpha: float) -> Cut:
-        """The cut at `alpha` in [0, 1].
+        """Return the α-cut at `alpha` in [0, 1].
 
         Raises:
-            RefusedError: `alpha` lies outside [0, 1], or the values do not decide the cut there.
+            RefusedError: `alpha` lies outside [0, 1] or below `decided`, where the measured values
+                leave the cut without a finite end.
         """
         if level(alpha) < self.decided:
             allowed = f"levels from {self.decided:.4g} on, which the values decide"

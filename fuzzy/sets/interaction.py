@@ -122,7 +122,7 @@ class Ellipsoidal:
 
 
 def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
-    """1 − μ with the side of the modal value as sign; grows beyond 1 outside the support."""
+    """Return ±(1 − μ) at x: negative below the modal value, beyond ±1 outside the support."""
     lower, upper = number.support
     outside = np.maximum(np.maximum(lower - x, x - upper), 0)
     outside = outside / max(upper - lower, np.finfo(float).tiny)
@@ -131,14 +131,16 @@ def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
 
 
 def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Array:
-    """The point, moved towards an allowed anchor until it is allowed.
+    """Return the first allowed point (inputs,) on the straight line from `point` to `anchor`.
+
+    401 points of the line are tried, in steps that grow from 1e-15 of its length.
 
     Args:
-        point: Shape (inputs,).
-        anchor: An allowed point, shape (inputs,).
-        slack: Room at points (n, inputs), shape (n,).
+        point: Start of the line, shape (inputs,).
+        anchor: An allowed point, shape (inputs,), which is the last one tried.
+        slack: Slack of the interactions at points (n, inputs), shape (n,); ≥ 0 where allowed.
     """
-    shares = np.concatenate([[0.0], np.geomspace(1e-15, 1, 400)])[:, None]
-    line: Array = point + shares * (anchor - point)
+    fractions = np.concatenate([[0.0], np.geomspace(1e-15, 1, 400)])[:, None]
+    line: Array = point + fractions * (anchor - point)
     line[-1] = anchor
     return np.asarray(line[np.argmax(slack(line) >= 0)])

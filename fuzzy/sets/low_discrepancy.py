@@ -11,7 +11,11 @@ from alphacut.fuzzy.arrays import Array
 
 
 def low_discrepancy(dimension: int) -> Iterator[Array]:
-    """Points of [0, 1]^d, one after the other: the additive recurrence of Roberts (2018)."""
+    """Yield an infinite sequence of points (d,) that fill the unit box [0, 1]^d evenly.
+
+    It is the additive recurrence x_k = 1/2 + k s mod 1 of Roberts (2018), with s_j = g^(−j) and g
+    the positive root of g^(d + 1) = g + 1.
+    """
     root = 2.0
     for _ in range(64):  # root^(d + 1) = root + 1
         root = (1 + root) ** (1 / (dimension + 1))

@@ -77,14 +77,11 @@ class FuzzyNumber(ABC):
         return np.where(np.isnan(x), np.nan, grade)
 
     def plot(self, axes: Axes | None = None, **line: Any) -> Axes:
-        """Draws the membership as a line on Matplotlib's axes, new ones if none are given.
+        """Draw the membership function as a line, and return the axes.
 
         Args:
-            axes: The axes.
+            axes: Axes of Matplotlib; new ones if not given.
             line: Keywords of `Axes.plot`, such as `color`.
-
-        Returns:
-            The axes.
         """
         axes = new_axes() if axes is None else axes
         levels, lower, upper = map(np.asarray, self.cuts)
@@ -111,7 +108,7 @@ def level(alpha: float) -> float:
 
 
 def rising(alpha: Iterable[float]) -> tuple[float, ...]:
-    """The levels, which must rise within [0, 1], as a tuple.
+    """Return levels as a tuple of floats, which must rise within [0, 1].
 
     Raises:
         RefusedError: There is no level, they do not rise, or one lies outside [0, 1].
@@ -123,24 +120,27 @@ def rising(alpha: Iterable[float]) -> tuple[float, ...]:
 
 
 def _interpolate(alpha: float, levels: Sequence[float], ends: Sequence[float]) -> float:
-    """The end of the cut at `alpha`, exact at the levels that are listed."""
+    """Return the lower or upper end at `alpha` by linear interpolation; exact at `levels`."""
     right = bisect_right(levels, alpha)
     if right == len(levels):
         return float(ends[-1])
-    share = (alpha - levels[right - 1]) / (levels[right] - levels[right - 1])
+    fraction = (alpha - levels[right - 1]) / (levels[right] - levels[right - 1])
     rise = ends[right] - ends[right - 1]
-    return float(
-        ends[right - 1] + share * rise if share < 0.5 else ends[right] - (1 - share) * rise
-    )
+    if fraction < 0.5:
+        return float(ends[right - 1] + fraction * rise)
+    return float(ends[right] - (1 - fraction) * rise)
 
 
 def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
-    """The highest α whose lower end does not exceed x; 0 where none does."""
+    """Return the highest level α whose cut has its lower end at or below x, interpolated linearly.
+
+    It is the membership of x on the left flank; 0 where x lies below all cuts.
+    """
     right = np.searchsorted(lower, x, side="right")
     inner = np.clip(right, 1, len(lower) - 1)
     rise = lower[inner] - lower[inner - 1]
-    share = np.divide(x - lower[inner - 1], rise, out=np.zeros_like(x), where=rise > 0)
-    between = levels[inner - 1] + share * (levels[inner] - levels[inner - 1])
+    fraction = np.divide(x - lower[inner - 1], rise, out=np.zeros_like(x), where=rise > 0)
+    between = levels[inner - 1] + fraction * (levels[inner] - levels[inner - 1])
     return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, between))
 
 
@@ -257,6 +257,7 @@ class _Nested(FuzzyNumber):
     to_one: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
+        """Store levels and ends as tuples of floats; refuse cuts that are not finite and nested."""
         levels = rising(self.alpha)
         low, high = (tuple(map(float, row)) for row in (self.lower, self.upper))
         complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
@@ -317,7 +318,10 @@ class Stepwise(_Nested):
 
     @cached_property
     def cuts(self) -> Cuts:
-        """The cuts at every level and at the floating-point number just below the next one."""
+        """The cuts as a piecewise linear membership function with jumps.
+
+        Each cut is listed at its level and at the last floating-point number below the next level.
+        """
         ends = [*(np.nextafter(level, 0.0) for level in self.alpha[1:]), 1.0]
         rows = [
             (at, k)
@@ -339,13 +343,13 @@ class Stepwise(_Nested):
 def outer_steps(
     alpha: Sequence[float] | Array, lower: Sequence[float] | Array, upper: Sequence[float] | Array
 ) -> Stepwise:
-    """Steps around nested cuts known at some levels: between two levels the wider cut holds.
+    """Return the fuzzy number that has the given nested cuts, and between two levels the wider one.
 
     Args:
-        alpha: Levels, rising; the first cut holds from 0 on. One that rounding has lifted above a
-            decimal, as 0.1 + 0.2, counts as that decimal.
-        lower: Lower ends.
-        upper: Upper ends.
+        alpha: Levels, rising, shape (A,); the first cut holds from α = 0 on. A level that rounding
+            has lifted above a decimal, as 0.1 + 0.2, counts as that decimal.
+        lower: Lower ends of the cuts, shape (A,).
+        upper: Upper ends of the cuts, shape (A,).
     """
     levels = (0.0, *(min(float(level), round(float(level), 12)) for level in alpha[1:]))
     return Stepwise(levels, tuple(lower), tuple(upper))
