@@ -3,8 +3,8 @@
 The key of a sample is the identity of the model (case, mesh options, versions: whatever the caller
 names) and the values of all inputs. Each row has a checksum over all its columns, and a batch is
 one transaction: a killed process or a power cut loses only samples that were not yet written.
-Opening a store reads and checks all rows. The intact rows of a damaged file are copied into a new
-file, and one line warns of it; other samples are computed anew. SQLite's application id tells that
+Opening a store reads and checks all rows. The rows of a damaged file that can be read are copied
+into a new one, with a warning; other samples are computed anew. SQLite's application id tells that
 a file is a store. Links, devices, pipes and data bases of other programs are refused, unchanged.
 """
 
@@ -16,7 +16,7 @@ import sqlite3
 import stat
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
@@ -79,6 +79,7 @@ class Row(NamedTuple):
 
 
 def _checksum(model: bytes, point: str, layout: str, outputs: bytes) -> bytes:
+    """Return a hash (16 bytes) of the columns of a row and of their lengths."""
     parts = model, point.encode(), layout.encode(), outputs
     sizes = np.array([len(part) for part in parts], "<i8").tobytes()
     return blake2b(b"".join((sizes, *parts)), digest_size=16).digest()
@@ -118,7 +119,7 @@ class Store:
         self._connection = self._open()
 
     def _open(self) -> sqlite3.Connection:
-        """Open the file and read its rows; of a damaged file copy the intact rows."""
+        """Open the file and read its intact rows; a damaged one is replaced by those rows."""
         connection = self._connect(self.path)
         with self.reported():
             try:
@@ -126,20 +127,18 @@ class Store:
                 damaged = connection.execute("pragma quick_check").fetchone() != ("ok",)
                 damaged |= connection.execute(_SCHEMA).fetchall() != [(_TABLE,)]
             except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-                name = getattr(error, "sqlite_errorname", "")  # a text of the file may be no text
-                if any(
-                    word in name for word in _ACCESS_ERRORS
-                ):  # locks, space or rights: no damage
+                name = getattr(error, "sqlite_errorname", "")  # none: text is no UTF-8
+                if any(word in name for word in _ACCESS_ERRORS):  # no damage
                     raise
                 damaged = True
-        damaged |= not self._read(connection, "asc")
+        damaged |= not self._read(connection)
         return self._with_intact_rows(connection) if damaged else connection
 
-    def _read(self, connection: sqlite3.Connection, order: str) -> bool:
-        """Read the intact rows; whether all rows are intact."""
+    def _read(self, connection: sqlite3.Connection) -> bool:
+        """Read rows up to the first that SQLite cannot read; return whether all are intact."""
         intact = True
         try:
-            for row in connection.execute(f"select {_COLUMNS} from sample order by rowid {order}"):
+            for row in connection.execute(f"select {_COLUMNS} from sample"):
                 stored = Row(*row)
                 intact &= stored.is_intact
                 if stored.is_intact:
@@ -149,8 +148,7 @@ class Store:
         return intact
 
     def _with_intact_rows(self, connection: sqlite3.Connection) -> sqlite3.Connection:
-        """Open a new file with the intact rows; the damaged one is renamed if its name is free."""
-        self._read(connection, "desc")  # up to the damage from its other side
+        """Close the damaged file, rename it, and return a new file with the rows that were read."""
         connection.close()
         aside = self.path.with_name(f"{self.path.name}.damaged")
         with suppress(FileNotFoundError):
@@ -189,7 +187,7 @@ class Store:
 
     @contextmanager
     def reported(self) -> Iterator[None]:
-        """Raise errors of the file in one line."""
+        """Context manager that turns errors of SQLite into a `FailedError` with a cure."""
         try:
             yield
         except sqlite3.Error as error:
@@ -208,7 +206,7 @@ class Store:
 
 
 def _prepare(connection: sqlite3.Connection) -> None:
-    """Marks the file as a store and adds its table, where it is new or of an older version."""
+    """Mark the file as a store and add its table, if it is new."""
     connection.execute("pragma synchronous = full")
     if connection.execute("pragma application_id").fetchone() != (_APPLICATION,):
         connection.execute(f"pragma application_id = {_APPLICATION}")
@@ -217,7 +215,7 @@ def _prepare(connection: sqlite3.Connection) -> None:
 
 
 def _is_store(path: Path) -> bool:
-    """True for a store, an empty file, or where there is nothing; none of them a link.
+    """Return True for a store, an empty file, or where there is nothing; none of them a link.
 
     Raises:
         OSError: The file cannot be read.
@@ -232,28 +230,19 @@ def _is_store(path: Path) -> bool:
     if not head.startswith(b"SQLite format 3\0"):
         return not head
     application = int.from_bytes(head[_HEAD - 4 :], "big")
-    return application == _APPLICATION or (application == 0 and _is_older(path))
+    return application == _APPLICATION
 
 
 def _is_regular(path: Path, *, missing: bool) -> bool:
-    """True for a regular file, which no link, device or pipe is."""
+    """Return whether a path is a regular file, no link or device; `missing` without a file."""
     try:
         return stat.S_ISREG(os.lstat(path).st_mode)
     except FileNotFoundError:
         return missing
 
 
-def _is_older(path: Path) -> bool:
-    """True for a file whose only table is that of a store, before stores had an id."""
-    try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as base:
-            return base.execute(_SCHEMA).fetchall() == [(_TABLE,)]
-    except (sqlite3.Error, UnicodeDecodeError):
-        return False
-
-
 def model_key(identity: Identity) -> bytes:
-    """Key of a model's samples: a hash of its identity.
+    """Return the key of a model's samples: a hash (16 bytes) of its identity.
 
     Raises:
         RefusedError: The identity is empty, or holds something that JSON does not.
@@ -269,6 +258,6 @@ def model_key(identity: Identity) -> bytes:
 
 
 def point_key(names: tuple[str, ...], point: Array) -> str:
-    """Key of a point: its inputs as JSON, exact to the last bit, in the order of their names."""
+    """Return the key of a point: its inputs as JSON in alphabetical order, exact to the bit."""
     values = {name: float(x) + 0.0 for name, x in zip(names, point, strict=True)}
     return json.dumps(values, sort_keys=True, separators=(",", ":"))

@@ -27,7 +27,7 @@ def from_data(
     bounds: Limits | None = None,
     law: Law | None = None,
 ) -> Claimed:
-    """Fuzzy number of measured values: P(claimed quantity in its cut at α) >= 1 − α at every α.
+    """Return the fuzzy number of measured values: P(claimed quantity in its α-cut) >= 1 − α.
 
     The probability is over repeated samples. Censored values may decide no cut at α, in one sample
     and not in another: without a bound on that side such samples count as ones whose cut contains
@@ -36,11 +36,9 @@ def from_data(
     For the next value, the median and a quantile this holds for any law, also with ties and steps,
     and any number of values. The values must be drawn independently, or at least exchangeably, from
     one law. Without bounds n values decide the cuts of the next value from α = 2/(n + 1) on, of the
-    median from 2^(1 − n), of the quantile q from qⁿ + (1 − q)ⁿ.
-
-    Where the law is continuous the coverage exceeds 1 − α by one step of the ranks at most: by
-    1/(n + 1) for the next value, by one binomial probability for a quantile (five values, median:
-    up to 0.31).
+    median from 2^(1 − n), of the quantile q from qⁿ + (1 − q)ⁿ. Where the law is continuous the
+    coverage exceeds 1 − α by 1/(n + 1) at most for the next value, by one binomial probability for
+    a quantile.
 
     Args:
         values: Numbers, or pairs (lower, upper) between which each value is known to lie; an
@@ -95,7 +93,7 @@ def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> t
 
 
 def mean_cuts(data: Observations) -> Stepwise:
-    """Cuts of the mean of any law within physical bounds.
+    """Return the α-cuts of the mean of any law within physical bounds, at the `LEVELS`.
 
     Without bounds no cuts hold for all laws: a rare, far value moves the mean and is not seen
     (Bahadur and Savage, Annals of Mathematical Statistics 27, 1956, 1115-1122). With bounds, the
@@ -123,7 +121,10 @@ def mean_cuts(data: Observations) -> Stepwise:
 
 @lru_cache(maxsize=64)
 def _band(n: int) -> Array:
-    """Half width of Smirnov's band: each side is left with half the probability of each level."""
+    """Return the half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1].
+
+    Each side of the band is left with half the probability of the level.
+    """
     from scipy.stats import ksone
 
     band: Array = ksone.isf(LEVELS / 2, n)

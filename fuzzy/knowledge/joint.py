@@ -22,7 +22,7 @@ from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise
 def jointly(
     inputs: Mapping[str, FuzzyNumber | float], *, independent: bool = False, means: str = ""
 ) -> dict[str, FuzzyNumber | float]:
-    """The inputs, claimed ones widened so that their box at α contains all with P >= 1 − α.
+    """Return the inputs, claimed ones widened: the box of their α-cuts has P >= 1 − α of all.
 
     Args:
         inputs: Fuzzy numbers by name; plain numbers are crisp.
@@ -53,7 +53,7 @@ def jointly(
 
 
 def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
-    """The inputs, plain numbers as crisp ones, with claims joined unless they are joined already.
+    """Return the inputs as fuzzy numbers whose claims hold jointly (`jointly`, if not done before).
 
     Raises:
         RefusedError: As `fuzzy_inputs` and `jointly`.
@@ -65,6 +65,7 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
 
 
 def _common(claimed: Mapping[str, Claimed]) -> str:
+    """Return the claimed quantity, such as "median", which must be the same for all inputs."""
     kinds = {number.claim.about for number in claimed.values()}
     cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
     require(
@@ -78,6 +79,7 @@ def _common(claimed: Mapping[str, Claimed]) -> str:
 
 
 def _require_different_values(claimed: Mapping[str, Claimed]) -> None:
+    """Refuse inputs stated to be independent of which two have the same cuts, from one sample."""
     for (first, number), (second, partner) in combinations(claimed.items(), 2):
         cure = f"{first} and {second} rest on the same values"
         require(
@@ -86,7 +88,7 @@ def _require_different_values(claimed: Mapping[str, Claimed]) -> None:
 
 
 def _widened(number: Claimed, rule: Joint) -> Claimed:
-    """The number with each cut at its joint level."""
+    """Return the number with its cut at β moved to the joint level α(β), which is higher."""
     steps = number.number
     level = rule.joined(np.asarray(steps.alpha))
     last = np.append(np.diff(level) > 0, True) & (level <= 1)  # of equal levels the last cut
@@ -114,7 +116,13 @@ class JointClaim:
     def from_inputs(
         cls, inputs: Mapping[str, FuzzyNumber], nature: str = "guaranteed"
     ) -> JointClaim:
-        """Claim of a result with these inputs and bounds of this nature."""
+        """Return the claim of a result of these inputs, with bounds of the given nature.
+
+        Args:
+            inputs: Fuzzy numbers by name.
+            nature: "attained", "estimated" or "guaranteed"; unless guaranteed, that the true range
+                stays inside the bounds is a condition.
+        """
         claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
         opinions = tuple(
             name
@@ -142,7 +150,7 @@ class JointClaim:
         return None if self.rule is None else Claim(self.rule.means, self.conditions)
 
     def __str__(self) -> str:
-        """The claim in one sentence; empty where nothing is fuzzy."""
+        """Return the claim as a sentence; without claims the names of the opinions, or nothing."""
         if self.rule is None:
             names = ", ".join(self.opinions)
             return names and f"{names}: opinions, so that no level has a probability"

@@ -43,6 +43,7 @@ class Knowledge:
     tests: int = 16
 
     def __post_init__(self) -> None:
+        """Refuse signs other than 1 and −1 and a number of tests that is no whole number."""
         real("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
@@ -74,7 +75,7 @@ class Knowledge:
                 chosen("output of knowledge", name, outputs)
 
     def stated(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
-        """Stated signs, 0 where none is, shape (outputs, inputs)."""
+        """Return the stated signs, shape (outputs, inputs), 0 where none is stated."""
         table = np.zeros((len(outputs), len(inputs)), np.int8)
         for name, sign in self.signs.items():
             column = inputs.index(name)
@@ -83,19 +84,19 @@ class Knowledge:
         return table
 
     def monotone_in(self, inputs: Sequence[str], outputs: Sequence[str]) -> Mask:
-        """Stated monotonicity of each output in each input, shape (outputs, inputs)."""
+        """Return whether each output is stated to be monotone in each input, (outputs, inputs)."""
         named = np.array([name in self.monotone for name in inputs])
         return np.asarray((self.stated(inputs, outputs) != 0) | named)
 
 
 def negligible(values: Array) -> Array:
-    """Largest differences due to rounding, shape (outputs,), from values (n, outputs)."""
+    """Return the largest difference due to rounding of each output, from values (n, outputs)."""
     size = np.nanmax(np.abs(values), axis=0)
     return np.asarray(ROUND_OFF * (np.nanmax(values, axis=0) - np.nanmin(values, axis=0) + size))
 
 
 def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Array] | None:
-    """The two samples that contradict the signs of one output the most, if any do.
+    """Return the pair of samples that contradicts the signs of an output most, None without one.
 
     Args:
         points: Samples, shape (n, inputs); of more than 400 a choice spread over the values.
@@ -104,7 +105,7 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
             equal in both samples.
 
     Returns:
-        Two points; the second should have the larger output and has not.
+        Two points (inputs,): by the signs the output cannot be smaller at the second, but it is.
     """
     rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MAX_COMPARED)).astype(int))]

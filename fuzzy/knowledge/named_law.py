@@ -29,13 +29,17 @@ them the wider cut holds.
 def law_cuts(
     data: Observations, law: Law, quantile: float | None, *, mean: bool
 ) -> tuple[Stepwise, float]:
-    """Cuts under a named law, and the least level at which they are finite without physical bounds.
+    """Return the α-cuts under a named law, and the least level at which both ends are finite.
 
     Args:
         data: The values.
         law: Name of the law.
         quantile: Probability of a quantile; None for the next value, or for the mean.
         mean: Whether the mean is meant.
+
+    Returns:
+        The cuts at the `LEVELS`, clipped to the physical bounds, and the level, which is 0 with
+        bounds on both sides.
 
     Raises:
         RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
@@ -69,7 +73,10 @@ def law_cuts(
 
 
 def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
-    """Ends of the cuts at all levels: mean + factor · deviation, widest over values' intervals."""
+    """Return lower and upper ends of the cuts at the `LEVELS`: mean + factor · deviation.
+
+    The widest ends over all values within their intervals are taken.
+    """
     below, above = _factors(data.count, quantile)
     least, most = _scatter(data)
     lower = data.lower.mean() + below * np.where(below < 0, most, least)
@@ -78,7 +85,10 @@ def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
 
 
 def _scatter(data: Observations) -> tuple[float, float]:
-    """Bounds of the standard deviation of values within intervals, by the triangle inequality."""
+    """Return least and greatest standard deviation of values anywhere within their intervals.
+
+    By the triangle inequality it differs from that of the middles by the norm of the half widths.
+    """
     middle, half = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
     spread, give = float(middle.std(ddof=1)), float(np.sqrt((half**2).sum() / (data.count - 1)))
     return max(spread - give, 0.0), spread + give
@@ -86,7 +96,14 @@ def _scatter(data: Observations) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)
 def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
-    """Factors of the standard deviation for the lower and the upper end at every level."""
+    """Return the factors of the standard deviation for lower and upper end at the `LEVELS`.
+
+    Student's t for next value, mean and median, the non-central t for other quantiles.
+
+    Args:
+        n: Number of values.
+        quantile: Probability of the quantile, 0.5 for mean and median; None for the next value.
+    """
     tail = LEVELS / 2
     if quantile is None or quantile == 0.5:
         from scipy.stats import t
@@ -102,7 +119,10 @@ def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
 
 
 def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
-    """Cuts clipped to the bounds, and the least level at which they are finite without them."""
+    """Return the cuts clipped to physical bounds, and the level from which on they are finite.
+
+    Below that level the cuts repeat the first finite one; with two bounds the level is 0.
+    """
     low, high = bounds
     upper = np.minimum.accumulate(np.clip(upper, low, high))
     # at α = 1 both are one point, to round-off
@@ -116,7 +136,7 @@ def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[St
 
 
 def from_scatter(mean: float, deviation: float, count: int) -> Claimed:
-    """Fuzzy number of the mean of a normal law whose deviation is known from elsewhere.
+    """Return the fuzzy number of the mean of a normal law with known standard deviation.
 
     Args:
         mean: Mean of the values.

@@ -32,7 +32,7 @@ class Observations:
 
     @classmethod
     def from_values(cls, values: Values, bounds: Limits | None = None) -> Observations:
-        """Observations from values as they were measured.
+        """Return the observations of values as they were measured, within physical bounds.
 
         Args:
             values: Numbers, shape (n,), or pairs of a lower and an upper end, shape (n, 2),
@@ -76,7 +76,7 @@ class Observations:
 
 
 def _limits(bounds: Limits | None) -> tuple[float, float]:
-    """Physical bounds; infinite where there is none."""
+    """Return the physical bounds as two floats, infinite where there is none."""
     lower, upper = (None, None) if bounds is None else bounds
     low = -np.inf if lower is None else real("lower bound", lower)
     high = np.inf if upper is None else real("upper bound", upper)
@@ -97,7 +97,12 @@ def _is_number(value: object) -> bool:
 
 
 def _pair(number: int, value: object) -> tuple[float, float]:
-    """Lower and upper end of one value."""
+    """Return the lower and upper end of a measured value, which is a number or a pair.
+
+    Args:
+        number: Position of the value in the list, from 1, for the message.
+        value: The value.
+    """
     ends = np.atleast_1d(np.asarray(value, object))
     plain = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
     if plain and all(_is_number(end) for end in ends):

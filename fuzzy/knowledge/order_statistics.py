@@ -41,7 +41,9 @@ class Windows:
 
 @lru_cache(maxsize=64)
 def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Windows:
-    """Windows of gaps for n values.
+    """Return the nested windows of gaps between n sorted values, and the level of each.
+
+    The largest window holds all n + 1 gaps; `_removes_lowest` says which gap is removed next.
 
     Args:
         n: Number of values.
@@ -64,7 +66,12 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
 
 
 def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
-    """Probability of each gap, of all below it, and of all above, three arrays (n + 1,)."""
+    """Return the probability of each gap, of all gaps below it and of all above, each (n + 1,).
+
+    Args:
+        n: Number of values.
+        quantile: Probability of the quantile; None for the next value, for which gaps are equal.
+    """
     from scipy.stats import binom
 
     gaps = np.arange(n + 1)
@@ -77,10 +84,16 @@ def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
 def _removes_lowest(
     gaps: tuple[Array, Array, Array], low: int, high: int, open_ends: tuple[bool, bool]
 ) -> bool:
-    """Whether the next gap to remove is the lowest one, not the highest.
+    """Return True if the next gap to remove is the lowest of the window, False if the highest.
 
     A gap at an open end is removed first, then the less probable one, then the one at the end from
     which less was removed.
+
+    Args:
+        gaps: Probabilities as of `_gaps`.
+        low: First gap of the window.
+        high: Last gap of the window.
+        open_ends: Whether the lowest and the highest gap of all have no physical bound.
     """
     inside, below, above = gaps
     left, right = open_ends[0] and low == 0, open_ends[1] and high == len(inside) - 1
@@ -92,11 +105,15 @@ def _removes_lowest(
 
 
 def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, float]:
-    """Cuts by ranks, and the least level at which the values (and bounds) decide both ends.
+    """Return the α-cuts from ranks, and the least level at which the values decide both ends.
 
     Args:
         data: The values.
         quantile: Probability of the quantile; None for the next value.
+
+    Returns:
+        The cuts; below the level they repeat the first that is finite. Physical bounds count as
+        ends.
 
     Raises:
         RefusedError: The values decide no cut at all.
@@ -121,7 +138,7 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
 
 
 def _centre(data: Observations, quantile: float) -> float:
-    """Cut at α = 1: the quantile of the sample."""
+    """Return the sample quantile, the cut at α = 1: mean of those of lower and of upper ends."""
     rows = (row[np.isfinite(row)] for row in (data.lower, data.upper))
     ends = [np.quantile(row, quantile) for row in rows if len(row)]
     return float(np.mean(ends)) if ends else np.nan

@@ -52,7 +52,7 @@ class Optimisation:
             real(key, getattr(self, key), positive=True, whole=True)
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Bounds of all outputs on all levels."""
+        """Return the bounds of all outputs on all levels that the search attains in its budget."""
         outputs = campaign(domain.modal[None]).columns
         try:
             for cut in cuts_with_width(campaign, domain):
@@ -63,7 +63,7 @@ class Optimisation:
         return attained_bounds(campaign, domain, self.name, ended=False)
 
     def _search(self, cut: CutSearch, outputs: tuple[str, ...]) -> None:
-        """Run the first points of a cut and the descents of all bounds."""
+        """Evaluate corners and spread points of a cut, and descend to the bounds of all outputs."""
         points = _spread(len(cut.uncertain_inputs), self.look, cut.level)
         allowed = np.concatenate([cut.corners, points[cut.slack(points) >= 0]])
         if len(allowed):
@@ -74,7 +74,7 @@ class Optimisation:
 
 
 def _spread(inputs: int, look: int, level: int) -> Array:
-    """`look` Halton points of the unit cube for each input."""
+    """Return `look` scrambled Halton points per input, shape (look · inputs, inputs), in [0, 1]."""
     from scipy.stats import qmc
 
     rng = np.random.default_rng([0, level])
@@ -82,7 +82,13 @@ def _spread(inputs: int, look: int, level: int) -> Array:
 
 
 def _best(cut: CutSearch, bound: Bound, count: int) -> Array:
-    """The best few samples in the cut that lie in different parts of it, in unit coordinates."""
+    """Return up to `count` of the best samples in the cut, from which descents begin.
+
+    Any two of them differ by more than a quarter of the cut's width in an input.
+
+    Returns:
+        Unit coordinates, best first, shape (≤ count, uncertain inputs).
+    """
     samples = cut.campaign.samples
     inside = cut.contains(samples.points)
     unit = cut.unit(samples.points[inside])

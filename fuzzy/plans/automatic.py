@@ -86,7 +86,7 @@ class _Search:
         self.ended = False
 
     def run(self) -> Bounds:
-        """Bounds of every output, with the nature that the search gives them."""
+        """Return the bounds of every output, estimated or attained as the search found out."""
         try:
             if self.cuts:
                 self._search()
@@ -97,7 +97,10 @@ class _Search:
         )
 
     def _search(self) -> None:
-        """Run the corners of the outputs whose effects keep their signs, and search the others."""
+        """Evaluate the corners for outputs whose effects keep their signs, and search the others.
+
+        It sets `monotone`, `searched` and `linkage`.
+        """
         widest = self.cuts[-1]
         first: Array = np.empty((0, len(widest.uncertain_inputs)))
         if not self.domain.interactions:
@@ -121,7 +124,10 @@ class _Search:
             self.linkage.sample()
 
     def _judge(self, bounds: Bounds) -> Bounds:
-        """The bounds with errors, natures and what they rest on."""
+        """Return the attained bounds with the error and nature of each output and the notes.
+
+        Bounds of monotone outputs, and of those whose search met its stopping rule, are estimated.
+        """
         estimated = self.monotone.copy()
         for column, output in enumerate(self.outputs):
             estimated[column] |= self.linkage is not None and self.linkage.is_estimate(output)
@@ -139,7 +145,7 @@ class _Search:
         )
 
     def _notes(self) -> list[str]:
-        """What the estimates rest on, and which outputs have none."""
+        """Return sentences on what the estimates rest on and on bounds at kinks or jumps."""
         notes = []
         if self.monotone.any():
             names = _listed(np.array(self.outputs)[self.monotone])
@@ -153,6 +159,6 @@ class _Search:
 
 
 def _listed(names: Iterable[str]) -> str:
-    """The first four names."""
+    """Return a text of the first four names."""
     first = list(names)
     return ", ".join(first[:4]) + (" …" if len(first) > 4 else "")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -87,7 +88,10 @@ class CutSearch:
         return np.asarray(self.domain.inside(points)[self.level])
 
     def values(self, unit: Array, bound: Bound) -> Array:
-        """Values of sign · output at points of the unit cube; inf where not allowed or failed."""
+        """Return sign · output at points (n, uncertain inputs) of the unit cube, shape (n,).
+
+        It is infinite where the interactions do not allow a point or its sample failed.
+        """
         inside = self.slack(unit) >= 0
         values: Array = np.full(len(unit), np.inf)
         if inside.any():
@@ -96,17 +100,24 @@ class CutSearch:
         return np.where(np.isnan(values), np.inf, values)
 
     def output_range(self, output: str) -> float:
-        """Range of an output over all samples, or 1: the unit of its slopes."""
+        """Return the range of an output over all samples, the unit of its slopes; 1 if it is 0."""
         values = self.campaign.samples.values
         column = values.array[:, values.column(output)]
         span = float(np.nanmax(column) - np.nanmin(column))
         return span if span >= np.finfo(float).tiny else 1.0
 
     def steepest(self, point: Array, output: str) -> float:
-        """Largest slope at a point (inputs,) along inputs that are not at an end there.
+        """Return the largest slope of an output at a point, along inputs inside their cuts there.
 
-        Both sides along each input, in ranges of the output over the width of the cut: nearly 0 at
-        a smooth optimum, not at a kink or a jump, nor where a descent stalled.
+        Differences to both sides are taken, so that kinks and jumps show.
+
+        Args:
+            point: Inputs, shape (inputs,).
+            output: Name of the output.
+
+        Returns:
+            The slope in ranges of the output over the width of the cut; 0 if all inputs are at an
+            end.
         """
         unit = self.unit(point[None])[0]
         inner = np.flatnonzero((unit > _LARGE_DIFFERENCE) & (unit < 1 - _LARGE_DIFFERENCE))
@@ -118,59 +129,87 @@ class CutSearch:
         return float(slopes.max(initial=0.0))
 
     def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
-        """Result of a descent by gradients inside the cut; its samples stay in the campaign.
+        """Return the local optimum that a gradient descent inside the cut reaches.
+
+        L-BFGS-B, or SLSQP with interactions, on differences; all samples stay in the campaign.
 
         Args:
             start: Allowed point in unit coordinates, shape (uncertain inputs,).
-            bound: What is minimised.
+            bound: Output and sign that are minimised.
             first_step: Longest first step in unit coordinates: a short one does not leave the basin
                 of its start. Without limit it mostly reaches a face at once.
         """
+        objective = _Objective(self, bound, start, first_step)
+        if self.domain.interactions:
+            return self._descend_with_interactions(objective, start)
+        ends = {"ftol": _LEAST_CHANGE * objective.factor, "gtol": _LEAST_SLOPE * objective.factor}
+        end = objective.minimise(start, "L-BFGS-B", ends)
+        value = objective.start_value + objective.unit * float(end.fun) / objective.factor
+        slope = _free_slope(end.x, end.jac / objective.factor)
+        return Optimum(self, bound, self.points(end.x[None])[0], value, slope)
+
+    def _descend_with_interactions(self, objective: _Objective, start: Array) -> Optimum:
+        """Return the better of the start and SLSQP's result, moved back until it is allowed."""
+        slack = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
+        ends = {"ftol": _LEAST_MODEL_CHANGE * objective.factor}
+        end = objective.minimise(start, "SLSQP", ends, constraints=[slack])
+        candidates = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
+        values = self.values(candidates, objective.bound)
+        best = int(values.argmin())
+        point = self.points(candidates)[best]
+        return Optimum(self, objective.bound, point, float(values[best]), np.inf)
+
+
+class _Objective:
+    """Change of sign · output from the start of a descent, in ranges of the output.
+
+    It is scaled by `factor`, since both minimisers begin with a step of one gradient.
+
+    Args:
+        cut: Where the descent takes place.
+        bound: Output and sign that are minimised.
+        start: Allowed point in unit coordinates, shape (uncertain inputs,).
+        first_step: Longest first step in unit coordinates.
+    """
+
+    def __init__(self, cut: CutSearch, bound: Bound, start: Array, first_step: float) -> None:
+        self.cut, self.bound = cut, bound
+        self.unit = cut.output_range(bound.output)
+        self.start_value = float(cut.values(start[None], bound)[0])
+        self.factor = 1.0
+        slope = float(np.linalg.norm(self(start)[1]))
+        self.factor = min(_STEEPNESS, first_step / max(slope, _FLAT))
+
+    def __call__(self, unit: Array) -> tuple[float, Array]:
+        """Return value and gradient at a point of the unit cube, by one-sided differences."""
+        steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
+        points = self.cut.points(np.concatenate([unit[None], unit + np.diag(steps)]))
+        rows = self.cut.campaign(points)
+        values = self.bound.sign * rows.array[:, rows.column(self.bound.output)]
+        changes = np.nan_to_num((values - self.start_value) / self.unit, nan=_FAILED)
+        gradient = (changes[1:] - changes[0]) / steps
+        return self.factor * float(changes[0]), self.factor * gradient
+
+    def minimise(
+        self, start: Array, algorithm: str, ends: Mapping[str, float], **settings: object
+    ) -> Any:
+        """Return SciPy's result of a minimisation over the unit cube."""
         from scipy.optimize import minimize
 
-        span = self.output_range(bound.output)
-        first = self.values(start[None], bound)[0]
-
-        def shares(unit: Array) -> tuple[float, Array]:
-            """Change of value from the start, and gradient, in ranges of the output."""
-            steps = np.where(unit + _DIFFERENCE > 1, -_DIFFERENCE, _DIFFERENCE)
-            rows = self.campaign(self.points(np.concatenate([unit[None], unit + np.diag(steps)])))
-            values = bound.sign * rows.array[:, rows.column(bound.output)]
-            changes = np.nan_to_num((values - first) / span, nan=_FAILED)
-            return float(changes[0]), (changes[1:] - changes[0]) / steps
-
-        # both minimisers begin with a step of one gradient
-        factor = min(_STEEPNESS, first_step / max(float(np.linalg.norm(shares(start)[1])), _FLAT))
-
-        def objective(unit: Array) -> tuple[float, Array]:
-            change, gradient = shares(unit)
-            return factor * change, factor * gradient
-
+        options = {"maxiter": _MAX_ITERATIONS, **ends}
         cube = [(0.0, 1.0)] * len(start)
-        settings = {"x0": start, "jac": True, "bounds": cube}
-        if not self.domain.interactions:
-            ends = {"ftol": _LEAST_CHANGE * factor, "gtol": _LEAST_SLOPE * factor}
-            options = {"maxiter": _MAX_ITERATIONS, **ends}
-            end = minimize(objective, method="L-BFGS-B", options=options, **settings)
-            value = first + span * float(end.fun) / factor
-            slope = _free_slope(end.x, end.jac / factor)
-            return Optimum(self, bound, self.points(end.x[None])[0], value, slope)
-        room = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
-        options = {"maxiter": _MAX_ITERATIONS, "ftol": _LEAST_MODEL_CHANGE * factor}
-        end = minimize(objective, method="SLSQP", constraints=[room], options=options, **settings)
-        candidates = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
-        values = self.values(candidates, bound)
-        best = int(values.argmin())
-        return Optimum(self, bound, self.points(candidates)[best], float(values[best]), np.inf)
+        return minimize(
+            self, start, jac=True, bounds=cube, method=algorithm, options=options, **settings
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """Result of a descent.
+    """Local optimum that a descent has reached.
 
     Args:
-        cut: Where it was made.
-        bound: What was minimised.
+        cut: The cut in which it was searched.
+        bound: Output and sign that were minimised.
         point: Inputs, shape (inputs,).
         value: sign · output there.
         slope: Largest slope along an input that can still change, in ranges of the output over the
@@ -185,9 +224,9 @@ class Optimum:
 
     @cached_property
     def is_smooth(self) -> bool:
-        """Whether the output has nearly no slope there, on any side: false at kinks and jumps.
+        """Whether the output has nearly no slope at the optimum: False at kinks and jumps.
 
-        False, too, where the budget does not carry the samples that tell.
+        Also False if the budget does not allow the samples that decide it.
         """
         if self.slope <= _MAX_SLOPE:
             return True
@@ -197,10 +236,10 @@ class Optimum:
             return False
 
     def holds_in(self, cut: CutSearch) -> bool:
-        """Whether it is an optimum of another cut, too.
+        """Return whether the point is a local optimum of another cut as well.
 
-        It is one of a narrower cut that it lies in, and of a wider one unless a face of its own cut
-        stopped the descent.
+        It is one of a narrower cut that contains it, and of a wider one unless a face of its own
+        cut stopped the descent.
         """
         if self.cut.level <= cut.level:
             return bool(cut.contains(self.point[None])[0])
@@ -210,13 +249,13 @@ class Optimum:
 
 
 def _free_slope(unit: Array, gradient: Array) -> float:
-    """Largest slope of a minimum along inputs that the cube does not stop from falling."""
+    """Return the largest component of a gradient that does not point out of the unit cube."""
     stopped = ((unit <= 0) & (gradient > 0)) | ((unit >= 1) & (gradient < 0))
     return float(np.abs(np.where(stopped, 0.0, gradient)).max(initial=0.0))
 
 
 def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[CutSearch]:
-    """Cuts that have a width, from the narrowest on."""
+    """Yield the cuts in which an input is uncertain, from the narrowest to the widest."""
     for level in reversed(range(len(domain.alpha))):
         cut = CutSearch(campaign, domain, level)
         if len(cut.uncertain_inputs):
@@ -224,7 +263,7 @@ def cuts_with_width(campaign: Campaign, domain: Domain) -> Iterator[CutSearch]:
 
 
 def attained_bounds(campaign: Campaign, domain: Domain, method: str, *, ended: bool) -> Bounds:
-    """Bounds from all samples of a search, with a note where the budget ended it."""
+    """Return the bounds that all samples of a search attain; a note says if the budget ended it."""
     bounds = bounds_of_samples(domain, campaign.samples, method)
     note = "the budget ended the search: a larger one may find more"
     return replace(bounds, notes=(note,)) if ended else bounds

@@ -51,7 +51,9 @@ class Design:
         return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
 
     def bounds(self, values: Values, method: str) -> Bounds:
-        """Retransformation: attained extremes of the samples of each level and of those above it.
+        """Return the attained bounds: extremes over the samples of each level and those above it.
+
+        This is the retransformation of Hanss (2005).
 
         Args:
             values: Outputs at `points`; NaN where a sample failed and was skipped.
@@ -73,7 +75,17 @@ class Design:
         )
 
     def _extremes(self, values: Array) -> Rows:
-        """Rows of the least values, shape (levels, outputs)."""
+        """Return the row of the sample with the least value, for each level and output.
+
+        Args:
+            values: Outputs at the samples, shape (n, outputs); NaN where a sample failed.
+
+        Returns:
+            Rows of `points`, shape (levels, outputs).
+
+        Raises:
+            FailedError: A level has no sample with a value.
+        """
         columns = np.arange(values.shape[1])
         usable = np.where(np.isnan(values), np.inf, values)
         best: list[Rows] = []
@@ -90,13 +102,15 @@ class Design:
 
 
 def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
-    """Bounds in which each level uses all samples that lie in its cut."""
+    """Return the bounds that samples attain; each level uses all samples that lie in its cut."""
     levels = tuple(np.flatnonzero(inside) for inside in domain.inside(samples.points))
     return Design(domain, samples.points, levels).bounds(samples.values, method)
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """The bounds, guaranteed for the outputs whose corners the knowledge proves to suffice.
+    """Return the bounds, guaranteed for outputs whose extremes lie at corners by the knowledge.
+
+    Further samples inside the cuts test the knowledge first.
 
     Args:
         bounds: Bounds attained at the corners that the knowledge names.
@@ -136,10 +150,10 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
 
 
 def _test_points(domain: Domain, campaign: Campaign) -> Array:
-    """Points inside the cuts that the corners know nothing of, shape (n, inputs).
+    """Return points inside the cuts at which stated knowledge is tested, shape (n, inputs).
 
-    The narrowest cut that has a width takes all tests, a wider one a quarter besides: what lies in
-    a narrower cut tests a wider one, too.
+    The narrowest cut that has a width gets all tests, each wider one a quarter as many: points of a
+    narrower cut lie in the wider ones, too. The budget limits their number.
     """
     lower, upper = domain.boxes
     widths, tests, points = upper - lower, campaign.knowledge.tests, list[Array]()
@@ -153,7 +167,7 @@ def _test_points(domain: Domain, campaign: Campaign) -> Array:
 
 
 def _refuted(bounds: Bounds, samples: Samples) -> Mask:
-    """Outputs of which a sample exceeds the values at the corners of its cut."""
+    """Return the outputs of which a sample exceeds all corners of its cut, a mask (outputs,)."""
     sampled = bounds_of_samples(Domain(bounds.inputs, tuple(bounds.alpha)), samples, "")
     small = negligible(samples.values.array)
     low, high = sampled.lower < bounds.lower - small, sampled.upper > bounds.upper + small
@@ -161,7 +175,7 @@ def _refuted(bounds: Bounds, samples: Samples) -> Mask:
 
 
 def _between(bounds: Bounds, pair: tuple[Array, Array] | None) -> str:
-    """The two samples in words."""
+    """Return a text that names the two samples which contradict a sign; empty without a pair."""
     if pair is None:
         return ""
     places = [

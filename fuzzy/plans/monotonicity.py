@@ -36,7 +36,7 @@ class Effects:
     signs: Signs
 
     def notes(self, domain: Domain) -> tuple[str, ...]:
-        """A sentence for each effect without a sign, with the highest level where it has none."""
+        """Return a sentence for each effect of unknown sign, with the highest such level."""
         return tuple(
             f"output {output} is not monotone in input {name}, or not surely, up to α ="
             f" {domain.alpha[np.flatnonzero(signs == 0)[-1]]:g}"
@@ -47,7 +47,10 @@ class Effects:
 
 
 def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) -> Effects:
-    """Find the sign of every effect on every level, from the widest box up.
+    """Return the sign of every input's effect on every output, level by level.
+
+    Stated signs are tested at pairs of points; the others are observed at probes, from the widest
+    box to the narrowest. A sign holds on all narrower boxes.
 
     Args:
         campaign: The model with the knowledge about it.
@@ -74,9 +77,10 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
 
 
 def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, column: int) -> Array:
-    """Pairs of points that differ in one input alone, at its two bounds, to test its stated sign.
+    """Return points that test the stated sign of one input, without repetitions, (points, inputs).
 
-    The other inputs have their modal values, or those of an extreme corner of a pattern of signs.
+    Each pair has the input at its lower and upper bound and the others at their modal values, or at
+    the corner at which an output is least or greatest.
 
     Args:
         modal: Modal values, shape (inputs,).
@@ -84,9 +88,6 @@ def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, co
         lower: Lower bounds of the box, shape (inputs,).
         upper: Upper bounds of the box, shape (inputs,).
         column: Index of the input.
-
-    Returns:
-        Points without repetitions, shape (points, inputs).
     """
     points = np.repeat(np.concatenate([modal[None], _extreme(signs, lower, upper)]), 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
@@ -94,7 +95,11 @@ def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, co
 
 
 def _extreme(signs: Signs, lower: Array, upper: Array) -> Array:
-    """The two extreme corners for every pattern of signs that occurs, shape (corners, inputs)."""
+    """Return the corners of least and greatest output for each distinct row of signs.
+
+    Returns:
+        Points of shape (2 · distinct rows, inputs).
+    """
     rises = np.unique(signs >= 0, axis=0)
     return np.concatenate([np.where(rises, lower, upper), np.where(rises, upper, lower)])
 
@@ -109,7 +114,15 @@ class _Box:
     upper: Array
 
     def observed_signs(self, modal: Array, stated: Signs) -> Signs:
-        """Signs that slopes have at all probes, with the margin, else 0; (outputs, inputs)."""
+        """Return the sign of the slopes at all probes of the box, shape (outputs, inputs).
+
+        It is 0 where slopes differ in sign, or the smallest is below 5 % of their range; and 1 for
+        an input without any effect.
+
+        Args:
+            modal: Modal values of the inputs, shape (inputs,).
+            stated: Signs known before, 0 where they are to be observed, shape (outputs, inputs).
+        """
         free = np.flatnonzero((stated == 0).any(axis=0))
         first = np.sign(self._slopes(modal[None], free)[0]).astype(np.int8)
         corners = _extreme(np.where(stated != 0, stated, first), self.lower, self.upper)
@@ -128,9 +141,11 @@ class _Box:
         return self.lower + unit * (self.upper - self.lower)
 
     def _slopes(self, points: Array, inputs: Rows) -> Array:
-        """One-sided difference quotients by some inputs, (n, outputs, inputs); 0 by the others.
+        """Return one-sided difference quotients at points (n, inputs), shape (n, outputs, inputs).
 
-        Their points stay inside the box.
+        Args:
+            points: Points of the box; differences stay inside it.
+            inputs: Columns of the inputs that are varied; the slopes of the others are 0.
         """
         values = self._values(points)
         slopes = np.zeros((*values.shape, points.shape[1]))

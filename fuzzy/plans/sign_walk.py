@@ -52,7 +52,7 @@ class SignWalk:
         return self.steps + 2 * (2 if len(self.cut.uncertain_inputs) > 1 else 1)
 
     def corners_suffice(self) -> Mask:
-        """Mask of the outputs that the corners of all cuts bound, by all samples, shape (outputs,).
+        """Return the outputs that two corners of each cut bound, by all samples, a mask (outputs,).
 
         Evaluates those corners, which are samples of the campaign afterwards.
         """
@@ -68,9 +68,11 @@ class SignWalk:
         return monotone
 
     def _signs_along_walk(self) -> Signs:
-        """Sign of the differences by each input, shape (outputs, uncertain inputs).
+        """Return the sign of the differences by each input along the walk.
 
-        It is 0 where differences have both signs or are NaN, and 1 of an input without effect.
+        Returns:
+            Signs of shape (outputs, uncertain inputs): 0 where differences have both signs or are
+            NaN, 1 for an input without effect.
         """
         inputs = len(self.cut.uncertain_inputs)
         steps = self.steps * inputs
@@ -90,8 +92,9 @@ class SignWalk:
         """Evaluate the corners of each cut, and steps along each input from two of the widest cut.
 
         Args:
-            signs: Sign of each input's effect on an output, shape (uncertain inputs,); the two
-                corners are where that output is greatest and least.
+            signs: Sign of each input's effect on an output, shape (uncertain inputs,). The output
+                is greatest at the corner with all inputs of positive sign at their upper ends, and
+                least at the opposite one.
         """
         greatest = (signs > 0).astype(float)
         corners = np.stack([greatest, 1 - greatest])

@@ -54,20 +54,36 @@ _MAX_DRAWS = 10**6  # points drawn for one round where the interactions allow fe
 def critical_distance(
     samples: int, inputs: int, volume: float = 1.0, sigma: float = SIGMA_ONE_HUMP
 ) -> float:
-    """Distance r in the unit cube within which a better sample makes a descent superfluous."""
+    """Return the critical distance r in the unit cube, as the module's docstring defines it.
+
+    Args:
+        samples: N, uniform samples of the cut.
+        inputs: d, uncertain inputs.
+        volume: V, the fraction of the cut that the interactions allow.
+        sigma: σ.
+    """
     ball = sigma * gamma(1 + inputs / 2) * volume * log(samples) / samples
     return float(ball ** (1 / inputs) / sqrt(pi))
 
 
 def uncovered_share(samples: int, optima: int) -> float:
-    """Expected share of the basins not yet seen; infinite before two samples and an optimum."""
+    """Return the expected fraction of the cut in basins not yet seen (Boender, Rinnooy Kan 1987).
+
+    It is infinite with fewer than two samples or no optimum.
+    """
     if samples < 2 or not optima:
         return inf
     return optima * (optima + 1) / (samples * (samples - 1))
 
 
 def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
-    """Rows of the points (n, d) with finite values (n,) that have no better one within reach."""
+    """Return the rows of the samples from which descents start: no better sample within `distance`.
+
+    Args:
+        unit: Samples, shape (n, d), in unit coordinates.
+        values: Values that are minimised, shape (n,); infinite ones start no descent.
+        distance: Critical distance.
+    """
     from scipy.spatial import cKDTree
 
     pairs = cKDTree(unit).query_pairs(distance, output_type="ndarray")
@@ -106,7 +122,7 @@ class BoundSearch:
         return bool(self.optima) and self.best.is_smooth
 
     def n_humps(self, cut: CutSearch) -> int:
-        """Number of optima that are no corner of the cut."""
+        """Return the number of optima that are no corner of the cut."""
         at_ends = [
             (optimum.point <= cut.lower + cut.near) | (optimum.point >= cut.upper - cut.near)
             for optimum in self.optima
@@ -114,17 +130,20 @@ class BoundSearch:
         return sum(not ends.all() for ends in at_ends)
 
     def is_estimate(self, uncovered: float) -> bool:
-        """Whether the bound is known to a tolerance, as far as the rule tells."""
+        """Return whether the stopping rule is met and the output is smooth at the best optimum."""
         return self.samples >= MIN_SAMPLES and self.share < uncovered and self.is_smooth
 
     def is_open(self, uncovered: float) -> bool:
-        """Whether more samples are wanted; none where the best optimum is at a kink or a jump."""
+        """Return whether the search goes on; kinks and jumps at the best optimum end it, too."""
         if self.samples < MIN_SAMPLES or not self.optima:
             return True
         return self.share >= uncovered and self.is_smooth
 
     def asked(self, uncovered: float) -> int:
-        """Samples with which the rule is met if no other optimum appears; at most doubled."""
+        """Return the number of samples that meet the stopping rule if no new optimum appears.
+
+        It is at most twice the present number.
+        """
         count = len(self.optima)
         rule = ceil(0.5 + sqrt(0.25 + count * (count + 1) / uncovered)) + 1
         return max(MIN_SAMPLES, min(max(rule, self.samples + _MIN_NEW), 2 * self.samples))
@@ -170,7 +189,7 @@ class SingleLinkage:
         self._exhausted: set[int] = set()  # levels of cuts that the interactions leave no volume
 
     def run(self, first: Array) -> None:
-        """Sample and descend, all cuts in turn, until every bound meets the rule.
+        """Sample and descend, cut by cut in rounds, until every bound meets the stopping rule.
 
         Args:
             first: Uniform samples of the widest cut in unit coordinates, (n, uncertain inputs).
@@ -189,17 +208,17 @@ class SingleLinkage:
                 self.campaign.report(1 - (1 - 0.8 * number / len(visits)) / rounds)
 
     def is_estimate(self, output: str) -> bool:
-        """Whether both bounds of an output are known to the tolerance in all cuts."""
+        """Return whether both bounds of an output meet the stopping rule in all cuts."""
         states = [state for (_, bound), state in self.states.items() if bound.output == output]
         return bool(states) and all(state.is_estimate(self.uncovered) for state in states)
 
     def is_rough(self, output: str) -> bool:
-        """Whether the best optimum of a bound lies at a kink or a jump in a cut."""
+        """Return whether the best optimum of a bound of the output is at a kink or jump."""
         states = [state for (_, bound), state in self.states.items() if bound.output == output]
         return any(state.optima and not state.is_smooth for state in states)
 
     def summary(self) -> str:
-        """Sentence about the bound whose cut is covered least."""
+        """Return a sentence on the bound with the largest uncovered fraction of its cut."""
         worst = max(self.states.values(), key=lambda state: state.share)
         return (
             f"W = {len(worst.optima)} optima found from N = {worst.samples} samples: of each cut"
@@ -207,12 +226,15 @@ class SingleLinkage:
         )
 
     def sample(self) -> None:
-        """Run the fewest samples of each cut, without any descent."""
+        """Evaluate `MIN_SAMPLES` uniform samples of each cut, without descents."""
         for cut in self.cuts:
             self._fill(cut, MIN_SAMPLES, 0)
 
     def _open(self, cut: CutSearch) -> list[Bound]:
-        """Bounds of a cut that do not meet the rule; descents from better values come first."""
+        """Return the bounds of a cut whose search goes on.
+
+        Before, each bound descends from any sample that is better than its optima.
+        """
         for bound in self.bounds:
             self._descend_from_better(cut, bound)
         if cut.level in self._exhausted:
@@ -221,7 +243,7 @@ class SingleLinkage:
         return [bound for bound, state in states if state.is_open(self.uncovered)]
 
     def _descend_from_better(self, cut: CutSearch, bound: Bound) -> None:
-        """Descend from the best sample of any search if it is better than all optima."""
+        """Descend from the best of all samples in the cut if it is better than all known optima."""
         state, samples = self.states[cut.level, bound], self.campaign.samples
         if not state.optima:
             return
@@ -232,7 +254,11 @@ class SingleLinkage:
             self._descend_from(cut, bound, cut.unit(samples.points[inside][best][None])[0])
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
-        """Descend, and again with short steps where the first descent passed over a hump."""
+        """Descend from a start and keep the optimum.
+
+        If values do not fall all along the straight line to it, the descent has left the basin of
+        its start; it is repeated with a short first step.
+        """
         optimum = cut.descend(start, bound)
         self._keep(optimum)
         step = cut.unit(optimum.point[None])[0] - start
@@ -242,7 +268,10 @@ class SingleLinkage:
                 self._keep(cut.descend(start, bound, FIRST_STEP))
 
     def _keep(self, optimum: Optimum) -> None:
-        """Add an optimum to all cuts of which it is a new one, or a better value of one."""
+        """Add an optimum to the list of every cut of which it is a local optimum.
+
+        An equal optimum in the list is replaced if its value is worse.
+        """
         for cut in self.cuts:
             if not optimum.holds_in(cut):
                 continue
@@ -254,9 +283,9 @@ class SingleLinkage:
                 optima[number] = optimum
 
     def _number(self, cut: CutSearch, optimum: Optimum) -> int:
-        """Index of the same optimum among those of a cut; their count if it is a new one.
+        """Return the index of an equal optimum in the list of a cut; its length if there is none.
 
-        Optima of nearly one value are the same if they are close, or if no value between them is
+        Optima of nearly one value are equal if they are close, or if no value between them is
         larger: a valley is where many descents end, and symmetric hills are several.
         """
         optima, near = self.states[cut.level, optimum.bound].optima, self._near(optimum.bound)
@@ -273,20 +302,23 @@ class SingleLinkage:
         return len(optima)
 
     def _near(self, bound: Bound) -> float:
-        """Difference of values within which optima count as one."""
+        """Return the difference of values within which two optima count as equal."""
         values = self._values[bound][np.isfinite(self._values[bound])]
         span = VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max()
         return float(span)
 
     def _fill(self, cut: CutSearch, asked: int, rounds: int) -> None:
-        """Run the model at new uniform samples of a cut until there are as many as asked."""
+        """Evaluate new uniform samples of a cut until it has as many as `asked`."""
         missing = asked - len(self._rows(cut))
         if missing > 0:
             rng = np.random.default_rng([self.seed, 1 + cut.level, rounds])
             self._add(cut, self._draw(cut, missing, rng))
 
     def _descend(self, cut: CutSearch, bounds: list[Bound]) -> None:
-        """Run the descents that the samples and the corners of a cut start."""
+        """Descend from those samples and corners of a cut that have no better one nearby.
+
+        With two optima inside the cut the critical distance is reduced (σ = 2 in place of 4).
+        """
         rows = self._rows(cut)
         if len(rows) < 2:  # the interactions leave next to nothing
             return
@@ -307,13 +339,14 @@ class SingleLinkage:
             state.samples = len(rows)
 
     def _rows(self, cut: CutSearch) -> Rows:
-        """Rows of the samples that are uniform in a cut: its own, and those of wider ones."""
+        """Return the rows of the samples that are uniform in a cut: its own and of wider cuts."""
         return np.flatnonzero((self._levels <= cut.level) & cut.contains(self._points))
 
     def _draw(self, cut: CutSearch, count: int, rng: np.random.Generator) -> Array:
-        """Uniform points of a cut that the interactions allow, in unit coordinates.
+        """Return `count` uniform points of the allowed part of a cut, (count, uncertain inputs).
 
-        There may be fewer than `count` where the interactions allow next to nothing.
+        They are in unit coordinates. There may be fewer where the interactions allow next to
+        nothing.
         """
         allowed: Array = np.empty((0, len(cut.uncertain_inputs)))
         drawn = 0
@@ -326,7 +359,7 @@ class SingleLinkage:
         return allowed[:count]
 
     def _add(self, cut: CutSearch, unit: Array) -> None:
-        """Run the model at uniform samples of a cut."""
+        """Evaluate uniform samples (n, uncertain inputs) of a cut and append them."""
         if len(unit):
             points = cut.points(unit)
             rows = self.campaign(points)

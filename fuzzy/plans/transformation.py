@@ -34,7 +34,7 @@ _ROUND_OFF = 1e-13
 def hanss_points(
     number: FuzzyNumber, alpha: Sequence[float], *, inner: bool = True
 ) -> list[list[float]]:
-    """Points of every level by Hanss' recursion.
+    """Return the points of every level by the recursion of the transformation method (Hanss 2005).
 
     Args:
         number: A fuzzy number or interval.
@@ -62,7 +62,7 @@ def hanss_points(
 
 
 def _merged(x: float, points: list[float], width: float) -> float:
-    """The listed point that differs from x by round-off only, otherwise x, which is then listed."""
+    """Return the listed point that equals x but for round-off, else x, which is then listed."""
     index = bisect_left(points, x - _ROUND_OFF * width)
     if index < len(points) and points[index] - x <= _ROUND_OFF * width:
         return points[index]
@@ -71,7 +71,10 @@ def _merged(x: float, points: list[float], width: float) -> float:
 
 
 def grids(domain: Domain, refined: Collection[str]) -> list[list[list[float]]]:
-    """Points of each level and input, rising; those between the ends of refined inputs only."""
+    """Return the points of each level and input, rising, as a list by level of lists by input.
+
+    Points between the ends of a cut are added for inputs in `refined` only.
+    """
     columns = [
         hanss_points(number, domain.alpha, inner=name in refined)
         for name, number in domain.inputs.items()
@@ -80,7 +83,7 @@ def grids(domain: Domain, refined: Collection[str]) -> list[list[list[float]]]:
 
 
 def _combined(campaign: Campaign, domain: Domain, refined: Collection[str], method: str) -> Design:
-    """Design of all combinations of the points of each level."""
+    """Return the design with all combinations of the inputs' points on each level."""
     levels = grids(domain, refined)
     require_budget(sum(prod(map(len, grid)) for grid in levels), campaign, method)
     return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in levels])
@@ -89,7 +92,14 @@ def _combined(campaign: Campaign, domain: Domain, refined: Collection[str], meth
 def _transformed(
     campaign: Campaign, domain: Domain, refined: Collection[str], method: str
 ) -> Bounds:
-    """Bounds from all combinations, guaranteed where corners suffice."""
+    """Evaluate all combinations and return their bounds, guaranteed where corners suffice.
+
+    Args:
+        campaign: The model with the knowledge about it.
+        domain: Inputs and levels.
+        refined: Inputs with points between the ends of their cuts.
+        method: Name of the method.
+    """
     domain.require_free(method)
     design = _combined(campaign, domain, refined, method)
     bounds = design.bounds(campaign(design.points), method)
@@ -98,11 +108,11 @@ def _transformed(
 
 
 def corners_suffice(domain: Domain, monotone: Mask) -> Mask:
-    """Outputs that are monotone in all inputs that have a width, shape (outputs,).
+    """Return the outputs that are monotone in every input that has a width, a mask (outputs,).
 
     Args:
         domain: Inputs and levels.
-        monotone: Whether each output is so in each input, shape (outputs, inputs).
+        monotone: Whether each output is monotone in each input, shape (outputs, inputs).
     """
     lower, upper = domain.boxes
     return np.asarray((monotone | (lower[0] == upper[0])).all(axis=1))
@@ -219,7 +229,7 @@ class Signed:
 
 
 def _verified(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
-    """Bounds from the samples of a design, guaranteed where all signs are stated."""
+    """Evaluate a design and return its bounds, guaranteed where all signs are stated."""
     corners = design.bounds(campaign(design.points), method)
     stated = campaign.knowledge.stated(design.domain.names, corners.outputs) != 0
     proved = corners_suffice(design.domain, stated) & np.isin(corners.outputs, effects.outputs)
@@ -236,7 +246,7 @@ def _verified(design: Design, campaign: Campaign, effects: Effects, method: str)
 
 
 def _size(effects: Effects, domain: Domain) -> float:
-    """Number of samples of the signed plan; there may be too many to list."""
+    """Return the number of samples of the signed plan, a float: there may be too many to list."""
     total = 0.0
     for signs, grid in zip(effects.signs, grids(domain, domain.names), strict=True):
         counts = np.array([len(points) for points in grid], float)
@@ -246,7 +256,12 @@ def _size(effects: Effects, domain: Domain) -> float:
 
 
 def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
-    """Both corners that each pattern of signs names, times all points of inputs without a sign."""
+    """Return the points of the signed plan on one level, shape (n, inputs).
+
+    Args:
+        signs: Distinct rows of signs, shape (rows, inputs); each names two opposite corners.
+        grid: Points of each input; inputs without a sign take all of them.
+    """
     rows: list[tuple[float, ...]] = []
     for pattern in np.concatenate([signs, -signs]):
         pairs = zip(pattern, grid, strict=True)
@@ -255,5 +270,5 @@ def _level_points(signs: Signs, grid: list[list[float]]) -> Array:
 
 
 def _ends(points: list[float], sign: int) -> list[float]:
-    """The first point where the effect rises, the last where it falls, all where it has no sign."""
+    """Return the first point for a positive sign, the last for a negative one, all for none."""
     return points if sign == 0 else [points[0 if sign > 0 else -1]]

@@ -313,17 +313,6 @@ def test_what_is_nobodys_store_is_refused_and_not_touched(tmp_path, made):
         )
 
 
-def test_a_store_without_an_id_is_taken_and_marked(tmp_path):
-    path = tmp_path / "s.db"
-    run(path)
-    with closing(sqlite3.connect(path)) as base:
-        base.execute("pragma application_id = 0")
-    for _ in range(2):
-        run(path)
-        assert not calls
-    assert path.read_bytes()[68:72] == b"alph"
-
-
 def test_a_second_damage_leaves_the_copy_of_the_first(tmp_path):
     path = tmp_path / "s.db"
     for stored in ("first", "second"):
