@@ -58,14 +58,14 @@ class MicrostructureStudy:
         return self.source.packing.shape if isinstance(self.source, Simulated) else DISCS
 
     def limits_of(self, sample: AreaWeighted) -> tuple[float, float]:
-        """Limits of r_n of a sample."""
+        """Return lower and upper limit of r_n for a sample."""
         lower, upper = self.limits or sample.limits(SHARE_WITHIN)
         return lower, upper if self.limits else min(upper, self.shape.reach)
 
     def used(self, sample: AreaWeighted) -> AreaWeighted:
-        """The sample with cells of discs no tighter than `Shape.reach`, unless limits are set.
+        """Return the sample with r_n of discs capped at `Shape.reach`, unless limits are stated.
 
-        Cells of spheres that are tighter are cut off by the limits.
+        Cells of spheres that are tighter are cut off by the limits; the sample is unchanged.
 
         Raises:
             RefusedError: More than `MAX_CAPPED` of the area or volume lies in cells tighter than
@@ -81,7 +81,7 @@ class MicrostructureStudy:
 
     @property
     def _cure(self) -> str:
-        """What to do with particles too dense for cells of one particle."""
+        """Advice in the message on particles that are too dense for cells of one particle."""
         fraction = (
             f"{self.source.packing.fraction:g}" if isinstance(self.source, Simulated) else "…"
         )
@@ -147,12 +147,14 @@ def study(
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Microstructure:
-    """Fuzzy radius map of a microstructure: cells, distribution, limits, fit, p-box.
+    """Return the fuzzy radius map of a microstructure, with the statistics that it rests on.
+
+    Cells of the particles, distribution of r_n, limits, fitted map and p-box are found in turn.
 
     Args:
         case: The settings.
         executor: Runs the packings; one after the other if None. The result is the same.
-        progress: Receives the share done, 0 to 1.
+        progress: Called with the completed fraction, 0 to 1.
 
     Raises:
         RefusedError: Measured data are not allowed, or cells are too tight.
@@ -169,7 +171,11 @@ def study(
 def _sections(
     case: MicrostructureStudy, executor: Executor | None, progress: Callable[[float], None]
 ) -> list[ParticleCells]:
-    """Sections of the source; packings of spheres are made denser until the map's fraction fits."""
+    """Return the particles with their cells from the source: one image or file, or packings.
+
+    Packings of spheres are repeated, at most `MAX_PACKINGS` times, with a volume fraction that is
+    corrected until the fitted map has the fraction of the case.
+    """
     source = case.source
     if not isinstance(source, Simulated):
         return [with_cells(source.read())]
@@ -193,7 +199,11 @@ def _sections(
 def fitted_map(
     case: MicrostructureStudy, sample: AreaWeighted
 ) -> tuple[AreaWeighted, PBox, SlopeBand, float]:
-    """Sample within the limits, p-box, band of the slopes and of the distribution function.
+    """Fit the radius map to a sample of r_n and make its slopes fuzzy.
+
+    Returns:
+        Sample within the limits, p-box, bootstrap band of the slopes, and half width of the
+        bootstrap band of the distribution function, in probability.
 
     Raises:
         RefusedError: All cells have one r_n.
@@ -221,13 +231,13 @@ def fitted_map(
 
 
 def _mapped_fraction(case: MicrostructureStudy, sample: AreaWeighted) -> float:
-    """Volume fraction of the map fitted to a sample within its own limits."""
+    """Return the mean volume fraction of the cells for the map fitted to a sample of r_n."""
     lower, upper = case.limits_of(sample)
     fit = HermiteFit(lower, upper)
     return _fraction(case.shape, fit, fit.slopes(sample.truncated(lower, upper)))
 
 
 def _fraction(shape: Shape, fit: HermiteFit, slopes: tuple[float, float]) -> float:
-    """Mean share of the cell that the particle takes, for the map with these slopes."""
+    """Return the mean fraction of the cell that the particle fills, for slopes (a2, a4)."""
     rule = gauss_rule(fit.distribution, points=8)
     return float(rule.mean(shape.shares(fit.map(slopes)(rule.nodes))))

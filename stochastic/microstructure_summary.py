@@ -17,7 +17,7 @@ CRISP_TOLERANCE = 1e-6  # of a3 − a1: an end nearer to the fitted slope differ
 
 
 def summary(result: Microstructure) -> dict[str, object]:
-    """All numbers of the study, lengths in m."""
+    """Return all numbers of a microstructure study by name, lengths in m."""
     particles = [section.particles for section in result.sections]
     radii = np.concatenate([packing.radii for packing in particles])
     shape, map_ = result.study.shape, result.fraction_of_map
@@ -38,7 +38,10 @@ def summary(result: Microstructure) -> dict[str, object]:
 
 
 def _of_discs(result: Microstructure) -> dict[str, object]:
-    """Numbers of Apollonius cells and of neighbours."""
+    """Return number and distances of direct neighbours and the correlation of r_n across walls.
+
+    Empty for spheres.
+    """
     diagrams = [section.diagram for section in result.sections if section.diagram]
     if not diagrams:
         return {}
@@ -57,7 +60,7 @@ def _of_discs(result: Microstructure) -> dict[str, object]:
 
 
 def _of_map(result: Microstructure) -> dict[str, object]:
-    """Numbers of the reduced radii and their map."""
+    """Return statistics of r_n, limits, fuzzy slopes with their bands, and misfits, by name."""
     box, sample = result.pbox, result.sample
     return {
         "cells": len(sample.values),
@@ -80,7 +83,7 @@ def _of_map(result: Microstructure) -> dict[str, object]:
 
 
 def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
-    """The section [radius] of a case, with as many digits as the fit has."""
+    """Return the case section [radius] as a mapping: ends of θ, a1, a3 and fuzzy a2, a4."""
     box, law = result.pbox, result.pbox.fit.distribution
     near = CRISP_TOLERANCE * (box.fit.a3 - box.fit.a1)
 
@@ -98,7 +101,7 @@ def radius_section(result: Microstructure) -> dict[str, list[float] | float]:
 
 
 def fragment(numbers: Mapping[str, Any]) -> str:
-    """The section [radius] of a case file.
+    """Return the case section [radius] as TOML text, with fractions as comments.
 
     Args:
         numbers: Those of `summary`.
@@ -119,7 +122,11 @@ def fragment(numbers: Mapping[str, Any]) -> str:
 
 
 def to_dataset(result: Microstructure) -> xarray.Dataset:
-    """Distribution function of r_n with its band and p-box, over a grid of radii."""
+    """Return the distribution function of r_n over 501 radii as a dataset.
+
+    Returns:
+        Variables cdf (of the sample), pbox_lower, pbox_upper and fitted, over the coordinate r_n.
+    """
     import xarray
 
     box, fit = result.pbox, result.pbox.fit

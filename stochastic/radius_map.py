@@ -41,7 +41,9 @@ class RadiusMap(Protocol):
 
 
 def require_map(radius_map: RadiusMap) -> None:
-    """Refuse a law without a support, and radii outside (0, 1) at any of 65 places over θ.
+    """Refuse a radius map whose law of θ has no support or whose radii leave (0, 1).
+
+    The radii are evaluated at 65 values of θ.
 
     Raises:
         RefusedError: The map or its law is refused.
@@ -102,7 +104,7 @@ class HermiteMap:
         return np.array([a1, a2, 3 * (a3 - a1) - 2 * a2 - a4, 2 * (a1 - a3) + a2 + a4])
 
     def xi(self, theta: ArrayLike) -> Array:
-        """θ carried to [0, 1]."""
+        """Return ξ = (θ − lower)/(upper − lower) in [0, 1], any shape."""
         law = self.distribution
         return np.asarray((np.asarray(theta, float) - law.lower) / (law.upper - law.lower))
 
@@ -112,7 +114,7 @@ class HermiteMap:
         return np.asarray(radius, float)
 
     def extremes(self) -> tuple[float, float]:
-        """Least and greatest radius on the support."""
+        """Return least and greatest radius on the support of θ."""
         turning = np.roots(np.polynomial.polynomial.polyder(self.monomials)[::-1])
         inner = turning.real[(abs(turning.imag) < 1e-12) & (turning.real > 0) & (turning.real < 1)]
         radii = np.polynomial.polynomial.polyval(

@@ -45,7 +45,10 @@ class ParticleCells:
 
 
 def with_cells(particles: Particles) -> ParticleCells:
-    """Particles with their cells: Apollonius cells of discs, power cells of spheres."""
+    """Return particles with their cells: Apollonius cells of discs, power cells of spheres.
+
+    Cells near the edge of a window are left out and others weighted instead (`counted_cells`).
+    """
     if particles.shape != DISCS:
         indices = np.arange(len(particles), dtype=np.intp)
         return ParticleCells(particles, indices, cell_volumes(particles), np.ones(len(particles)))
@@ -73,7 +76,13 @@ class Simulated:
         executor: Executor | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> list[ParticleCells]:
-        """All packings with their cells; the k-th depends on `seed` and k only."""
+        """Return all packings with their cells; the k-th depends on `seed` and k only.
+
+        Args:
+            seed: Seed of all packings.
+            executor: Runs the packings; this process if None.
+            progress: Called with the completed fraction.
+        """
         seeds = np.random.SeedSequence(seed).spawn(self.packings)
         sections: list[ParticleCells] = []
         for section in (executor.map if executor else map)(
@@ -86,7 +95,9 @@ class Simulated:
 
 
 def reduced_radii(sections: Sequence[ParticleCells]) -> AreaWeighted:
-    """r_n of all counted cells, weighted by area or volume, grouped by section or patch.
+    """Return r_n of all counted cells, weighted by area or volume, grouped for the bootstrap.
+
+    A group is a section, or one of 5 × 5 patches if there is a single section.
 
     Raises:
         RefusedError: A cell is smaller than its particle, so that particles overlap.
@@ -118,7 +129,7 @@ def _packing_with_cells(packing: Packing, seed: np.random.SeedSequence) -> Parti
 
 
 def _patches(section: ParticleCells) -> Rows:
-    """Numbers of the patches in which the counted cells lie, shape (k,)."""
+    """Return the number of the patch in which each counted cell lies, shape (k,)."""
     particles = section.particles
     patch = (PATCHES * particles.centres[section.counted] / particles.size).astype(int)
     base = PATCHES ** np.arange(len(particles.size))[::-1]

@@ -55,17 +55,16 @@ _STRENGTH = 0.8  # of the smoothing, over the noise
 
 @dataclass(frozen=True, eq=False)
 class Segmentation:
-    """Grey classes of an image, and where they are in doubt.
+    """Grey classes of an image, and which pixels may belong to another class.
 
     Args:
         grey: Grey values that are segmented, shape (rows, columns).
-        thresholds: Values that part the classes, rising; a pixel is of class k if k of them are at
-            or below its grey value.
+        thresholds: Grey values between the classes, rising; a pixel is of class k if k of them are
+            at or below its grey value.
         levels: Grey value of each class under mean light.
         light: What the light adds to each pixel, of mean zero, shape (rows, columns).
-        noise: Standard deviation of the rest, in grey values.
-        moved: What smoothing may have moved each grey value by, or left of its noise; infinite
-            at impulses and scratches.
+        noise: Standard deviation of the residuals, in grey values.
+        moved: Uncertainty of each grey value from smoothing; infinite at impulses and scratches.
     """
 
     grey: Array
@@ -93,12 +92,16 @@ class Segmentation:
 
     @property
     def open(self) -> float:
-        """Share of the area that may be of another class."""
+        """Fraction of the area whose pixels may be of another class."""
         first, last = self.ranges()
         return float(np.mean(first < last))
 
     def ranges(self) -> tuple[Rows, Rows]:
-        """Least and greatest class that each pixel may be of, shape (rows, columns) each."""
+        """Return least and greatest class of each pixel, two arrays of shape (rows, columns).
+
+        The grey value is varied by `CONFIDENT` deviations of the noise, by the light and by the
+        uncertainty from smoothing.
+        """
         doubt = CONFIDENT * self.noise + np.abs(self.light) + self.moved
         first, last = (
             np.searchsorted(self.thresholds, self.grey + sign * doubt, side="right")
@@ -107,10 +110,13 @@ class Segmentation:
         return first, last
 
     def require(self, most: float = MOST_OPEN) -> None:
-        """Refuses a segmentation whose fractions depend too much on where the threshold lies.
+        """Refuse a segmentation with too much uncertain area beside that of the smallest class.
+
+        Args:
+            most: Largest allowed uncertain area, as a fraction of the smallest class's.
 
         Raises:
-            RefusedError: More is open than `most` of the smallest class's area.
+            RefusedError: It is larger.
         """
         share = self.open / float(self.fractions.min())
         impulses = float(np.mean(np.isinf(self.moved)))
@@ -126,14 +132,14 @@ class Segmentation:
 def segmented(
     grey: Array, thresholds: Sequence[float], *, smooth: bool = False, level: bool = False
 ) -> Segmentation:
-    """The classes of an image.
+    """Return the segmentation of a grey image: class, light and uncertainty of its pixels.
 
     Args:
         grey: Grey values, shape (rows, columns).
-        thresholds: Values that part the classes, rising.
-        smooth: Take the noise away first.
-        level: Take the light's drift away first; the thresholds, which were read off the uneven
-            image, then give way to the `middles` of the even one.
+        thresholds: Grey values between the classes, rising.
+        smooth: Remove noise first.
+        level: Remove the drift of the light first; the thresholds, which were read off the uneven
+            image, are replaced by the `middles` of the even one.
 
     Raises:
         RefusedError: A class has no pixel, or grey values are clipped.
@@ -155,10 +161,10 @@ def segmented(
 
 
 def _impulses(image: Segmentation) -> Mask:
-    """Pixels that neither a class nor the noise explains, as salt, pepper and scratches.
+    """Return the mask of pixels that are salt, pepper or scratches, shape (rows, columns).
 
-    They lie beyond the noise of the level of each class, and beyond that of most pixels around
-    them, which pixels of a blurred border do not. None where they are less than `MIN_IMPULSES`.
+    Their grey values lie beyond the noise of every class and of most pixels around them, unlike
+    those of a blurred border. If they are less than `MIN_IMPULSES` of the image there are none.
     """
     grey = image.grey - image.light
     band = CONFIDENT * image.noise + _EXACT * float(np.abs(grey).max())
@@ -169,15 +175,15 @@ def _impulses(image: Segmentation) -> Mask:
 
 
 def _refuse_clipped(values: Array, borders: tuple[float, ...], sound: Mask) -> None:
-    """Refuses grey values that were cut off at an end.
+    """Refuse an image whose grey values are clipped: a class piles up at an end of the values.
 
     Args:
         values: Grey values.
-        borders: Values that part the classes.
+        borders: Thresholds between the classes.
         sound: Pixels that are no impulses.
 
     Raises:
-        RefusedError: They were.
+        RefusedError: They are clipped.
     """
     labels = median_filter(np.searchsorted(borders, values, side="right"), _PATCH, mode="wrap")
     far = _far(labels, _BORDER) & sound
@@ -197,7 +203,12 @@ def _refuse_clipped(values: Array, borders: tuple[float, ...], sound: Mask) -> N
 
 
 def _is_flat(grey: Array, contrast: float) -> bool:
-    """True for a class of a clean image: one grey value, or a few that are far from each other."""
+    """Return whether a class has one grey value, or up to three distant ones, as in a clean image.
+
+    Args:
+        grey: Grey values of the pixels of a class, shape (n,).
+        contrast: Range of the grey values of the image.
+    """
     places, counts = np.unique(grey, return_counts=True)
     most = np.sort(places[np.argsort(-counts)[:_MAX_FLAT]])
     shares = np.sort(counts)[::-1] / grey.size
@@ -206,7 +217,7 @@ def _is_flat(grey: Array, contrast: float) -> bool:
 
 
 def _classified(values: Array, borders: tuple[float, ...]) -> Segmentation:
-    """Classes, light and noise of an image without smoothing or levelling."""
+    """Return classes, levels, light and noise, fitted and assigned in turn until they settle."""
     shapes, light, before = _polynomials(values.shape), np.zeros_like(values), None
     for _ in range(_MAX_ITERATIONS):
         labels = np.searchsorted(borders, values - light, side="right")
@@ -218,7 +229,12 @@ def _classified(values: Array, borders: tuple[float, ...]) -> Segmentation:
 
 
 def _smoothed(grey: Array, noise: float) -> Array:
-    """The image by non-local means, as if it repeated itself."""
+    """Return the image without noise, by non-local means with periodic edges.
+
+    Args:
+        grey: Grey values, shape (rows, columns).
+        noise: Standard deviation of the noise.
+    """
     from skimage import restoration
 
     edge = _PATCH + _REACH
@@ -230,9 +246,10 @@ def _smoothed(grey: Array, noise: float) -> Array:
 
 
 def _remaining_noise(rough: Array, smooth: Array, noise: float) -> Array:
-    """Noise that smoothing leaves in each pixel: from what it makes of half as much again nearby.
+    """Return the standard deviation of the noise that smoothing leaves in each pixel.
 
-    Near borders few patches are alike, so that more is left than inside the classes.
+    Half as much noise again is added and its effect on the smoothed image measured nearby. Near
+    borders few patches are alike, so that more is left than inside the classes.
     """
     rng = np.random.default_rng(0)
     squares = [
@@ -250,7 +267,16 @@ def _polynomials(shape: tuple[int, ...]) -> Array:
 
 
 def _fitted(values: Array, labels: Rows, shapes: Array, classes: int) -> tuple[Array, Array, float]:
-    """Levels of the classes, light and noise, from pixels away from the borders."""
+    """Return grey levels (classes,), light (rows, columns) and noise of a classified image.
+
+    Least squares over pixels away from borders; outliers are left out in three passes.
+
+    Args:
+        values: Grey values, shape (rows, columns).
+        labels: Class of each pixel.
+        shapes: Polynomials of the light at the pixels, shape (pixels, 5).
+        classes: Number of classes.
+    """
     inner = _inner(labels, classes).ravel()
     columns = np.hstack([labels.reshape(-1, 1) == np.arange(classes), shapes])
     flat, used = values.ravel(), inner
@@ -266,7 +292,9 @@ def _fitted(values: Array, labels: Rows, shapes: Array, classes: int) -> tuple[A
 
 
 def _inner(labels: Rows, classes: int) -> Mask:
-    """Pixels with none of another class near, as far as each class has some.
+    """Return the mask of pixels up to 3 pixels away from other classes, as far as classes allow.
+
+    The distance is reduced until a tenth of each class is left.
 
     Raises:
         RefusedError: A class has no pixel.
@@ -282,6 +310,6 @@ def _inner(labels: Rows, classes: int) -> Mask:
 
 
 def _far(labels: Rows, reach: int) -> Mask:
-    """Pixels with none of another class up to so many pixels away."""
+    """Return the mask of pixels with no other class within `reach` pixels."""
     low, high = (f(labels, 2 * reach + 1, mode="wrap") for f in (minimum_filter, maximum_filter))
     return np.asarray(low == high)

@@ -48,7 +48,7 @@ Figures = dict[str, Callable[[], "Figure"]]
 
 
 def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
-    """Draws every figure into `folder`; name of each figure to its files."""
+    """Write every figure of a microstructure as SVG and PNG; return the files of each name."""
     figures = of_map(result)
     if result.study.shape == DISCS:
         figures |= of_discs(result)
@@ -57,7 +57,7 @@ def draw(result: Microstructure, folder: Path) -> dict[str, list[Path]]:
 
 
 def of_map(result: Microstructure) -> Figures:
-    """Figures of radii, cells and map, each to its drawing."""
+    """Return functions that draw radii, cell areas, p-box and radius map, by figure name."""
     source = result.study.source
     law = source.packing.radii if isinstance(source, Simulated) else None
     return {
@@ -69,9 +69,9 @@ def of_map(result: Microstructure) -> Figures:
 
 
 def of_discs(result: Microstructure) -> Figures:
-    """Figures of discs, each to its drawing.
+    """Return functions that draw the figures of discs and their cells, by figure name.
 
-    Those on direct neighbours show discs of one size at the same area fraction, as in the paper.
+    Figures of direct neighbours show discs of one size at the same area fraction, as in the paper.
     """
     first, source = result.sections[0], result.study.source
     generator = np.random.default_rng(result.study.seed)
@@ -91,7 +91,7 @@ def of_discs(result: Microstructure) -> Figures:
 
 
 def _equal_discs(result: Microstructure, number: int) -> Particles:
-    """A packing of equal discs with the area fraction and the mean disc area of the sections."""
+    """Return a packing of equal discs with the sections' area fraction and mean disc area."""
     discs = [section.particles for section in result.sections]
     radius = float(np.sqrt(np.mean(np.concatenate([packing.radii for packing in discs]) ** 2)))
     fraction = float(np.mean([packing.fraction for packing in discs]))
@@ -101,7 +101,7 @@ def _equal_discs(result: Microstructure, number: int) -> Particles:
 
 
 def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
-    """Distribution function of the radii, and their law if there is one (Fig. 11)."""
+    """Draw the distribution function of the radii, and their law if there is one (Fig. 11)."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(6.4, 3.8))
@@ -117,7 +117,7 @@ def draw_radii(result: Microstructure, law: RadiusLaw | None) -> Figure:
 
 
 def draw_neighbour_statistics(discs: Particles) -> Figure:
-    """Distances (Fig. 6) and number (Fig. 7) of direct neighbours, discs of one size."""
+    """Draw distances (Fig. 6) and number (Fig. 7) of direct neighbours of equal discs."""
     figure, (left, right) = two_panels(EQUAL.format(len(discs)))
     direct = neighbours(discs)
     distance, number = direct.distances / (2 * float(discs.radii[0])), direct.number
@@ -136,7 +136,7 @@ def draw_neighbour_statistics(discs: Particles) -> Figure:
 
 
 def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
-    """Values of r_n of cells that share a wall, beside those of equal discs (Fig. 9)."""
+    """Draw r_n of pairs of cells that share a wall, beside those of equal discs (Fig. 9)."""
     import matplotlib.pyplot as plt
 
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 4.4))
@@ -155,7 +155,7 @@ def draw_correlation(result: Microstructure, equal: Apollonius) -> Figure:
 
 
 def draw_areas(result: Microstructure) -> Figure:
-    """Measure of the cells over r_n, with the limits and what no particle can reach (Fig. 12)."""
+    """Draw area or volume of the cells over r_n, with its limits and upper bound (Fig. 12)."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(6.4, 3.8))
@@ -178,7 +178,10 @@ def draw_areas(result: Microstructure) -> Figure:
 
 
 def draw_pbox(result: Microstructure) -> Figure:
-    """Distribution of r_n with its bootstrap band, and the p-box around it (Fig. 13)."""
+    """Draw the distribution function of r_n, its bootstrap band and the p-box (Fig. 13).
+
+    The lower panel shows the differences from the fitted map.
+    """
     import matplotlib.pyplot as plt
 
     figure, (axes, residual_axes) = plt.subplots(
@@ -204,7 +207,7 @@ def draw_pbox(result: Microstructure) -> Figure:
 
 
 def draw_map(result: Microstructure) -> Figure:
-    """The map θ ↦ r_n: the sample's own, the fitted cubic and its fuzzy bounds (eq. 12)."""
+    """Draw the radius map θ ↦ r_n: quantiles of the sample, fitted cubic, fuzzy bounds (eq. 12)."""
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(figsize=(6.4, 3.8))

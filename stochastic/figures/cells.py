@@ -21,7 +21,7 @@ EQUAL = "{} equal discs of the same area fraction, not those of the section"
 
 
 def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
-    """Circles by centres, shape (n, 2), and radii, shape (n,), in m, drawn in mm."""
+    """Draw circles by centres, shape (n, 2), and radii, shape (n,), in m, on axes in mm."""
     from matplotlib.collections import EllipseCollection
 
     width = 2e3 * radii
@@ -30,14 +30,14 @@ def _circles(axes: Axes, centres: Array, radii: Array, **look: Any) -> None:
 
 
 def _view(axes: Axes, low: Array, high: Array) -> None:
-    """Limits in m, axes in mm of equal scale, no grid."""
+    """Set the axes' limits, given in m, to mm of equal scale, without grid."""
     axes.set(xlim=1e3 * np.array([low[0], high[0]]), ylim=1e3 * np.array([low[1], high[1]]))
     axes.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
     axes.grid(visible=False)
 
 
 def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array | None = None) -> None:
-    """Particles in their rectangle, or in its corner `view` (m), with their images, in mm."""
+    """Draw discs and their periodic images in the rectangle, or in its corner `view` (m), in mm."""
     view = discs.size if view is None else view
     centres = np.concatenate([discs.centres + shift for shift in _shifts(discs)])
     radii = np.tile(discs.radii, len(_shifts(discs)))
@@ -47,7 +47,7 @@ def plot_discs(axes: Axes, discs: Particles, colour: str, view: Array | None = N
 
 
 def plot_cells(axes: Axes, diagram: Apollonius, view: Array | None = None) -> None:
-    """Curved walls of the cells, with their images, in the rectangle or its corner `view` (m)."""
+    """Draw the curved walls of the cells, with images, in the rectangle or its corner `view`."""
     from matplotlib.collections import LineCollection
 
     discs = diagram.discs
@@ -61,13 +61,13 @@ def plot_cells(axes: Axes, diagram: Apollonius, view: Array | None = None) -> No
 
 
 def _shifts(discs: Particles) -> list[Array]:
-    """Shifts of the images of a section, in m; none but zero where it does not repeat."""
+    """Return the shifts of all periodic images of a section, in m; only zero in a window."""
     tiles = (-1, 0, 1) if discs.periodic else (0,)
     return [discs.size * (i, j) for i in tiles for j in tiles]
 
 
 def draw_cells(diagram: Apollonius) -> Figure:
-    """Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
+    """Draw Voronoi cells, whose walls cut discs, beside Apollonius cells (Fig. 10)."""
     discs = diagram.discs
     view = discs.size * min(1.0, float(np.sqrt(CORNER_DISCS / len(discs))))
     width, height = 1e3 * discs.size
@@ -82,7 +82,7 @@ def draw_cells(diagram: Apollonius) -> Figure:
 
 
 def draw_neighbours(discs: Particles) -> Figure:
-    """Delaunay triangulation of equal discs beside their Voronoi cells (Figs. 5, 8)."""
+    """Draw the Delaunay triangulation of equal discs beside their Voronoi cells (Figs. 5, 8)."""
     from matplotlib.collections import LineCollection
 
     titles = "Delaunay triangulation: the direct neighbours", "Voronoi cells, its dual"
@@ -98,7 +98,7 @@ def draw_neighbours(discs: Particles) -> Figure:
 
 
 def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
-    """Why distances in pairs do not describe a packing (Figs. 3, 4).
+    """Draw why the distribution of pair distances does not describe a packing (Figs. 3, 4).
 
     Left: around one disc, others drawn independently with the packing's own pair distances: they
     overlap each other. Right: the true discs within the same distance; only the direct neighbours
@@ -130,7 +130,7 @@ def draw_two_point(discs: Particles, generator: np.random.Generator) -> Figure:
 def _from_pair_distances(
     discs: Particles, number: int, reach: float, generator: np.random.Generator
 ) -> Array:
-    """Places drawn from the distances between all discs, shape (number, 2), in m."""
+    """Return points (number, 2), in m, at random angles and pair distances of the discs."""
     from scipy.spatial import KDTree
 
     tree = KDTree(discs.centres, boxsize=discs.size)
@@ -142,13 +142,14 @@ def _from_pair_distances(
 
 
 def _overlaps(places: Array, radius: float) -> int:
+    """Return the number of discs of equal `radius` at centres (n, 2) that overlap another one."""
     distance = np.hypot(*np.moveaxis(places[:, None] - places[None], -1, 0))
     np.fill_diagonal(distance, np.inf)
     return int((distance.min(axis=1) < 2 * radius).sum())
 
 
 def draw_overlay(picture: Array, discs: Particles) -> Figure:
-    """The grey image with the outline of every circle that was taken from it.
+    """Draw the grey image with the outline of every circle that was found in it.
 
     Args:
         picture: Grey values, shape (rows, columns).

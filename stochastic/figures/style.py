@@ -33,7 +33,7 @@ SETTINGS: dict[str, Any] = {
 
 @contextmanager
 def figure_style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[None]:
-    """Context in which figures have this style; `more` are further settings of Matplotlib."""
+    """Context manager that sets this style; `more` are further settings of Matplotlib."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -42,7 +42,7 @@ def figure_style(more: Mapping[str, object] = MappingProxyType({})) -> Iterator[
 
 
 def two_panels(title: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
-    """Figure of two panels, with a common title and one for each panel, if any."""
+    """Return a figure with two panels and their axes; titles of figure and panels are set."""
     import matplotlib.pyplot as plt
 
     figure, panels = plt.subplots(1, 2, figsize=(9.6, 5.0 if titles else 4.0))
@@ -53,7 +53,7 @@ def two_panels(title: str, *titles: str) -> tuple[Figure, Sequence[Axes]]:
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure to STEM.svg and STEM.png, and close it; paths of the two files."""
+    """Write a figure to STEM.svg and STEM.png, close it, and return the two paths."""
     import matplotlib.pyplot as plt
 
     stem.parent.mkdir(parents=True, exist_ok=True)

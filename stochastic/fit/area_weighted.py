@@ -34,7 +34,7 @@ class AreaWeighted:
     def from_values(
         cls, values: ArrayLike, weights: ArrayLike | None = None, groups: ArrayLike | None = None
     ) -> AreaWeighted:
-        """Sample of sorted values, with weights (equal by default) scaled to the sum 1."""
+        """Return the sample with values sorted and weights, by default equal, scaled to sum 1."""
         values = np.asarray(values, float).ravel()
         weights = np.ones_like(values) if weights is None else np.asarray(weights, float).ravel()
         members = np.arange(len(values)) if groups is None else np.asarray(groups).ravel()
@@ -55,7 +55,7 @@ class AreaWeighted:
         return self.values[step], np.append(0.0, at[:-1]), at
 
     def cdf(self, radius: ArrayLike) -> Array:
-        """Share of area with r_n ≤ radius, any shape."""
+        """Return the fraction of area with r_n ≤ radius, any shape."""
         count = np.searchsorted(self.values, radius, side="right")
         return np.asarray(np.append(0.0, self.cumulated)[count])
 
@@ -70,15 +70,18 @@ class AreaWeighted:
         return float(self.weights @ self.values)
 
     def share_within(self, lower: float, upper: float) -> float:
-        """Share of area with lower ≤ r_n ≤ upper."""
+        """Return the fraction of area with lower ≤ r_n ≤ upper."""
         return float(self.weights[(self.values >= lower) & (self.values <= upper)].sum())
 
     def limits(self, share: float) -> tuple[float, float]:
-        """Limits that contain `share` in (0, 1) of the area, with equal shares beyond both."""
+        """Return limits of r_n that contain the fraction `share` in (0, 1) of the area.
+
+        Equal fractions lie below and above them.
+        """
         return float(self.quantile((1 - share) / 2)), float(self.quantile((1 + share) / 2))
 
     def truncated(self, lower: float, upper: float) -> AreaWeighted:
-        """Part of the sample within the limits, its weights scaled to the sum 1.
+        """Return the part of the sample within limits of r_n, its weights scaled to the sum 1.
 
         Raises:
             RefusedError: Fewer than ten values lie within them.
@@ -98,7 +101,7 @@ class AreaWeighted:
         return AreaWeighted(np.minimum(self.values, most), self.weights, self.groups)
 
     def resampled(self, number: int, generator: np.random.Generator) -> Iterator[Array]:
-        """Weights of `number` bootstrap samples of groups, shape (n,) each, sum 1."""
+        """Yield the weights (n,) of `number` bootstrap samples; groups are drawn, the sum is 1."""
         count = int(self.groups.max()) + 1
         for _ in range(number):
             drawn = np.bincount(generator.integers(count, size=count), minlength=count)
@@ -106,7 +109,14 @@ class AreaWeighted:
             yield weights / weights.sum()
 
     def band(self, level: float, number: int, generator: np.random.Generator) -> float:
-        """Half width c of the bootstrap band: sup |F* − F| ≤ c in a share `level` of the resamples.
+        """Return the half width of the simultaneous bootstrap band of the distribution function F.
+
+        It is the `level` quantile of sup |F* − F| over the resampled distribution functions F*.
+
+        Args:
+            level: Confidence, in (0, 1).
+            number: Number of bootstrap samples.
+            generator: Random number generator.
 
         Raises:
             RefusedError: There are fewer than five groups to draw from.

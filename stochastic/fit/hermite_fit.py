@@ -48,7 +48,9 @@ class HermiteFit:
     distribution: ClassVar[TruncatedNormal] = TruncatedNormal()
 
     def slopes(self, sample: AreaWeighted, weights: Array | None = None) -> tuple[float, float]:
-        """Slopes a2, a4 of the monotone cubic nearest to the sample between the limits.
+        """Return the slopes a2, a4 of the monotone cubic nearest to the sample between the limits.
+
+        The distance is ∫ (Q(F_Θ(θ)) − H(θ))² f_Θ dθ, Q the quantile function of the sample.
 
         Args:
             sample: r_n within [a1, a3].
@@ -64,11 +66,16 @@ class HermiteFit:
         return float(max(a2, 0)), float(max(a4, 0))
 
     def map(self, slopes: tuple[float, float]) -> HermiteMap:
-        """The map with these slopes."""
+        """Return the radius map with slopes (a2, a4)."""
         return HermiteMap(self.a1, slopes[0], self.a3, slopes[1], self.distribution)
 
     def misfit(self, sample: AreaWeighted, slopes: tuple[float, float]) -> float:
-        """Root mean square of r(θ) − H(θ) under f_Θ, in units of r_n, by a fine rule."""
+        """Return the root mean square of quantile function less map under f_Θ, in units of r_n.
+
+        Args:
+            sample: r_n within [a1, a3].
+            slopes: Slopes (a2, a4) of the map.
+        """
         share = (np.arange(20_000) + 0.5) / 20_000
         fitted = self.map(slopes)(self.distribution.quantile(share))
         return float(np.sqrt(np.mean((sample.quantile(share) - fitted) ** 2)))
@@ -81,7 +88,13 @@ class HermiteFit:
         return np.array([Polynomial(h)(xi).coef for h in SHAPES[[1, 3]]])
 
     def _integrals(self, share: Array) -> Array:
-        """∫ h_i f_Θ dθ from the lower end to each quantile, for h2 and h4, shape (2, n); exact."""
+        """Return ∫ h_i f_Θ dθ from the lower end of θ to its quantiles, for h2 and h4, (2, n).
+
+        The moments ∫ θ^k f_Θ dθ follow from each other by partial integration, without quadrature.
+
+        Args:
+            share: Probabilities of the quantiles, shape (n,), rising from 0 to 1.
+        """
         law = self.distribution
         theta = law.quantile(share)
         density, first = law.pdf(theta), law.pdf(law.lower)
@@ -94,6 +107,7 @@ class HermiteFit:
 
     @cached_property
     def _shapes_at_nodes(self) -> tuple[Array, Array]:
+        """Weights (8,) of a Gauss rule of f_Θ, and h1 … h4 at its nodes, shape (4, 8)."""
         rule = gauss_rule(self.distribution, points=8)
         law = self.distribution
         xi = (rule.nodes - law.lower) / (law.upper - law.lower)
@@ -101,11 +115,13 @@ class HermiteFit:
 
     @cached_property
     def _gram(self) -> Array:
+        """Gram matrix ∫ h_i h_j f_Θ dθ of h2 and h4, shape (2, 2)."""
         weights, shape = self._shapes_at_nodes
         return np.asarray(shape[[1, 3]] * weights @ shape[[1, 3]].T)
 
     @cached_property
     def _ends(self) -> Array:
+        """Integrals ∫ h_i (a1 h1 + a3 h3) f_Θ dθ for h2 and h4, shape (2,)."""
         weights, shape = self._shapes_at_nodes
         return np.asarray(shape[[1, 3]] * weights @ (self.a1 * shape[0] + self.a3 * shape[2]))
 
@@ -115,7 +131,7 @@ class HermiteFit:
         return np.asarray(self.a1 * SLOPES[0] + self.a3 * SLOPES[2] - MARGIN * (self.a3 - self.a1))
 
     def is_monotone(self, slopes: ArrayLike) -> bool:
-        """True if the map with slopes (a2, a4) rises."""
+        """Return whether the map with slopes (a2, a4) rises at all points XI."""
         return bool((self.rising + np.asarray(slopes) @ SLOPES[[1, 3]] >= -1e-12).all())
 
     @property
@@ -125,9 +141,9 @@ class HermiteFit:
         return float(weights @ shape[1]), float(-weights @ shape[3])
 
     def _nearest_monotone(self, best: Array) -> Array:
-        """Slopes of the monotone map nearest to the one with the slopes `best`.
+        """Return the slopes (2,) of the monotone map nearest to the map with slopes `best` (2,).
 
-        Lawson & Hanson 1974, chapter 23: least distance programming by non-negative least squares.
+        Least distance programming by non-negative least squares (Lawson, Hanson 1974, chapter 23).
         """
         from scipy.optimize import nnls
 
@@ -154,7 +170,7 @@ class SlopeBand:
     a4: tuple[float, float, float]
 
     def monotone(self, fit: HermiteFit) -> SlopeBand:
-        """The part of the band whose four corners are monotone maps.
+        """Return the largest part of the band around the fitted slopes with four monotone corners.
 
         The quantile function of a sample rises, so slopes beyond are those of no radius map. The
         ends are cut at slopes from zero to three times the chord's (Fritsch and Carlson 1980), then
@@ -184,17 +200,18 @@ def slope_band(
     resamples: int,
     generator: np.random.Generator,
 ) -> SlopeBand:
-    """Fitted slopes ± a quantile of Student's t times their bootstrap standard error.
+    """Return the fitted slopes and their joint confidence band, by the bootstrap.
 
-    The miss is halved between the two slopes (Bonferroni); t has one degree of freedom less than
+    The half width is a quantile of Student's t times the bootstrap standard error. The probability
+    of error is halved between the two slopes (Bonferroni); t has one degree of freedom less than
     there are groups to draw.
 
     Args:
         fit: Ends of the map and law of θ.
         sample: r_n within the ends.
-        level: Joint level, in (0, 1).
+        level: Joint confidence, in (0, 1).
         resamples: Bootstrap resamples, at least 2.
-        generator: Source of chance.
+        generator: Random number generator.
     """
     from scipy.special import stdtrit
 

@@ -36,7 +36,7 @@ class PBox:
     a4: tuple[float, float, float]
 
     def bounds(self, theta: Array) -> tuple[Array, Array]:
-        """Least and greatest radius at `theta`, any shape."""
+        """Return least and greatest radius at `theta`, two arrays of its shape."""
         least, greatest = (self.a2[0], self.a4[2]), (self.a2[2], self.a4[0])
         return self.fit.map(least)(theta), self.fit.map(greatest)(theta)
 
@@ -47,7 +47,10 @@ class PBox:
         return (self.a2[2] - self.a2[0]) * h2 + (self.a4[2] - self.a4[0]) * h4
 
     def excess(self, sample: AreaWeighted) -> float:
-        """Half width of the band with which the sample would lie within the p-box."""
+        """Return the largest distance of the sample's distribution function outside the p-box.
+
+        It is a probability; 0 if the p-box contains the function.
+        """
         values, before, after = sample.steps
         law = self.fit.distribution
         grid = np.asarray(np.linspace(law.lower, law.upper, 20_001), float)
@@ -61,7 +64,7 @@ class PBox:
 def least_pbox(
     fit: HermiteFit, sample: AreaWeighted, band: float, *, required: SlopeBand | None = None
 ) -> PBox:
-    """Least p-box around the fitted map that contains `sample`, within a band of `band`.
+    """Return the p-box of least area around the fitted map that contains the sample's band.
 
     The misfit alone gives little fuzziness where data are few and the band is wide; `required` adds
     the scatter of the slopes.
@@ -69,7 +72,8 @@ def least_pbox(
     Args:
         fit: Ends of the map and law of θ.
         sample: r_n within the ends.
-        band: In probability, in [0, 1).
+        band: Half width of the band by which the p-box may miss the sample's distribution function,
+            in probability, in [0, 1).
         required: Slopes that the supports must contain as well, such as their bootstrap band, as
             far as its maps are monotone.
 
@@ -85,17 +89,18 @@ def least_pbox(
 def _core(
     modal: tuple[float, float], required: SlopeBand | None
 ) -> list[tuple[float, float | None]]:
-    """Ranges of the four ends (a2L, a2U, a4L, a4U) around the modal slopes, in the supports."""
+    """Return the ranges of the ends (a2L, a2U, a4L, a4U) that contain modal and required slopes."""
     bands = ((), ()) if required is None else (required.a2, required.a4)
     a2, a4 = ((slope, *band) for slope, band in zip(modal, bands, strict=True))
     return [(0, min(a2)), (max(a2), None), (0, min(a4)), (max(a4), None)]
 
 
 def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Array, Array]:
-    """Rows @ (a2L, a2U, a4L, a4U) ≤ right of containing a sample's band.
+    """Return matrix (k, 4) and right side (k,) of the linear constraints: p-box contains the band.
 
-    The greatest radius must reach the sample where its band ends below, the least where it ends
-    above.
+    They read matrix @ (a2L, a2U, a4L, a4U) ≤ right. At each step of the sample's distribution
+    function the greatest radius must reach the value where the band's lower edge rises, and the
+    least radius must not pass it where the upper edge does.
     """
     share, values, up = _steps(sample, band)
     law = fit.distribution
@@ -108,7 +113,12 @@ def _containment(fit: HermiteFit, sample: AreaWeighted, band: float) -> tuple[Ar
 
 
 def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
-    """Ends of a sample's band: share, value, and whether a greatest radius must reach it."""
+    """Return the corners of the band around the sample's distribution function, three arrays (k,).
+
+    Returns:
+        Probability and value of each corner, and whether the greatest radius is constrained there;
+        the least radius otherwise.
+    """
     values, before, after = sample.steps
     up, down = before + band < 1, after - band > 0
     return (
@@ -121,7 +131,17 @@ def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
 def _solve(
     fit: HermiteFit, core: list[tuple[float, float | None]], matrix: Array, right: Array
 ) -> list[float]:
-    """Ends (a2L, a2U, a4L, a4U) of least p-box area under the rows, corners monotone."""
+    """Return the ends (a2L, a2U, a4L, a4U) of least p-box area, by a linear program.
+
+    Args:
+        fit: Ends of the map and law of θ.
+        core: Lower and upper limit of each of the four ends.
+        matrix: Constraints of containment, shape (k, 4).
+        right: Their right sides, shape (k,).
+
+    Raises:
+        FailedError: No monotone corners fulfil the constraints.
+    """
     from scipy.optimize import linprog
 
     monotone = np.zeros((4, SLOPES.shape[1], 4))

@@ -30,7 +30,7 @@ class CircleFile:
     size: tuple[float, float]
 
     def read(self) -> Particles:
-        """The circles, origin at the corner of the section.
+        """Return the circles of the file, with the origin at the corner of the section, in m.
 
         Raises:
             RefusedError: The file cannot be read, or a circle lies outside or overlaps another one.
@@ -49,7 +49,7 @@ class CircleFile:
         return discs
 
     def _refuse_overlap(self, discs: Particles, rows: Rows) -> None:
-        """Refuses the file where two circles overlap."""
+        """Refuse the file if two circles overlap, with the rows of the worst pair."""
         first, second = close_pairs(discs, 0.0)
         smaller = np.minimum(discs.radii[first], discs.radii[second])
         share = -surface_distance(discs, first, second) / smaller

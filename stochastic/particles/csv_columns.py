@@ -24,7 +24,7 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
-    """Columns of a file; others are not read.
+    """Return row numbers and columns of lengths of a CSV file; other columns are not read.
 
     Args:
         path: The file; separated by commas, semicolons or tabs; empty lines and those behind # are
@@ -45,7 +45,7 @@ def length_columns(path: Path, columns: Sequence[str]) -> tuple[Rows, Array]:
 
 
 def fields(path: Path) -> list[tuple[int, list[str]]]:
-    """Numbered rows of a text file that are neither empty nor comments, cut at its separator.
+    """Return number and fields of each line of a CSV file that is neither empty nor a comment.
 
     Raises:
         RefusedError: The file is missing, no text, or has no row.
@@ -61,7 +61,7 @@ def fields(path: Path) -> list[tuple[int, list[str]]]:
 
 
 def cells_of(name: str, row: int, line: str, separator: str) -> list[str]:
-    """Fields of a line of a file.
+    """Return the fields of line `row` of the file `name`.
 
     Raises:
         RefusedError: A field is longer than Python's reader takes.
@@ -74,7 +74,7 @@ def cells_of(name: str, row: int, line: str, separator: str) -> list[str]:
 
 
 def text_of(path: Path) -> str:
-    """The text of a file in UTF-8.
+    """Return the text of a file in UTF-8.
 
     Raises:
         RefusedError: It cannot be read, or is no text.
@@ -87,7 +87,7 @@ def text_of(path: Path) -> str:
 
 
 def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
-    """The number in a field, in plain ASCII digits with a point.
+    """Return the number in a field of a row, in plain ASCII digits with a decimal point.
 
     Raises:
         RefusedError: The field is missing or holds no number.
@@ -100,7 +100,7 @@ def number(path: Path, row: int, cells: Sequence[str], column: int) -> float:
 
 
 def _column(header: list[str], name: str, path: Path) -> tuple[int, float]:
-    """Index of a column, and the factor from its unit to metres."""
+    """Return the index of the column `name` in the header, and the factor of its unit to m."""
     named = (*RADII, *DIAMETERS) if name == "r" else (name,)
     for column, cell in enumerate(header):
         match = re.fullmatch(HEADER, cell)

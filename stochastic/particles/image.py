@@ -54,7 +54,7 @@ class SectionImage:
         return self.circles(self.picture())
 
     def picture(self) -> Array:
-        """Grey values of the material, shape (rows, columns).
+        """Return the grey values of the image file, shape (rows, columns).
 
         Raises:
             RefusedError: The file is no image.
@@ -70,7 +70,10 @@ class SectionImage:
             raise RefusedError("image.file", self.path, allowed) from None
 
     def circles(self, picture: Array) -> Particles:
-        """Circles of a grey image.
+        """Return circles of the same area and centroid as the particles in a grey image, in m.
+
+        Args:
+            picture: Grey values, shape (rows, columns).
 
         Raises:
             RefusedError: Noise or light hide the particles, or too many of them are not round.
@@ -102,7 +105,13 @@ class SectionImage:
         return Particles(centres * self.pixel, radius * self.pixel, size, periodic=False)
 
     def _particles(self, picture: Array) -> Mask:
-        """Mask of the particles' pixels."""
+        """Return the mask of the particles' pixels, by Otsu's threshold of the smoothed image.
+
+        The phase whose pieces fill more of their convex hulls is that of the particles.
+
+        Raises:
+            RefusedError: The greys differ too little beside their noise, or the light is uneven.
+        """
         from skimage import filters
 
         smooth = filters.gaussian(picture, SMOOTHING, preserve_range=True)  # type: ignore[no-untyped-call]
@@ -131,7 +140,10 @@ class SectionImage:
 
 
 def _pieces(phase: Mask) -> NDArray[np.int_]:
-    """Labels of the particles: a watershed of the distance to the background."""
+    """Return the label of the particle at each pixel, 0 outside, shape (rows, columns).
+
+    Particles that touch are separated by a watershed of the distance to the background.
+    """
     from scipy import ndimage
     from skimage import feature, measure, segmentation
 
@@ -145,7 +157,7 @@ def _pieces(phase: Mask) -> NDArray[np.int_]:
 
 
 def _convexity(phase: Mask) -> float:
-    """Area of all pieces over that of their convex hulls."""
+    """Return the area of all particles of a phase over that of their convex hulls."""
     from skimage import measure
 
     pieces = measure.regionprops(_pieces(phase))  # type: ignore[no-untyped-call]
@@ -155,7 +167,7 @@ def _convexity(phase: Mask) -> float:
 
 
 def _unevenness(smooth: Array, matrix: Mask) -> float:
-    """Greatest difference of the matrix's median grey between tiles."""
+    """Return the range of the matrix's median grey value over 8 × 8 tiles of the image."""
     from scipy import ndimage
 
     core = ndimage.binary_erosion(matrix, iterations=4)

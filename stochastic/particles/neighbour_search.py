@@ -16,7 +16,7 @@ MAX_PAIRS = 3_000_000  # in a portion, so that it fits into memory
 
 
 def size_classes(radii: Array) -> Iterator[Rows]:
-    """Indices of particles whose radii lie within a factor of two, class by class."""
+    """Yield the indices of particles whose radii lie within a factor of two, class by class."""
     level = np.zeros(len(radii))
     if (top := radii.max(initial=0.0)) > 0:
         level = np.floor(np.log2(np.maximum(radii, top * 2.0**-20) / top))
@@ -25,7 +25,15 @@ def size_classes(radii: Array) -> Iterator[Rows]:
 
 
 def close_pairs(particles: Particles, gap: float) -> tuple[Rows, Rows]:
-    """Unordered pairs (first, second), each of shape (m,), whose surfaces are within `gap` (m)."""
+    """Return the unordered pairs of particles with surfaces closer than `gap`, in m.
+
+    Args:
+        particles: In a periodic box or a window.
+        gap: Distance between the surfaces, in m; 0 finds overlaps.
+
+    Returns:
+        Indices of first and second particle, shape (m,) each.
+    """
     box = particles.size if particles.periodic else None
     classes = list(size_classes(particles.radii))
     trees = [KDTree(particles.centres[members], boxsize=box) for members in classes]
@@ -49,7 +57,7 @@ def surface_distance(particles: Particles, first: Rows, second: Rows) -> Array:
 
 
 def balls(tree: KDTree, centres: Array, reach: Array) -> tuple[Rows, Rows]:
-    """Numbers of points in balls, shape (n,), and the points of all balls, one after the other."""
+    """Return the number of points in each ball (n,), and all their indices, ball after ball."""
     near = tree.query_ball_point(centres, reach, return_sorted=False)
     counts = np.fromiter(map(len, near), int, len(near))
     return counts, np.fromiter((k for ball in near for k in ball), int, counts.sum())
@@ -84,11 +92,14 @@ class Pairs:
 
 
 def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]:
-    """Pairs of discs i and images of j with |c_j − c_i| < reach_i, in portions of i.
+    """Yield ordered pairs of disc i and periodic image of disc j with centres within reach_i.
 
     Args:
         discs: The discs.
-        reach: Distance, shape (n,), in m.
+        reach: Largest distance of the centres for each i, shape (n,), in m.
+
+    Yields:
+        Indices i of a portion of the discs, of at most `MAX_PAIRS` pairs or so, and their pairs.
     """
     image, shift = _images(discs, float(reach.max()))
     places = discs.centres[image] + shift
@@ -106,7 +117,12 @@ def pairs_within(discs: Particles, reach: Array) -> Iterator[tuple[Rows, Pairs]]
 
 
 def _images(discs: Particles, margin: float) -> tuple[Rows, Array]:
-    """Indices of all discs, and shifts to all their images within `margin` of the rectangle."""
+    """Return disc and shift of all periodic images within `margin` (m) of the rectangle.
+
+    Returns:
+        Index of the disc of each image, shape (m,), the discs themselves first, and the shift of
+        its centre, shape (m, 2), in m.
+    """
     originals = np.arange(len(discs), dtype=np.intp)
     indices: list[Rows] = [originals]
     shifts: list[Array] = [np.zeros((len(discs), 2))]

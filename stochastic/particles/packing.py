@@ -51,7 +51,7 @@ class Packing:
         real(key, self.fraction, positive=True, most=self.shape.densest)
 
     def make(self, generator: np.random.Generator) -> Particles:
-        """One packing, in a box as large as the particles and the fraction make it.
+        """Return a random packing, in a square or cube that the particles fill to `fraction`.
 
         Raises:
             FailedError: The packing is too dense.
@@ -61,10 +61,10 @@ class Packing:
         return Particles(self._centres(radii, box, generator), radii, box)
 
     def _radii(self, generator: np.random.Generator) -> tuple[Array, float]:
-        """Radii, and the side of their box, in m.
+        """Draw radii until their box has room for the largest; return them and its side, in m.
 
-        Radii are drawn until the box holds the largest of them. On average this keeps the law's
-        shares (Wald's identity), as drawing all of them anew does not.
+        On average this keeps the frequencies of the law (Wald's identity), as drawing all of them
+        anew does not.
         """
         radii: Array = np.empty(0)
         side = -np.inf
@@ -83,24 +83,25 @@ class Packing:
         return radii, side
 
     def _centres(self, radii: Array, box: Array, generator: np.random.Generator) -> Array:
-        """Centres one by one where the packing is loose, else pushed apart; (n, d), in m."""
+        """Return centres (n, d), in m: of a loose packing placed one by one, else relaxed."""
         loose = self.fraction <= self.shape.sequential
         placed = random_sequential(radii, box, generator) if loose else None
         return relaxed(radii, box, generator) if placed is None else placed
 
 
 def random_sequential(radii: Array, box: Array, generator: np.random.Generator) -> Array | None:
-    """Centres of particles without overlap in a periodic box, shape (n, d), in m.
+    """Return centres (n, d), in m, of particles without overlap, by random sequential addition.
 
-    None if `MAX_PROPOSALS` proposals for a particle all overlap.
-
-    Particles are added from the largest down, in blocks; each one that fails is proposed again at a
-    new place, uniform in the box.
+    Particles are added from the largest down, in blocks; each one that overlaps is proposed again
+    at a new place, uniform in the periodic box.
 
     Args:
         radii: shape (n,), in m.
         box: Sides of the box, shape (d,), in m.
-        generator: Source of chance.
+        generator: Random number generator.
+
+    Returns:
+        The centres; None if `MAX_PROPOSALS` proposals for a particle all overlap.
     """
     order = np.argsort(-radii, kind="stable")
     falling = radii[order]
@@ -118,7 +119,13 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
 
 
 class _Standing:
-    """Particles in place, for tests of which proposals hit them."""
+    """Particles that have their places, for tests whether proposed ones overlap them.
+
+    Args:
+        centres: shape (n, d), in m.
+        radii: shape (n,), in m.
+        box: Sides of the periodic box, shape (d,), in m.
+    """
 
     def __init__(self, centres: Array, radii: Array, box: Array) -> None:
         classes = list(size_classes(radii)) if len(radii) else []
@@ -128,7 +135,12 @@ class _Standing:
         ]
 
     def hit(self, proposal: Array, radii: Array) -> Mask:
-        """Mask of proposed particles that overlap one in place, shape (n,)."""
+        """Return which proposed particles overlap a placed one, a mask (n,).
+
+        Args:
+            proposal: Proposed centres, shape (n, d), in m.
+            radii: Their radii, shape (n,), in m.
+        """
         hit = np.zeros(len(proposal), bool)
         for tree, centres, standing in self.parts:
             open_ = np.flatnonzero(~hit)
@@ -141,7 +153,10 @@ class _Standing:
 
 
 def _added(standing: _Standing, radii: Array, generator: np.random.Generator) -> Array | None:
-    """Centres for more particles among those in place, shape (n, d); None if one has no place."""
+    """Return centres (n, d) of further particles that overlap neither placed ones nor each other.
+
+    None if a particle found no place in `MAX_PROPOSALS` proposals.
+    """
     box = standing.box
     new = np.full((len(radii), len(box)), np.nan)
     fresh = _Standing(new[:0], radii[:0], box)
@@ -161,7 +176,7 @@ def _added(standing: _Standing, radii: Array, generator: np.random.Generator) ->
 
 
 def _first_come(proposal: Array, radii: Array, box: Array) -> Mask:
-    """Mask of proposals that overlap no earlier proposal that stays."""
+    """Return which proposals are accepted, a mask (n,): they overlap no earlier accepted one."""
     state = np.zeros(len(proposal), int)  # 0 open, 1 stays, -1 goes
     if len(proposal) < 2:
         return np.asarray(state == 0)
@@ -175,12 +190,14 @@ def _first_come(proposal: Array, radii: Array, box: Array) -> Mask:
 
 
 def relaxed(radii: Array, box: Array, generator: np.random.Generator) -> Array:
-    """Centres of particles without overlap in a periodic box, shape (n, d), in m.
+    """Return centres (n, d), in m, of particles without overlap in a periodic box, by relaxation.
+
+    Random centres are pushed apart (`_push`) and then moved at random (`_shake`).
 
     Args:
         radii: shape (n,), in m.
         box: Sides of the box, shape (d,), in m.
-        generator: Source of chance.
+        generator: Random number generator.
 
     Raises:
         FailedError: The particles still overlap after all steps.
@@ -194,7 +211,13 @@ def relaxed(radii: Array, box: Array, generator: np.random.Generator) -> Array:
 
 
 def _push(particles: Particles, growth: float) -> Particles:
-    """Relaxes until no two particles overlap; they repel as if grown."""
+    """Return the particles moved apart until none overlap, by FIRE (Bitzek et al. 2006).
+
+    The energy ½ Σ overlap² of particles with radii grown by the factor `growth` is minimised.
+
+    Raises:
+        FailedError: Particles overlap after `MAX_STEPS` steps.
+    """
     centres, box, radii = particles.centres, particles.size, particles.radii * growth
     velocity, step, mixing, downhill = np.zeros_like(centres), 0.1, 0.1, 0
     skin, overlap = 0.6 * float(particles.radii.mean()), 0.0
@@ -227,7 +250,10 @@ def _push(particles: Particles, growth: float) -> Particles:
 def _repulsion(
     centres: Array, radii: Array, pairs: tuple[Rows, Rows], box: Array
 ) -> tuple[Array, float]:
-    """Forces, shape (n, d), and the greatest overlap, in m."""
+    """Return the force on each particle, shape (n, d), and the greatest overlap, in m.
+
+    Each pair repels along the line of centres with a force equal to its overlap.
+    """
     first, second = pairs
     offset = nearest_image(centres[second] - centres[first], box)
     distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-300)
@@ -241,7 +267,10 @@ def _repulsion(
 
 
 def _shake(particles: Particles, generator: np.random.Generator) -> Array:
-    """Random moves that keep clear of the neighbours' old and new places; the centres."""
+    """Return centres (n, d) after `MOVES` random moves of each particle without overlap.
+
+    A move is made if it keeps clear of both old and new places of the neighbours.
+    """
     box, dimensions, radii = particles.size, len(particles.size), particles.radii
     reach = 0.25 * particles.spacing * (1 - particles.fraction ** (1 / dimensions))
     centres = particles.centres

@@ -40,7 +40,7 @@ class Shape:
         return float(self.factor ** (-1 / self.dimensions))
 
     def shares(self, radii: ArrayLike) -> Array:
-        """Share of a cell that particles take, of reduced radii of any shape."""
+        """Return the area or volume fraction of a cell that particles of reduced radii fill."""
         return np.asarray(self.factor * np.asarray(radii, float) ** self.dimensions)
 
     def reduced_radius(self, fraction: float) -> float:
@@ -78,6 +78,7 @@ class Particles:
     periodic: bool = True
 
     def __post_init__(self) -> None:
+        """Check the shapes and values, wrap centres into a periodic box, and store float arrays."""
         size = np.array(self.size, float).ravel()
         centres: Array = np.array(self.centres, float).reshape(-1, len(size))
         radii = np.array(self.radii, float).ravel()
@@ -121,17 +122,17 @@ class Particles:
         return float((self.measure / len(self)) ** (1 / len(self.size)))
 
     def separation(self, first: Rows, second: Rows) -> Array:
-        """Vectors from centres `first` to the nearest images of `second`, shape (…, d), in m."""
+        """Return vectors from centres `first` to the nearest images of `second`, (…, d), in m."""
         offset: Array = self.centres[second] - self.centres[first]
         return nearest_image(offset, self.size) if self.periodic else offset
 
 
 def nearest_image(offset: Array, size: Array) -> Array:
-    """Vectors between centres, shape (…, d), brought to the nearest image in a periodic box."""
+    """Return vectors between centres (…, d) to the nearest image in a periodic box of `size`."""
     return np.asarray(offset - size * np.round(offset / size))
 
 
 def _refuse(bad: Mask | np.bool_, name: str, values: Array, allowed: str) -> None:
-    """Refuses the first bad one of some values."""
+    """Refuse an array of values of which some are marked as bad, and name the first of them."""
     row = int(np.argmax(bad))
     require(not bad.any(), f"{name}[{row}]", value=values[row].tolist(), allowed=allowed)

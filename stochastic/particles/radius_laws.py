@@ -19,7 +19,7 @@ LEAST, MOST = 1e-12, 1e6  # m; no particle of a material is smaller or larger
 
 
 def require_radii(key: str, radii: ArrayLike) -> None:
-    """Refuses none, and radii outside [1e-12, 1e6] m, which are slips of a unit or of a digit.
+    """Refuse an empty list and radii outside [1e-12, 1e6] m, which have a wrong unit or digit.
 
     Raises:
         RefusedError: One lies outside.
@@ -110,7 +110,7 @@ class MeasuredRadii:
 
     @classmethod
     def read(cls, path: Path) -> MeasuredRadii:
-        """Radii of a CSV file with a column r, or d for diameters, and its unit: ``d [mm]``.
+        """Return the radii of a CSV file with a column r, or d of diameters, as ``d [mm]``.
 
         Raises:
             RefusedError: The file cannot be read, or a row has no radius.

@@ -63,9 +63,13 @@ class Apollonius:
         return np.asarray(2 * self.discs.radii / np.sqrt(self.areas))
 
     def walls(self, count: int) -> tuple[Array, Array]:
-        """`count` angles along each arc, its ends among them, and the distance of its wall there.
+        """Return points along the wall of each arc in polar coordinates of its cell's centre.
 
-        Two arrays of shape (count, m), the distance from the centre in m.
+        Args:
+            count: Number of points on each arc, its ends among them.
+
+        Returns:
+            Angle and distance, the latter in m, two arrays of shape (count, m).
         """
         angle = np.asarray(np.linspace(self.start, self.end, count), float)
         near, far = _near_far(self.discs.radii, self.cell, self.neighbour, self.offset)
@@ -74,11 +78,11 @@ class Apollonius:
 
 
 def apollonius(discs: Particles) -> Apollonius:
-    """Apollonius diagram of `discs`, of which none lies inside another one.
+    """Return the Apollonius diagram of discs, of which none lies inside another one.
 
-    The neighbours are certain, not guessed: cells from the discs nearby bound the true ones, and a
-    disc j can only cut the cell of i if |c_j − c_i| < 2 ρ_max,i − r_i + r_j; all such discs are
-    then taken into account.
+    Cells bounded by the discs nearby contain the true ones, and a disc j can only cut the cell of i
+    if |c_j − c_i| < 2 ρ_max,i − r_i + r_j, with ρ_max,i the largest radius of that first cell; all
+    such discs are then taken into account.
 
     Args:
         discs: Periodic box or open window.
@@ -98,7 +102,10 @@ def apollonius(discs: Particles) -> Apollonius:
 
 
 def _near_far(radii: Array, first: Rows, second: Rows, offset: Array) -> tuple[Array, Array]:
-    """Sums d + Δ and differences d − Δ of pairs; a window's edge is a wall to an equal disc."""
+    """Return d + Δ and d − Δ of pairs, (m,): d distance of the centres, Δ = r_first − r_second.
+
+    At a window's edge, where `second` is −1, Δ is 0.
+    """
     distance = np.hypot(offset[:, 0], offset[:, 1])
     difference = np.where(second < 0, 0.0, radii[first] - radii[second])
     return distance + difference, distance - difference
@@ -106,14 +113,14 @@ def _near_far(radii: Array, first: Rows, second: Rows, offset: Array) -> tuple[A
 
 @dataclass(frozen=True, eq=False)
 class _Walls:
-    """Walls of the discs towards their neighbours, and the envelopes that they form."""
+    """Walls of discs towards their neighbours, `pairs`, and the arcs of them that bound cells."""
 
     discs: Particles
     pairs: Pairs
     arcs: Arcs
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
-        """Anomalies at both ends of every arc, and d + Δ, d − Δ of its wall."""
+        """Return the hyperbolic anomalies at both ends of each arc, d + Δ and d − Δ; all (m,)."""
         wall = self.arcs.function
         offset = self.pairs.offset[wall]
         near, far = _near_far(
@@ -133,10 +140,10 @@ class _Walls:
         return np.asarray(np.bincount(self.arcs.owner, sectors, len(self.discs)), float)
 
     def largest_radius(self) -> Array:
-        """Upper bound of the distance from the centre to the cell's boundary, shape (n,).
+        """Return an upper bound of the distance from each centre to its cell's boundary, (n,).
 
-        Each corner is taken from that of its two walls which it lies less far out on; a per mille
-        is added for round-off.
+        The boundary is farthest at a corner. Of its two walls the one with the smaller anomaly
+        there gives the distance; a per mille is added for round-off.
         """
         start, end, near, far = self._anomalies()
         owner = self.arcs.owner
@@ -153,7 +160,12 @@ class _Walls:
 
 
 def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
-    """Cells of portions of the discs, with all others within reach and own images around them."""
+    """Yield the walls of portions of the discs: envelopes of all neighbours within reach.
+
+    Args:
+        discs: The discs.
+        reach: Distance up to which other discs count as neighbours, shape (n,), in m.
+    """
     for portion, neighbours in pairs_within(discs, reach):
         near, far = _near_far(discs.radii, neighbours.first, neighbours.second, neighbours.offset)
         walls = neighbours.where((near > 0) & (far > 0))
@@ -171,7 +183,11 @@ def _walls(discs: Particles, reach: Array) -> Iterator[_Walls]:
 
 
 def _bounds(discs: Particles, portion: Rows) -> Pairs:
-    """Pairs that bound the cells: images of a disc in a periodic box, mirror images in a window."""
+    """Return the pairs that bound every cell: a disc and its own images, or its mirror images.
+
+    In a periodic box these are the eight nearest images, in a window the mirror images at its four
+    edges, with `second` −1.
+    """
     if discs.periodic:
         shifts = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) * discs.size
         return Pairs(
@@ -186,23 +202,23 @@ def _bounds(discs: Particles, portion: Rows) -> Pairs:
 
 
 def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
-    """Cells clear of the window's edge, with weights that make up for the others.
+    """Return the cells that no disc outside the window can change, and their weights.
 
-    A cell counts only if no disc whose centre lies beyond the window's edge could change it. Such a
-    disc, if none is larger than the largest one seen, shows no deeper in the window than that one's
-    radius; taking all that lies beyond for one such disc, the wall towards it is a parabola, ρ = (D
-    + r)/(1 + cos ψ), D the distance from the centre to the edge less the largest radius: the cell
-    is whole if ρ (1 + cos ψ) − r ≤ D all around, for all four edges. Large cells fail this more
-    often than small ones; each whole cell therefore stands for 1/p cells, p the share of places in
-    the window where its like would be whole (Miles 1974, Lantuéjoul 1978). This holds for a section
-    that looks the same everywhere, with every disc listed whose centre lies in the window.
+    A disc beyond the window's edge, if none is larger than the largest one seen, shows no deeper in
+    the window than that one's radius; taking all that lies beyond for one such disc, the wall
+    towards it is a parabola, ρ = (D + r)/(1 + cos ψ), D the distance from the centre to the edge
+    less the largest radius: the cell is unchanged if ρ (1 + cos ψ) − r ≤ D all around, for all four
+    edges. Large cells fail this more often than small ones; each counted cell therefore stands for
+    1/p cells, p the fraction of places in the window where its like would count (Miles 1974,
+    Lantuéjoul 1978). This holds for a section that looks the same everywhere, with every disc
+    listed whose centre lies in the window.
 
     Returns:
-        Indices of the discs whose cells are whole, shape (k,), and the number of cells that each
-        stands for, shape (k,); all and 1 in a periodic box.
+        Indices of their discs, shape (k,), and the number of cells that each stands for, shape
+        (k,); all and 1 in a periodic box.
 
     Raises:
-        RefusedError: No cell is whole.
+        RefusedError: There is no such cell.
     """
     discs = diagram.discs
     if discs.periodic:
@@ -225,10 +241,10 @@ def counted_cells(diagram: Apollonius) -> tuple[Rows, Array]:
 
 
 def _reach(diagram: Apollonius) -> Array:
-    """Greatest ρ (1 + cos ψ) − r of each cell towards the four edges, shape (n, 4), in m.
+    """Return max ρ (1 + cos ψ) − r over each cell's boundary for the four edges, (n, 4), in m.
 
-    The greatest of `ANGLES` on each arc, its ends among them: their second order is far below what
-    the largest disc beyond the edge is known by.
+    ρ is the distance from the centre and ψ the angle from the edge's direction. The maximum over
+    `ANGLES` points of each arc is taken, whose error is of second order.
     """
     angle, rho = diagram.walls(ANGLES)
     reach = np.full((len(diagram.discs), 4), -np.inf)

@@ -17,7 +17,7 @@ from alphacut.fuzzy.refused import FailedError
 
 
 def anomaly(psi: Array, near: Array, far: Array) -> Array:
-    """Hyperbolic anomaly s of the angle ψ.
+    """Return the hyperbolic anomaly s of the angle ψ: tanh(s/2) = √(near/far) tan(ψ/2), shape (m,).
 
     Args:
         psi: Angle from the direction of the neighbour, shape (m,), brought to [−π, π] here.
@@ -31,7 +31,14 @@ def anomaly(psi: Array, near: Array, far: Array) -> Array:
 
 
 def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
-    """Area between the centre and the wall from anomaly `start` to `end`, shape (m,)."""
+    """Return the area between centre and hyperbolic wall from anomaly `start` to `end`, (m,).
+
+    Args:
+        start: Anomaly at the beginning of the arc, shape (m,).
+        end: Anomaly at its end, shape (m,).
+        near: d + Δ, shape (m,).
+        far: d − Δ, shape (m,).
+    """
     middle, half = (start + end) / 2, (end - start) / 2
     sum_, difference = 2 / near, 2 / far  # M + C, M − C
     bulge = 2 * np.sinh(middle / 2) ** 2 * np.sinh(half) + _sinh_less_argument(half)
@@ -41,7 +48,7 @@ def sector_area(start: Array, end: Array, near: Array, far: Array) -> Array:
 
 
 def _sinh_less_argument(x: Array) -> Array:
-    """Sinh x − x to full relative precision."""
+    """Return sinh x − x to full relative precision, by its series for |x| < 1."""
     square, series = x * x, np.ones_like(x)
     for k in range(9, 0, -1):
         series = 1 + series * square / ((2 * k + 2) * (2 * k + 3))
@@ -73,7 +80,7 @@ class Arcs:
 
 
 def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
-    """Upper envelopes of groups of functions a cos φ + b sin φ + c.
+    """Return the arcs of the upper envelopes of groups of functions a cos φ + b sin φ + c.
 
     Args:
         a: Coefficients of cos φ, shape (k,), the groups one after the other.
@@ -110,32 +117,51 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
 def _sweep(
     a: Array, b: Array, c: Array, table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Walk once around the circle with all rows; arcs as (owner, function, start, end)."""
+    """Return the arcs of n envelopes by one sweep around the circle, n at a time.
+
+    Args:
+        a: Coefficients of cos φ, shape (n, w), one row a group.
+        b: Coefficients of sin φ, shape (n, w).
+        c: Constants, shape (n, w).
+        table: Index of each function among all groups, shape (n, w).
+        group: Number of each group, shape (n,).
+
+    Returns:
+        Group, function, start and end of each arc, as of `Arcs`.
+    """
     row = np.arange(len(a), dtype=np.intp)
     summit = np.argmax(np.hypot(a, b) + c, axis=1)  # the highest of all is on the envelope
     phi = np.arctan2(b[row, summit], a[row, summit])
     live, limit = row, phi + 2 * np.pi
-    took: list[tuple[Rows, Rows, Array]] = []  # row, function that takes over, angle
+    crossings: list[tuple[Rows, Rows, Array]] = []  # row, function that takes over, angle
     for step in range(4 * a.shape[1] + 16):
         after = phi + STRIDE if step else phi
         current, ahead = _next_crossing(a, b, c, after)
-        took.append((live, current, phi))
+        crossings.append((live, current, phi))
         phi = after + ahead
         on = phi < limit
         if not on.all():
             a, b, c, live, limit, phi = a[on], b[on], c[on], live[on], limit[on], phi[on]
         if not len(live):
-            return _arcs(took, table, group)
+            return _arcs(crossings, table, group)
     raise FailedError(
         "an envelope did not close after four times as many steps as it has functions"
     )
 
 
 def _arcs(
-    took: list[tuple[Rows, Rows, Array]], table: Rows, group: Rows
+    crossings: list[tuple[Rows, Rows, Array]], table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Join the take-overs of each row into arcs, across the start of the circle too."""
-    live, function, start = (np.concatenate(column) for column in zip(*took, strict=True))
+    """Return group, function, start and end of the arcs between the crossings of a sweep.
+
+    An arc across the start of the sweep is joined into one.
+
+    Args:
+        crossings: Rows, columns of functions that become uppermost, and φ of each step.
+        table: Index of each function among all groups, shape (n, w).
+        group: Number of each group, shape (n,).
+    """
+    live, function, start = (np.concatenate(column) for column in zip(*crossings, strict=True))
     order = np.argsort(live, kind="stable")
     live, start = live[order], start[order]
     function = table[live, function[order]]
@@ -151,12 +177,22 @@ def _arcs(
 
 
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Array]:
-    """Uppermost function of each row at φ, and the angle at which another rises above it.
+    """Return the uppermost function of each row at φ, and the angle to its next crossing.
 
-    With g ≤ 0 the difference of another function to the uppermost, h = −g(φ) and slope q = g'(φ),
-    the crossing solves (c − p) t² + 2 q t − h = 0 for the root at which g rises; its 1/t orders the
-    angles δ = 2 arccot(1/t) in (0, 2π) from the greatest to the least, and is computed without
-    cancellation.
+    With g ≤ 0 the difference of another function to the uppermost, h = −g(φ), slope q = g'(φ) and p
+    the oscillating part of g at φ, the crossing solves (c − p) t² + 2 q t − h = 0 for the root at
+    which g rises; its 1/t orders the angles δ = 2 arccot(1/t) in (0, 2π) from the greatest to the
+    least, and is computed without cancellation.
+
+    Args:
+        a: Coefficients of cos φ, shape (n, w).
+        b: Coefficients of sin φ, shape (n, w).
+        c: Constants, shape (n, w).
+        phi: Angles, shape (n,).
+
+    Returns:
+        Column of the uppermost function, shape (n,), and the angle from φ at which another one
+        rises above it, shape (n,).
     """
     row = np.arange(len(a))
     cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]

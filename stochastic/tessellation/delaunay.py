@@ -34,10 +34,11 @@ class Neighbours:
 
 
 def neighbours(discs: Particles) -> Neighbours:
-    """Delaunay neighbours, on a torus or of those centres in a window that are not on its rim.
+    """Return the Delaunay neighbours of the disc centres.
 
-    The torus is laid out with a layer of images, `LAYER` mean spacings wide. Its triangles are its
-    own where no circumcircle is wider than that, as in any packing.
+    A periodic section is triangulated with a layer of images, `LAYER` mean spacings wide: its
+    triangles are those of the periodic plane if no circumcircle is wider, as in any packing. In a
+    window, centres on the convex hull are not counted.
     """
     from scipy.spatial import Delaunay, QhullError
 
@@ -62,7 +63,7 @@ def neighbours(discs: Particles) -> Neighbours:
 
 
 def neighbouring_values(diagram: Apollonius, values: Array) -> Array:
-    """Pairs of `values` of cells that share a wall, either way round, shape (2, m)."""
+    """Return pairs of `values` of cells that share a wall, in both orders, shape (2, m)."""
     once = diagram.neighbour > diagram.cell
     pair = np.unique(np.stack([diagram.cell[once], diagram.neighbour[once]]), axis=1)
     return np.concatenate([values[pair], values[pair[::-1]]], axis=1)

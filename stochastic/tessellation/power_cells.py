@@ -18,7 +18,9 @@ from alphacut.stochastic.particles.particles import Particles
 
 
 def cell_volumes(spheres: Particles) -> Array:
-    """Volumes of the power cells in m³, shape (n,); they fill the cube.
+    """Return the volumes of the power (Laguerre) cells of spheres in m³, shape (n,).
+
+    They fill the periodic cube.
 
     Raises:
         FailedError: Voro++ is not installed or fails, or a sphere has no cell.

@@ -42,11 +42,11 @@ class ThetaLaw(Protocol):
         """P(Θ ≤ theta), any shape: 0 at `lower` and 1 at `upper`."""
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """The θ below which a share `probability` in [0, 1] lies, any shape."""
+        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape."""
 
 
 def require_support(lower: float, upper: float, unit: float = 0.0) -> None:
-    """Refuse a support that is not two finite ends in order, `MIN_WIDTH` or more apart.
+    """Refuse a support of θ that is not finite and rising, or narrower than `MIN_WIDTH` allows.
 
     Raises:
         RefusedError: It is not.
@@ -108,7 +108,11 @@ class TruncatedNormal:
         return np.asarray(self._below(inside) / self.mass, float)
 
     def quantile(self, probability: ArrayLike) -> Array:
-        """The θ below which a share `probability` in [0, 1] lies, any shape."""
+        """Return θ with P(Θ ≤ θ) = probability in [0, 1], any shape.
+
+        Raises:
+            RefusedError: A probability lies outside [0, 1].
+        """
         from scipy.special import ndtri
 
         share = np.asarray(probability, float)

@@ -45,11 +45,11 @@ class ThetaRule:
 
 
 def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRule:
-    """Gauss–Legendre with `points` nodes in each of `layers` equal slabs, weighted by f_Θ.
+    """Return a Gauss–Legendre rule with `points` nodes in each of `layers` equal intervals of θ.
 
-    The weights are scaled to the sum 1, so that a constant is its own mean whatever the number of
-    layers; where the density is smooth, the error of the mean of a smooth function falls with the
-    power 2·points of the layer height.
+    The weights contain the density f_Θ and are scaled to the sum 1, so that a constant is its own
+    mean. Where the density is smooth, the error of the mean of a smooth function falls with the
+    power 2·points of the interval's length.
 
     Example:
         >>> from alphacut.stochastic import TruncatedNormal
@@ -61,12 +61,12 @@ def layered_rule(distribution: ThetaLaw, *, layers: int, points: int) -> ThetaRu
 
 
 def level_rule(distribution: ThetaLaw, levels: Array, *, points: int) -> ThetaRule:
-    """As `layered_rule`, in slabs between levels of θ, equal or not, shape (layers + 1,)."""
+    """As `layered_rule`, between given levels of θ, shape (layers + 1,), rising."""
     return _weighted(distribution, levels, np.polynomial.legendre.leggauss(points))
 
 
 def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRule:
-    """A rule on [−1, 1] in each panel between edges, weighted by f_Θ and scaled to the sum 1."""
+    """Return a rule composed of `rule` on [−1, 1] in each panel, weighted by f_Θ to the sum 1."""
     x, w = rule
     half = np.diff(edges)[:, None] / 2
     nodes = (edges[:-1, None] + half * (1 + x)).ravel()
@@ -75,7 +75,7 @@ def _weighted(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> ThetaRu
 
 
 def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
-    """Gauss rule of f_Θ itself: exact for polynomials in θ up to degree 2·points − 1.
+    """Return the Gauss rule of the density f_Θ, exact for polynomials of degree 2·points − 1.
 
     The recurrence of the orthogonal polynomials comes from the discretised Stieltjes procedure on a
     fine Legendre rule (Gautschi, Orthogonal Polynomials, 2004, section 2.2.3), the nodes from the
@@ -111,7 +111,7 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
 
 
 def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
-    """Legendre rule in panels of at most 1 that integrates the density."""
+    """Return a Gauss–Legendre rule in panels of θ that integrates the density to round-off."""
     panels = min(math.ceil(law.upper - law.lower), _FIRST_PANELS)
     edges = np.asarray(np.linspace(law.lower, law.upper, panels + 1), float)
     rule = np.polynomial.legendre.leggauss(points)
@@ -119,18 +119,18 @@ def _fine_rule(law: ThetaLaw, points: int) -> ThetaRule:
 
 
 def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Edges of panels on which a rule integrates the density, rising, shape (m + 1,), m ≥ n.
+    """Return edges of panels on which a rule integrates the density, rising, shape (m + 1,).
 
-    A panel whose integrals miss those by the distribution function is halved. Corners and
-    jumps of the density, steep ends and narrow peaks are met by halving alone.
+    A panel on which the rule misses the difference of the distribution function is halved, which
+    resolves corners, jumps and narrow peaks of the density.
 
     Args:
         law: Law of θ.
-        edges: To begin with, rising, shape (n + 1,).
+        edges: First edges, rising, shape (n + 1,), n ≤ m.
         rule: Nodes and weights of a rule on [−1, 1].
 
     Raises:
-        RefusedError: What all panels miss together stays above `MASS_GAP`: density and distribution
+        RefusedError: The errors of all panels sum to more than `MASS_GAP`: density and distribution
             function are not of one law, or the density is not finite.
     """
     for _ in range(_HALVINGS):
@@ -153,10 +153,10 @@ def _panel_edges(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Arra
 
 
 def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
-    """Probability by which the rule on each panel misses that of the distribution function F.
+    """Return the error of a rule on each panel against the distribution function F, shape (n,).
 
-    Of f and of x f, x from −1 to 1 over the panel, whose integral is [x F] − ∫ F dx: a jump right
-    in the middle of a panel shows in the second alone.
+    The larger of the errors of ∫ f and of ∫ x f, x from −1 to 1 over the panel, which is [x F] − ∫
+    F dx: a jump right in the middle of a panel shows in the second alone.
     """
     x, w = rule
     half = np.diff(edges)[:, None] / 2
@@ -169,11 +169,11 @@ def _mass_gaps(law: ThetaLaw, edges: Array, rule: tuple[Array, Array]) -> Array:
 
 
 def between_nodes(nodes: Array, values: Array, at: Array) -> Array:
-    """A curve at `at` (any shape) from its values at rising nodes, shape (n,).
+    """Interpolate values at rising nodes (n,); return the curve at `at`, of its shape.
 
-    The polynomial through all nodes where they are those of one Gauss rule, whose Lebesgue constant
-    is small: its error falls with the number of nodes as that of the rule itself does. Pieces that
-    keep the order of the values elsewhere.
+    The polynomial through all nodes if they are those of one Gauss rule, whose Lebesgue constant is
+    small: its error falls with the number of nodes as that of the rule itself does. Otherwise
+    monotone cubic pieces (PCHIP).
     """
     from scipy.interpolate import BarycentricInterpolator, PchipInterpolator
 
