@@ -19,6 +19,7 @@ from alphacut.rve.cell import AnyPhase, Phase
 from alphacut.rve.phase_energies import CONSTANTS, first_order
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.energies import complex_moduli
+from alphacut.rve.spheres.result import HomogenisedSpheres
 
 MAX_FIRST_ORDER = 0.1
 """Loss factor of a phase above which the series takes complex moduli."""
@@ -56,8 +57,8 @@ def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
 def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
     """Loss factors of E, G and K of a result that knows the energies of its phases.
 
-    They are of first order; where a phase has more than `MAX_FIRST_ORDER`, those of the series are
-    of complex moduli.
+    They are of first order; where a phase has more than `MAX_FIRST_ORDER`, those of the plane
+    series are of complex moduli.
 
     Args:
         result: Of any model.
@@ -70,12 +71,16 @@ def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
         raise RefusedError("energies", None, "a model with energies=True")
     values, errors = first_order(result.energies, losses, result.constants_of)
     second_order = np.ptp(losses) ** 2 * values
-    if losses.max() > MAX_FIRST_ORDER and result.method == "series":
+    if losses.max() > MAX_FIRST_ORDER and _is_plane_series(result):
         values, second_order = _by_complex_moduli(result, losses), np.zeros(3)
     errors = errors + second_order + ROUND_OFF * abs(values)
     return LossFactors(
         *(dict(zip(CONSTANTS, map(float, x), strict=True)) for x in (values, errors))
     )
+
+
+def _is_plane_series(result: HomogenisedStiffness) -> bool:
+    return result.method == "series" and not isinstance(result, HomogenisedSpheres)
 
 
 def _by_complex_moduli(result: HomogenisedStiffness, losses: Array) -> Array:

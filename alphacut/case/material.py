@@ -246,7 +246,7 @@ class RoundCell(Section):
 
     @model_validator(mode="after")
     def _losses(self) -> Self:
-        """Refuses losses of one phase alone, of spheres, and of bulk moduli that are too large."""
+        """Refuses losses of one phase alone, and of bulk moduli that are too large."""
         for name, partner in (("matrix", "inclusion"), ("inclusion", "matrix")):
             loss, bulk = (getattr(self, f"{name}_loss{x}") for x in ("", "_bulk"))
             beside = getattr(self, f"{partner}_loss") is not None
@@ -270,13 +270,6 @@ class RoundCell(Section):
                     value=f"{bulk.support.upper:g}",
                     allowed=allowed,
                 )
-        fibres = not self.losses or self.particles != "spheres"
-        require(
-            fibres,
-            "cell.matrix_loss",
-            value="beside spheres",
-            allowed="losses of cylinders or ellipses",
-        )
         return self
 
 

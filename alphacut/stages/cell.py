@@ -103,7 +103,8 @@ def _model_of_particle(
     """`solve` of a model of a cell with one particle."""
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
-        return SphereSeriesModel(accuracy=max(SHARE * (tolerance or SPHERES), 1e-11)).solve
+        accuracy = max(SHARE * (tolerance or SPHERES), 1e-11)
+        return SphereSeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve
     if cell.has_series and method in ("auto", "series"):
         accuracy = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
         return SeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve

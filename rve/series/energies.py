@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 
 import numpy as np
@@ -14,7 +14,7 @@ from alphacut.rve.series.means import Mean, finer_count
 from alphacut.rve.series.multipoles import LOADS, Contrast, modulus, multipoles
 from alphacut.stochastic import RadiusMap, gauss_rule
 
-SAFETY, NOISE = 1.6, 1e-12
+SAFETY, NOISE = 1.6, 1e-9
 
 
 def complex_moduli(radius: Array, bulk: Array, shear: Array, *, harmonics: int) -> Array:
@@ -47,24 +47,43 @@ def phase_energies(radius: Array, matrix: Phase, inclusion: Phase, *, harmonics:
 
 
 def mean_energies(
-    radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], means: Sequence[Mean]
+    energies_of: Callable[..., Array],
+    radius_map: RadiusMap,
+    matrix: Phase,
+    inclusions: Sequence[Phase],
+    means: Sequence[Mean],
 ) -> list[PhaseEnergies]:
-    """Energies of means over θ; a finer rule with half as many terms more tells errors."""
-    energies = []
-    for inclusion, mean in zip(inclusions, means, strict=True):
-        count, rule = (
-            mean.terms,
-            gauss_rule(radius_map.distribution, points=finer_count(mean.curve.theta.size)),
-        )
-        values, judge = (
-            np.tensordot(
-                x.weights, phase_energies(radius_map(theta), matrix, inclusion, harmonics=n), 1
-            )
-            for x, theta, n in (
-                (mean.curve, mean.curve.theta, count),
-                (rule, rule.nodes, count + max(2, count // 2)),
-            )
-        )
-        errors = SAFETY * abs(values - judge) + NOISE * values.sum(axis=(0, 1))
-        energies.append(PhaseEnergies(np.asarray(values), np.asarray(errors)))
-    return energies
+    """Energies of means over θ, one for each inclusion.
+
+    Args:
+        energies_of: `phase_energies` of the series at hand.
+        radius_map: Radii over θ.
+        matrix: Material outside the particle.
+        inclusions: Materials of the particle.
+        means: Mean stiffness for each of them.
+    """
+    return [
+        _energies_of_mean(energies_of, radius_map, (matrix, inclusion), mean)
+        for inclusion, mean in zip(inclusions, means, strict=True)
+    ]
+
+
+def _energies_of_mean(
+    energies_of: Callable[..., Array],
+    radius_map: RadiusMap,
+    phases: tuple[Phase, Phase],
+    mean: Mean,
+) -> PhaseEnergies:
+    """Energies of one inclusion; the farther of two finer means tells the error, as of moduli."""
+    nodes, terms, law = mean.curve.theta.size, mean.terms, radius_map.distribution
+    levels: list[tuple[Array, Array, int]] = [(mean.curve.theta, mean.curve.weights, terms)]
+    for _ in range(2):
+        nodes, terms = finer_count(nodes), terms + max(2, terms // 2)
+        rule = gauss_rule(law, points=nodes)
+        levels.append((rule.nodes, rule.weights, terms))
+    values, *finer = (
+        np.tensordot(weights, energies_of(radius_map(theta), *phases, harmonics=n), 1)
+        for theta, weights, n in levels
+    )
+    distance = np.max([abs(values - judge) for judge in finer], axis=0)
+    return PhaseEnergies(values, SAFETY * distance + NOISE * values.sum(axis=(0, 1)))

@@ -15,22 +15,16 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.cubic import cubic_voigt
 
 
-def bulk_and_shear(phase: Phase) -> tuple[float, float]:
-    """K and μ of a material in space, in Pa."""
-    e, nu = phase.modulus, phase.poisson
-    return e / (3 * (1 - 2 * nu)), e / (2 * (1 + nu))
-
-
 def space_stiffness(phase: Phase) -> Array:
     """Stiffness in Voigt order (11, 22, 33, 23, 13, 12 with 2 ε), shape (6, 6), in Pa."""
-    bulk, shear = (np.asarray(modulus) for modulus in bulk_and_shear(phase))
+    bulk, shear = phase.bulk_and_shear
     return cubic_voigt(bulk, shear, shear)
 
 
 def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
     share = np.asarray(fraction, float)
-    bulks, shears = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
+    bulks, shears = zip(matrix.bulk_and_shear, inclusion.bulk_and_shear, strict=True)
     ends = [
         [
             harmonic_about(share, pair, x)
@@ -46,8 +40,8 @@ def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
 
     The bound that the matrix gives: the lower one of stiffer spheres, the upper one of softer.
     """
-    share, around = np.asarray(fraction, float), _around(*bulk_and_shear(matrix))
-    pairs = zip(bulk_and_shear(matrix), bulk_and_shear(inclusion), strict=True)
+    share, around = np.asarray(fraction, float), _around(*matrix.bulk_and_shear)
+    pairs = zip(matrix.bulk_and_shear, inclusion.bulk_and_shear, strict=True)
     return np.array([harmonic_about(share, pair, x) for pair, x in zip(pairs, around, strict=True)])
 
 

@@ -5,7 +5,12 @@ import pytest
 
 from alphacut.rve import Ellipse, Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
 from alphacut.rve.axial import AxialStiffness
-from alphacut.rve.engineering_constants import FREE, PLANE_STRAIN, engineering_constants
+from alphacut.rve.engineering_constants import (
+    FREE,
+    PLANE_STRAIN,
+    EngineeringConstants,
+    engineering_constants,
+)
 from alphacut.rve.fibre_constants import fibre_constants
 from alphacut.rve.mesh.curved import plane_mesh
 from alphacut.rve.slices.plane_cell import PlaneCell
@@ -77,6 +82,23 @@ def strained_along(cell, phases, fraction):
     shares = np.array([1 - fraction, fraction])
     mean = shares @ [phase.stiffness[0, 0] for phase in phases]
     return mixed / AREA, mean - load.dot(field) / AREA
+
+
+def test_errors_of_the_constants_cover_every_stiffness_within_its_errors():
+    """At random stiffnesses off by their errors, with either sign; a third would not cover them."""
+    chance = np.random.default_rng(np.random.SeedSequence().entropy)
+    covered = []
+    for _ in range(20):
+        root = np.eye(3) + 0.3 * chance.uniform(-1, 1, (3, 3))
+        stiffness = 20e9 * root @ root.T
+        errors = np.full((3, 3), 1e-3 * stiffness[0, 0])
+        declared = EngineeringConstants.of_stiffness(stiffness, errors)
+        for _ in range(200):
+            signs = np.triu(chance.choice([-1, 1], (3, 3)))
+            change = errors * (signs + np.triu(signs, 1).T)
+            moved = EngineeringConstants.of_stiffness(stiffness + change, errors).values
+            covered.append((abs(moved - declared.values) / declared.errors).max())
+    assert 0.5 < max(covered) <= 1
 
 
 def test_a_cell_turned_by_a_right_angle_exchanges_x_and_y():

@@ -7,6 +7,8 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Ellipse, Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
 from alphacut.rve.loss_factors import bulk_and_shear_losses, loss_factors
 from alphacut.rve.phase_energies import first_order
+from alphacut.rve.series.energies import complex_moduli
+from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.stochastic import HermiteMap
 
 RADIUS = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
@@ -88,3 +90,67 @@ def test_the_loss_of_young_s_modulus_is_the_mean_of_bulk_and_shear_by_energy():
     assert young.imag / young.real * 1e9 == pytest.approx(0.02, rel=1e-6)
     with pytest.raises(RefusedError, match="none beside a stiffness"):
         bulk_and_shear_losses(VoigtPhase(np.eye(3).tolist()), has_bulk=True)
+
+
+def test_errors_of_coarse_energies_cover_what_finer_ones_find():
+    """Of random cells; a tenth of the declared error would not."""
+    seed = int(np.random.SeedSequence().entropy % 2**32)
+    print(f"seed {seed}")
+    chance, covered = np.random.default_rng(seed), []
+    for _ in range(12):
+        first, width = chance.uniform(0.2, 0.5), chance.uniform(0.2, 0.4)
+        radius = HermiteMap(first, 0.1, first + width, 0.1)
+        particle = Phase(MATRIX.modulus * 10 ** chance.uniform(-2, 2), 0.2)
+        coarse, fine = (
+            SeriesModel(points=points, accuracy=accuracy, energies=True)
+            .solve(radius, MATRIX, [particle])[0]
+            .energies
+            for points, accuracy in ((4, 1e-2), (40, 1e-12))
+        )
+        covered.append((abs(coarse.values - fine.values) / coarse.errors).max())
+    assert 0.1 < max(covered) <= 1
+
+
+def test_losses_to_first_order_declare_what_complex_moduli_show():
+    result, losses = solved(MODELS[0]), np.array([[0.099, 0.099], [0.0, 0.0]])
+    found = loss_factors(result, losses)
+    _, only_energies = first_order(result.energies, losses, result.constants_of)
+    moduli = [
+        phase.bulk_and_shear * (1 + 1j * loss)
+        for phase, loss in zip((MATRIX, PARTICLE), losses, strict=True)
+    ]
+    radii = RADIUS(result.curve.theta)
+    mean = result.curve.weights @ complex_moduli(radii, *np.transpose(moduli), harmonics=20)[:, 0]
+    young = result.constants_of(mean)[0]
+    gap = abs(found.values["E"] - young.imag / young.real)
+    assert only_energies[0] < gap <= found.errors["E"]
+
+
+def test_losses_of_spheres_are_those_of_differences_of_the_modulus():
+    model, radius = SphereSeriesModel(energies=True), HermiteMap(0.2, 0.1, 0.6, 0.1)
+
+    def result_at(*factors):
+        matrix, sphere = (
+            Phase(phase.modulus * factor, phase.poisson)
+            for phase, factor in zip((MATRIX, PARTICLE), factors, strict=True)
+        )
+        return model.solve(radius, matrix, [sphere])[0]
+
+    result = result_at(1, 1)
+    assert np.allclose(result.energies.values.sum(axis=(0, 1)), result.moduli, rtol=1e-9, atol=0)
+    step, found = 1e-4, loss_factors(result, np.array([[0.02, 0.02], [0.005, 0.005]]))
+    slope = np.log(result_at(1, 1 + step).modulus / result_at(1, 1 - step).modulus) / (2 * step)
+    exact = 0.02 * (1 - slope) + 0.005 * slope
+    assert found.values["E"] == pytest.approx(exact, rel=1e-6)
+    assert abs(found.values["E"] - exact) < found.errors["E"] < 0.01 * exact
+
+
+def test_few_spheres_lose_what_eshelby_s_lone_sphere_does():
+    fraction = np.pi / 6 * 0.1**3
+    result = SphereSeriesModel(energies=True).solve(HermiteMap(0.1, 0, 0.1, 0), MATRIX, [PARTICLE])
+    energies = result[0].energies.values[:, :, 0]
+    (bulk, shear), sphere = MATRIX.bulk_and_shear, PARTICLE.bulk_and_shear[0]
+    # K = K_m + c (K_i − K_m)(3 K_m + 4 G_m)/(3 K_i + 4 G_m) to first order in c
+    slope = fraction * (3 * bulk + 4 * shear) ** 2 / (3 * sphere + 4 * shear) ** 2
+    assert energies[1, 0] == pytest.approx(sphere * slope, rel=2e-3)
+    assert energies[1, 1] == pytest.approx(0, abs=1e-6 * energies[1, 0])

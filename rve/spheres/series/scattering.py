@@ -11,7 +11,6 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
-from alphacut.rve.spheres.space_bounds import bulk_and_shear
 
 
 def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, Array]:
@@ -26,7 +25,7 @@ def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
         Of solutions 1 and 3, shape (k, 2, 2), and of solution 2, shape (k,).
     """
     n = np.asarray(degrees, float)
-    ratio = bulk_and_shear(inclusion)[1] / bulk_and_shear(matrix)[1]
+    ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
     soft, stiff = 1 / (1 + ratio), ratio / (1 + ratio)  # of one scale, pores and rigid alike
     stiffness = _surface_stiffness(n, inclusion.poisson)
 

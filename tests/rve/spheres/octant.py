@@ -20,7 +20,6 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.fenicsx import MPI, PETSc, cholesky, compiled, fem, petsc, ufl
 from alphacut.rve.interruption import uninterrupted
 from alphacut.rve.settings import HALVES, require_mesh_size
-from alphacut.rve.spheres.space_bounds import bulk_and_shear
 
 with uninterrupted():
     try:
@@ -80,7 +79,7 @@ class Octant:
         space, constant = fem.functionspace(mesh, ("Lagrange", 2, (3,))), ("DG", 0)
         lame, shear = (fem.Function(fem.functionspace(mesh, constant)) for _ in range(2))
         for tag, phase in ((MATRIX, matrix), (SPHERE, inclusion)):
-            bulk, own = (value / matrix.modulus for value in bulk_and_shear(phase))
+            bulk, own = (value / matrix.modulus for value in phase.bulk_and_shear)
             cells = tags.find(tag)
             lame.x.array[cells], shear.x.array[cells] = bulk - 2 / 3 * own, own
         u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
