@@ -20,17 +20,17 @@ from alphacut.fuzzy.result import Ends
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """What is asked of the bounds of a part, L levels.
+    """Requested accuracy and known bounds of a part of the box, on its L levels.
 
     Args:
         scale: Units of the tolerances of each output, shape (m,).
         peak: Peak of each output at the modal inputs and the probes, shape (m,).
         needed: Bounds of (−output, output) that are asked for, shape (L, T, m, 2).
         outer: Bounds that are known, the same shape; infinite where none is.
-        incumbent: Largest attained value on each side, shape (L, m, 2).
+        incumbent: Largest attained value of (−output, output), shape (L, m, 2).
         workers: Threads.
         last: Whether the part is not bisected any more, so that wide bounds are better than none.
-        tick: Takes the share of the part that is done.
+        tick: Called with the completed fraction of the part.
     """
 
     scale: Array
@@ -45,21 +45,23 @@ class Goal:
 
 @dataclass(frozen=True, eq=False)
 class PartBounds:
-    """Upper bounds of (−output, output) over one level of a part, n inputs.
+    """Upper bounds of (−output, output) over one level of a part of the box, n inputs.
 
     Args:
         outer: Proved, shape (T, m, 2).
         inner: Attained, less rounding; −inf where nothing is.
-        at: By these inputs, shape (T, m, 2, n), in SI units.
-        between: Of outputs from straight lines in the step to a node, shape (T, m).
-        shares: Share of each input in the gap at each peak, shape (m, 2, n).
+        at: Inputs that attain `inner`, shape (T, m, 2, n), in SI units.
+        between: Largest deviation of an output from a straight line in the step before each node,
+            shape (T, m).
+        shares: Fraction of each input in the gap at each peak, shape (m, 2, n).
         attained_error: What the exact motion at `at` may exceed `inner` by, shape (T, m); None for
             rounding alone.
-        remaining: Lower and upper ends of what may hold each peak, shape (2, m, 2, n), in SI units;
-            None for all of the part.
-        pruned: Bounds over what may not, as far as nodes are asked for; None for nothing.
+        remaining: Lower and upper ends of the box that may contain each peak, shape (2, m, 2, n),
+            in SI units; None for all of the part.
+        pruned: Upper bounds over the remainder of the part, for the nodes asked for; None if
+            nothing was pruned.
         least_peaks: Lower bound of each output's smallest peak, and one that is reached, shapes
-            (m,); None where all nodes are not bounded.
+            (m,); None where not all nodes are bounded.
         facts: Further numbers by name.
     """
 
@@ -81,10 +83,10 @@ class BisectionError(UnprovedError):
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """Turn what modes and matrices have against a proof into its refusal.
+    """Context manager that turns errors of modes and matrices into a proof's refusal.
 
     Raises:
-        UnprovedError: It refuses.
+        UnprovedError: The modes do not allow the proof, or a matrix is singular.
     """
     try:
         yield
@@ -109,21 +111,21 @@ class BoxProof(Protocol):
         """Threads; all cores unless given."""
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Expected work on the box, in evaluations of a mode's motion at a node.
+        """Return the expected work on the box, in evaluations of a mode's motion at a node.
 
         Raises:
             UnprovedError: No part of the box can be proved.
         """
 
     def peak_gap(self, scale: Array, peak: Array) -> Array:
-        """Gap at peaks that suffices, shape (m,), in the units of the outputs; see `Goal`."""
+        """Return the wanted gap of the outputs' peaks, shape (m,), in their units; see `Goal`."""
 
     def bounds(
         self, flow: LinearFlow, boxes: Boxes, goal: Goal
     ) -> Sequence[PartBounds | UnprovedError]:
-        """Bounds on each level of a part, or why there are none.
+        """Return bounds on each level of a part of the box, or the refusal of that level.
 
         Raises:
-            UnprovedError: There are none on any level.
+            UnprovedError: All levels are refused.
             ModalError: The structure has no smooth oscillating modes over the part.
         """

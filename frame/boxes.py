@@ -71,10 +71,10 @@ class Boxes:
         return self.numbers or {name: Interval(low, high) for name, low, high in ends}
 
     def bisected(self, axis: int) -> list[tuple[Boxes, Rows]]:
-        """Two halves along an input, each with the levels that reach it.
+        """Return two halves along an input, each with the rows of the levels that reach it.
 
-        They meet at the geometric middle where the ends are positive and far apart: frequencies are
-        powers of stiffnesses and masses.
+        The box is cut at the geometric mean of the ends where they are positive and far apart,
+        since frequencies are powers of stiffnesses and masses; else in the middle.
         """
         low, high = self.lower[0, axis], self.upper[0, axis]
         middle = np.sqrt(low * high) if low > 0 and high > FAR_APART * low else (low + high) / 2
@@ -88,22 +88,22 @@ class Boxes:
         return halves
 
     def on_levels(self, levels: Rows | Sequence[int]) -> Boxes:
-        """Some of the levels."""
+        """Return the boxes of some levels, given by their rows."""
         levels = np.asarray(levels)
         ends = self.lower[levels], self.upper[levels]
         return Boxes(self.names, self.alpha[levels], *ends, self.modal, self.numbers)
 
     def within(self, low: Array, high: Array) -> Boxes:
-        """What lies between ends (n,), which all levels reach."""
+        """Return the intersections of the boxes with the box from `low` to `high`, (d,) each."""
         lower, upper, modal = (
             np.asarray(np.clip(x, low, high)) for x in (self.lower, self.upper, self.modal)
         )
         return Boxes(self.names, self.alpha, lower, upper, modal)
 
     def distinct(self) -> tuple[Boxes, Array]:
-        """The boxes without those that repeat the one below, and which of them each level has.
+        """Return the boxes without repetitions, and the row in them of the box of each level, (A,).
 
-        Intervals have the same cut at every level, which need be searched once.
+        The cuts of intervals are the same at every level and need be searched once.
         """
         ends = np.concatenate([self.lower, self.upper], 1)
         new = np.append(True, (np.diff(ends, axis=0) != 0).any(1))
@@ -112,7 +112,7 @@ class Boxes:
 
     @property
     def probes(self) -> Array:
-        """The modal parameters and corners of the widest box, shape (S, d), in SI units."""
+        """Modal parameters and up to 16 corners of the widest box, shape (S, d), in SI units."""
         d = len(self.names)
         if 2**d <= CORNERS:
             ends = corners(-np.ones(d), np.ones(d))
@@ -140,7 +140,7 @@ class Boxes:
         return np.asarray(np.clip(self.centre + self.radius * unit, self.lower[0], self.upper[0]))
 
     def in_unit(self, jet: Jet) -> Jet:
-        """A jet whose derivatives by the physical parameters become those by unit coordinates."""
+        """Turn derivatives of a jet by physical parameters into those by unit coordinates."""
         shape, r = (1,) * jet.value.ndim, self.radius
         jet.first[:] *= r.reshape(-1, *shape)
         if len(jet.second):
@@ -148,12 +148,12 @@ class Boxes:
         return jet
 
     def unit(self, level: int) -> tuple[Array, Array]:
-        """Lower and upper ends of a level in unit coordinates."""
+        """Return lower and upper ends (d,) of a level's box in unit coordinates."""
         return self.to_unit(self.lower[level]), self.to_unit(self.upper[level])
 
 
 def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = ALPHA) -> Boxes:
-    """The α-cuts of `inputs` as boxes.
+    """Return the α-cuts of fuzzy inputs as nested boxes.
 
     Args:
         inputs: Fuzzy numbers by name, in SI units; a plain number is a crisp one.
@@ -173,12 +173,12 @@ def boxes(inputs: Mapping[str, FuzzyNumber | float], alpha: Sequence[float] = AL
 
 @dataclass(frozen=True, eq=False)
 class UnitFlow:
-    """A flow in unit coordinates.
+    """Motion of a structure as a function of unit coordinates of its fuzzy parameters.
 
     Args:
-        flow: The flow in physical parameters.
+        flow: The motion as a function of physical parameters.
         boxes: The boxes; its names must be those of `flow`.
-        relative: Whether tolerances are shares of each output's peak instead of lengths.
+        relative: Whether tolerances are fractions of each output's peak instead of lengths.
         store: Folder of the bounds of parts, from which a proof goes on; None for none.
         interruptible: Whether an interruption of a proof leaves the bounds known so far.
     """
@@ -205,7 +205,10 @@ class UnitFlow:
         return units_of(self.outputs)
 
     def tolerance(self, value: float | None) -> float:
-        """A tolerance, or the usual one: `SHARE` of each peak, of that of `reference` otherwise."""
+        """Return `value`, or without one the usual tolerance: `SHARE` of the peak.
+
+        Where tolerances are not relative it is the peak of output `reference`.
+        """
         return value or SHARE * (1.0 if self.relative else float(self.peak[self.reference]))
 
     @property
@@ -228,10 +231,10 @@ class UnitFlow:
 
     @cached_property
     def scale(self) -> Array:
-        """Factor on a tolerance for each output, shape (m,).
+        """Factor from a tolerance to the allowed error of each output, shape (m,).
 
-        A relative tolerance is multiplied by each output's peak. Another one is that of output
-        `reference`: the factor is 1 if all outputs share its unit, else the ratio of peaks.
+        Of a relative tolerance it is the output's peak. Another tolerance is that of output
+        `reference`: the factor is 1 if all outputs have its unit, else the ratio of the peaks.
         """
         if self.relative:
             return self.peak
@@ -240,11 +243,11 @@ class UnitFlow:
         return np.asarray(self.peak / self.peak[self.reference])
 
     def values(self, unit: Array) -> Array:
-        """Trajectories at unit coordinates (S, d), shape (S, T, outputs)."""
+        """Return outputs at unit coordinates (S, d) and all nodes, shape (S, T, m)."""
         return self.flow.values(self.boxes.to_physical(unit))
 
     def taylor(self, unit: Array) -> Jet:
-        """Trajectories with derivatives by the unit coordinates, V = (S, T, outputs)."""
+        """Return outputs with first and second derivatives by unit coordinates, V = (S, T, m)."""
         return self.boxes.in_unit(self.flow.taylor(self.boxes.to_physical(unit)))
 
     def envelope(
@@ -260,7 +263,19 @@ class UnitFlow:
         facts: Mapping[str, float] | None = None,
         notes: tuple[str, ...] = (),
     ) -> Envelope:
-        """Envelope from upper bounds of (−output, output), (A, T, m, 2), and their coordinates."""
+        """Return the envelope of given bounds of (−output, output), with all facts of its method.
+
+        Args:
+            bounds: Upper bounds of (−output, output), shape (A, T, m, 2).
+            at: Unit coordinates that reach them, shape (A, T, m, 2, d).
+            error: Error of both bounds, shape (A, T, m); 0 if None.
+            method: Name of the method.
+            nature: Attained, estimated or guaranteed.
+            evaluations: Number of motions computed.
+            seconds: Wall time, in s.
+            facts: Further numbers by name.
+            notes: Remarks, one sentence each.
+        """
         where = self.boxes.to_physical(at)
         return Envelope(
             alpha=self.boxes.alpha,

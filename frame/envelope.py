@@ -56,7 +56,7 @@ class Envelope(Bounds):
 
     @property
     def peak_words(self) -> str:
-        """Proved and reached peak of each output in the widest cut, in words."""
+        """Text with the proved and the reached peak of each output in the widest cut."""
         words = []
         for name, unit, *ends in zip(
             self.outputs,
@@ -72,7 +72,11 @@ class Envelope(Bounds):
         return "; ".join(words)
 
     def to_dataset(self) -> xarray.Dataset:
-        """The envelope as an xarray dataset with units; ready for NetCDF."""
+        """Return the envelope as an xarray dataset with units, ready for NetCDF.
+
+        To the variables of `Bounds` it adds inner and proved bounds, deviations between nodes,
+        smallest peaks and the structures of the self-test, where there are any.
+        """
         dataset = super().to_dataset()
         band = ("alpha", "time", "output")
         for kind, pair in (("inner", self.inner), ("proved", self.outer)):

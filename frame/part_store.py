@@ -40,7 +40,7 @@ class PartStore:
     problem: bytes
 
     def path(self, boxes: Boxes, goal: Goal) -> Path:
-        """File of the bounds of a part."""
+        """Return the file of the bounds of a part; its name is a hash of the part and the goal."""
         digest = hashlib.sha256(self.problem)
         goal_arrays = goal.needed, goal.outer, goal.incumbent, np.array(goal.last)
         for array in (boxes.alpha, boxes.lower, boxes.upper, *goal_arrays):
@@ -48,7 +48,7 @@ class PartStore:
         return self.folder / f"part-{digest.hexdigest()[:32]}.npz"
 
     def read(self, path: Path) -> Found | None:
-        """Bounds on each level, or None where there are none that can be read."""
+        """Return the stored bounds on each level, or None without a file that can be read."""
         if path.is_symlink() or not path.is_file():
             return None
         try:
@@ -58,7 +58,7 @@ class PartStore:
             return None
 
     def write(self, path: Path, found: Found) -> None:
-        """Stores bounds, all or none of a file; a full disk costs only what would be read again."""
+        """Write bounds to a file, completely or not at all; without room nothing is written."""
         arrays: dict[str, Array] = {"levels": np.array(len(found))}
         for k, bounds in enumerate(found):
             arrays |= {f"{k}.{name}": array for name, array in _arrays_of(bounds).items()}
@@ -71,6 +71,7 @@ class PartStore:
 
 
 def _arrays_of(bounds: PartBounds | UnprovedError) -> dict[str, Array]:
+    """Return bounds, or a refusal, as arrays by name."""
     if isinstance(bounds, UnprovedError):
         along = -1 if bounds.along is None else bounds.along
         return {"refusal": np.array([bounds.what, bounds.cure]), "along": np.array(along)}
@@ -81,6 +82,7 @@ def _arrays_of(bounds: PartBounds | UnprovedError) -> dict[str, Array]:
 
 
 def _unpacked(arrays: np.lib.npyio.NpzFile, k: int) -> PartBounds | UnprovedError:
+    """Return bounds, or a refusal, of level k from the arrays of a file."""
     fields: dict[str, Any] = {
         name.partition(".")[2]: arrays[name] for name in arrays if name.startswith(f"{k}.")
     }

@@ -65,9 +65,9 @@ class Part:
         boxes: Its L levels.
         levels: Which of all levels they are.
         needed: Bounds that are asked for, shape (L, T, m, 2).
-        outer: Bounds that are known, the same.
-        urgency: The largest of them above the incumbent, in units of the gap asked for.
-        work: Share of all work that it is expected to take, its halves included.
+        outer: Bounds that are known, same shape.
+        urgency: Excess of the largest known bound over the incumbent, in units of the wanted gap.
+        work: Fraction of all work that it is expected to take, with its halves.
     """
 
     boxes: Boxes
@@ -78,12 +78,12 @@ class Part:
     work: float = 1.0
 
     def restricted(self, chosen: Sequence[int], needed: Mask) -> Part:
-        """Some of its levels, with other bounds that are asked for."""
+        """Return the part on some levels, given by their rows, with other `needed` bounds."""
         levels = [self.levels[k] for k in chosen]
         return Part(self.boxes.on_levels(chosen), levels, needed, self.outer[list(chosen)])
 
     def bisected(self, axis: int) -> list[Part]:
-        """Both halves along an input, each with the levels that reach it."""
+        """Return both halves along an input, each with the levels that reach it."""
         halves = []
         for boxes, reached in self.boxes.bisected(axis):
             levels = [self.levels[k] for k in reached]
@@ -102,6 +102,7 @@ class _Tick:
         self.done = [0.0] * len(batch)
 
     def __call__(self, position: int, share: float) -> None:
+        """Report the completed fraction `share` of part `position` of the batch."""
         self.done[position] = max(share, self.done[position])
         if self.progress is not None:
             pairs = zip(self.work, self.done, strict=True)
@@ -115,15 +116,15 @@ Key = tuple[int, int, int]
 
 @dataclass(eq=False)
 class Queue:
-    """Parts that are open, and the hull of all that are closed.
+    """Queue of a spatial branch and bound: open parts, and the hull of the bounds of closed ones.
 
     Args:
-        proof: The proof.
+        proof: Method that bounds the outputs over a part.
         flow: Exact motions of a linear structure.
         boxes: All levels, A of them.
         scale: As of `Goal`.
         peak: As of `Goal`.
-        store: Bounds of parts that a run before has made; None for none.
+        store: Bounds of parts from an earlier run; None for none.
     """
 
     proof: BoxProof
@@ -151,14 +152,14 @@ class Queue:
         self.abandoned = set[Key]()
 
     def run(self, progress: Progress | None = None, *, interruptible: bool = False) -> None:
-        """Bound parts until none is open.
+        """Bound and bisect parts until none is open.
 
         Args:
-            progress: Takes the share of the work that is done.
+            progress: Called with the completed fraction of the work.
             interruptible: Whether an interruption leaves the bounds known so far, if there are.
 
         Raises:
-            UnprovedError: A part is refused, and so are many within it.
+            UnprovedError: A part is refused, and so are too many within it.
         """
         batch: list[Part] = []
         pool = ThreadPoolExecutor(self.workers)
@@ -185,7 +186,10 @@ class Queue:
             pool.shutdown(wait=False, cancel_futures=True)
 
     def _next(self) -> list[Part]:
-        """The most urgent parts, without the peaks whose gap is left as it is."""
+        """Remove the most urgent parts, at most `BATCH`, from the queue and return them.
+
+        Before, bounds of abandoned peaks are closed as they are.
+        """
         for part in self.open:
             self._drop_abandoned(part)
         self.open = [part for part in self.open if part.needed.any()]
@@ -194,6 +198,7 @@ class Queue:
         return batch
 
     def _drop_abandoned(self, part: Part) -> None:
+        """Close the known bounds of peaks whose gap is not reduced any more."""
         for k, level in enumerate(part.levels):
             for abandoned_level, output, side in self.abandoned:
                 if abandoned_level == level and part.needed[k, :, output, side].any():
@@ -205,21 +210,23 @@ class Queue:
                     part.needed[k] &= ~mask
 
     def _close(self, level: int, mask: Mask, outer: Array) -> None:
-        """Take bounds over a part into the hull."""
+        """Raise the hull of closed parts on a level to the bounds (T, m, 2) under the mask."""
         hull = self.closed[level]
         hull[mask] = np.maximum(hull[mask], outer[mask])
 
     def _incumbent(self, level: int) -> Array:
-        """Largest attained value of each output and side in a level, (m, 2); 0 at least."""
+        """Return the largest attained value of (−output, output) on a level, (m, 2); at least 0."""
         return np.asarray(np.maximum(self.inner[level:].max((0, 1)), 0.0))
 
     def _goal(self, part: Part, workers: int, tick: Progress) -> Goal:
+        """Return what the proof is asked for on a part."""
         incumbent = np.stack([self._incumbent(level) for level in part.levels])
         arrays = part.needed, part.outer, incumbent
         last = self.refusals >= self.proof.parts - 1
         return Goal(self.scale, self.peak, *arrays, max(workers, 1), last, tick)
 
     def _bounds(self, part: Part, goal: Goal) -> Sequence[PartBounds | UnprovedError]:
+        """Return bounds or refusal on each level of a part, from the store or by the proof."""
         path = None if self.store is None else self.store.path(part.boxes, goal)
         if self.store is not None and path is not None and (stored := self.store.read(path)):
             return stored
@@ -234,7 +241,12 @@ class Queue:
         return found
 
     def _settle(self, part: Part, found: Sequence[PartBounds | UnprovedError]) -> None:
-        """Take the bounds of a part over, and put what is open into the queue."""
+        """Take over the bounds of a part, close what is tight enough, and queue its halves.
+
+        Args:
+            part: The part.
+            found: Bounds or refusal on each of its levels.
+        """
         self.facts["parts"] += 1
         LOG.debug("part %d is bounded, %d are open", self.facts["parts"], len(self.open))
         for k, level in enumerate(part.levels):
@@ -260,6 +272,7 @@ class Queue:
         self._put(children)
 
     def _refused(self, refusal: UnprovedError, votes: Array) -> None:
+        """Count a refusal and vote for the input to bisect; raise it if parts do not help."""
         self.refusals, self.refusal = self.refusals + 1, refusal
         if self.refusals >= self.proof.parts or isinstance(refusal, BisectionError):
             raise refusal
@@ -267,6 +280,7 @@ class Queue:
             votes[refusal.along] += 1.0
 
     def _take(self, level: int, bounds: PartBounds) -> None:
+        """Take over what a part attains on a level, its errors, smallest peaks and facts."""
         better = bounds.inner > self.inner[level]
         self.inner[level][better], self.at[level][better] = bounds.inner[better], bounds.at[better]
         self.between = np.maximum(self.between, bounds.between)
@@ -292,8 +306,17 @@ class Queue:
     ) -> Mask:
         """Close what holds no higher peak, and append narrowed parts to `children`.
 
+        Args:
+            part: The part.
+            k: Row of the level in the part.
+            level: Row of the level in all levels.
+            bounds: Its bounds on the level.
+            votes: Votes for the inputs to bisect, shape (n,), to which those of open peaks are
+                added.
+            children: Parts for the queue.
+
         Returns:
-            The bounds that are left for the halves, shape (T, m, 2).
+            Mask of the bounds that the halves must improve, shape (T, m, 2).
         """
         needed, outer = part.needed[k], part.outer[k]
         top, worthless = self._incumbent(level) + self.gap[:, None], False
@@ -338,7 +361,13 @@ class Queue:
         return bool((ends[0] > boxes.lower[0]).any() or (ends[1] < boxes.upper[0]).any())
 
     def _is_hopeless(self, key: Key, peak: float, shares: Array) -> bool:
-        """True where a gap falls too slowly, or too many inputs share it."""
+        """Return True if the gap of a peak falls too slowly, or too many inputs share it.
+
+        Args:
+            key: Level, output and side of the peak.
+            peak: Its upper bound in the part.
+            shares: Fraction of each input in its gap, shape (n,).
+        """
         level, output, side = key
         rest_of_queue = [
             float(part.outer[k, :, output, side][part.needed[k, :, output, side]].max(initial=0))
@@ -357,7 +386,12 @@ class Queue:
         return count > most or (gap > WIDE * self.peak[output] and after > 2 * self.gap[output])
 
     def notes(self, outer: Array, inner: Array) -> Iterator[str]:
-        """Lines on an interruption, and on the inputs to narrow where a gap of a peak is left."""
+        """Yield sentences on an interruption, and on the inputs to narrow if a gap remains.
+
+        Args:
+            outer: Proved bounds, shape (A, T, m, 2).
+            inner: Attained bounds, same shape.
+        """
         if "interrupted" in self.facts:
             yield f"interrupted, with {len(self.open)} parts left whose bounds are wider than asked"
         gaps = (outer.max(1) - inner.max(1)) / self.peak[:, None]  # (A, m, 2)
@@ -375,7 +409,7 @@ class Queue:
             )
 
     def _axis(self, boxes: Boxes, votes: Array) -> int:
-        """Input with most votes, else the relatively widest."""
+        """Return the input with most votes; without votes that of largest relative width."""
         width = boxes.upper[0] - boxes.lower[0]
         votes = np.where(width > 0, votes, 0.0)
         if votes.any():
@@ -383,6 +417,7 @@ class Queue:
         return int((width / np.maximum(np.abs(boxes.centre), 1e-300)).argmax())
 
     def _put(self, parts: Sequence[Part]) -> None:
+        """Set the urgency of parts and add them to the queue."""
         for part in parts:
             excess = [
                 (np.where(part.needed[k], part.outer[k], -np.inf).max(0) - self._incumbent(level))
@@ -394,20 +429,25 @@ class Queue:
 
 
 def _peaks(above: Mask) -> list[tuple[int, int]]:
-    """Outputs and sides with bounds above their peaks, from a mask (T, m, 2)."""
+    """Return the pairs (output, side) with a bound under the mask (T, m, 2)."""
     return [(int(output), int(side)) for output, side in np.argwhere(above.any(0))]
 
 
 def halvings(shares: Array, parts: int) -> float:
-    """How often so many parts can halve all inputs among which a gap is shared, (n,)."""
+    """Return how often each input can be halved by bisection into so many parts.
+
+    Args:
+        shares: Fraction of each input in a gap, shape (n,); the others need no bisections.
+        parts: Number of parts.
+    """
     return float(np.log2(parts) * (shares**2).sum()) if shares.any() else 1.0
 
 
 def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-    """Guaranteed envelope of all outputs on all levels.
+    """Return the guaranteed envelope of all outputs on all levels, by spatial branch and bound.
 
     Raises:
-        UnprovedError: The system is not linear, its motion not the exact one, or bounds are not
+        UnprovedError: The system is not linear, its integrator not the exact one, or bounds are not
             proved.
     """
     start_time, linear, cuts = time.perf_counter(), exact_flow(flow.flow), flow.boxes
@@ -460,7 +500,7 @@ def prove(proof: BoxProof, flow: UnitFlow, progress: Progress | None = None) -> 
 
 
 def _problem(proof: BoxProof, flow: UnitFlow) -> bytes:
-    """Fingerprint of a proof with its options, and of a structure by exact motions."""
+    """Return a hash of a proof with its options and of the structure's motion at the probes."""
     options = {name: value for name, value in vars(proof).items() if name != "workers"}
     words = repr((proof.name, options, flow.boxes.names))
     motions = flow.flow.values(flow.boxes.probes)
@@ -468,10 +508,10 @@ def _problem(proof: BoxProof, flow: UnitFlow) -> bytes:
 
 
 def _require_order(inner: Array, outer: Array, outputs: tuple[str, ...]) -> None:
-    """Refuse attained bounds (A, T, m, 2), less their rounding, outside proved ones.
+    """Refuse attained bounds (A, T, m, 2), less their rounding, that exceed proved ones.
 
     Raises:
-        FailedError: One is outside, or no number.
+        FailedError: One does, or is no number.
     """
     wrong = ~(inner <= outer)
     if wrong.any():

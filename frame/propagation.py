@@ -44,7 +44,7 @@ FIRST_STEPS = 3
 MAX_INPUTS = 4
 """Most inputs of a follower's envelope that a proof is made beside."""
 OTHER_UNITS = 500
-"""From so many times the structure's own value on, or that part of it, units differ."""
+"""Factor between a support and the structure's own value from which on units must differ."""
 
 
 class Method(Protocol):
@@ -78,7 +78,7 @@ def envelope(
     progress: Progress | bool | None = None,
     **options: object,
 ) -> Envelope:
-    """Lower and upper envelopes of the outputs of `model`.
+    """Return lower and upper envelopes of a structure's outputs over time, on every level.
 
     Args:
         model: A linear structure or a general Lagrangian system.
@@ -97,9 +97,13 @@ def envelope(
             goes on after it was killed; None to keep nothing.
         interruptible: Whether Ctrl-C ends a proof with the best bounds so far and a note, if there
             are any; it raises KeyboardInterrupt otherwise.
-        progress: Called with the share done; a bar on a terminal or in a notebook if not given,
-            False for none.
+        progress: Called with the completed fraction; a bar on a terminal if not given, False for
+            none.
         options: Options of a method that is named, or of auto.
+
+    Returns:
+        Bounds at the nodes with their nature, error, deviations between nodes, and the inputs that
+        reach them.
 
     Raises:
         RefusedError: An unknown name or option, a value outside its range, a support that reaches
@@ -159,7 +163,7 @@ def _problem(
     integrator: str | Integrator | None,
     options: Mapping[str, object],
 ) -> _Problem:
-    """The problem that arguments of `envelope` pose.
+    """Return method, motion and distinct boxes that the arguments of `envelope` describe.
 
     Raises:
         RefusedError: As `envelope`.
@@ -189,7 +193,7 @@ def require_envelope(
     integrator: str | Integrator | None = None,
     **options: object,
 ) -> None:
-    """Requires what `envelope` requires of its arguments, from the first steps of a few motions.
+    """Refuse what `envelope` refuses, from the first steps of the motion at a few parameters.
 
     Raises:
         RefusedError: As `envelope`.
@@ -210,7 +214,7 @@ def require_envelope(
 
 
 def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
-    """The proof of the motion that a method follows, if it is affordable."""
+    """Return a proof for the motion that a follower has followed; None if it costs too much."""
     if not isinstance(method, GraphFollower | ImprovedFollower):
         return None
     if not isinstance(over.flow, LinearFlow) or len(over.boxes.names) > MAX_INPUTS:
@@ -219,10 +223,16 @@ def _proof_beside(method: Method, over: UnitFlow) -> Proof | None:
 
 
 def _with_proof(followed: Envelope, over: UnitFlow, proof: Proof, tick: Progress) -> Envelope:
-    """The envelope of a follower with a proof of the same motion beside it, if there is one.
+    """Return a follower's envelope with proved outer bounds and an error derived from them.
 
-    Its error is then the largest distance from the proved bounds and from those that the proof
-    attains, between which the true ones lie.
+    The error is the largest distance from the proved bounds and from those that the proof attains,
+    between which the true ones lie. The envelope is unchanged if the proof fails.
+
+    Args:
+        followed: Envelope of the follower.
+        over: The motion, by any integrator.
+        proof: Proof of the exact motion.
+        tick: Called with the completed fraction of the proof.
     """
     assert isinstance(over.flow, LinearFlow)
     exact = replace(over, flow=replace(over.flow, integrator=Exact()))
@@ -243,6 +253,7 @@ def _method(
     method: Method | str | None,
     options: Mapping[str, object],
 ) -> Method:
+    """Return the method by its name and options, by default one that fits the model."""
     if method is None:
         method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
     if not isinstance(method, str):
@@ -265,13 +276,13 @@ def _method(
 
 
 def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> None:
-    """Refuse supports that reach values without a meaning.
+    """Refuse supports with values that are not allowed for their parameters.
 
     Raises:
         RefusedError: A support is not finite, reaches what its parameter must not be, or is of
             another size than the structure's own value, as kN from N; or the weight may buckle a
             storey, the mass matrix of a linear structure is not positive definite at the modal
-            parameters or a corner, or nothing moves it.
+            parameters or a corner, or the structure stays at rest.
     """
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
         parameter, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
@@ -321,7 +332,7 @@ def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:
 
 
 def _on_levels(bounds: Envelope, alpha: Array, which: Rows) -> Envelope:
-    """The envelope on levels `alpha` (A,), each with the bounds of one of its own, `which`."""
+    """Return the envelope on levels `alpha` (A,), the bounds of each copied from row `which`."""
     names = ("lower", "upper", "lower_at", "upper_at", "error")
     rows = {name: getattr(bounds, name)[which] for name in names}
     pairs = [x and Ends(x.lower[which], x.upper[which]) for x in (bounds.inner, bounds.outer)]

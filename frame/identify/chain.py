@@ -59,15 +59,25 @@ class Chain:
         self.stiffness, self.mass = frame.springs(modal).value[0], np.asarray(frame.masses, float)
 
     def modes(self, points: Array) -> tuple[Array, Array]:
-        """Squared angular frequencies (S, n), rising, and shapes (S, floor, mode), at (S, d)."""
+        """Return squared angular frequencies (S, n), rising, and mode shapes (S, floor, mode).
+
+        Args:
+            points: Parameters, shape (S, d), in SI units.
+        """
         stiffness, mass = np.exp(np.log(points / self.nominal) @ self.powers.swapaxes(1, 2))
         return chain_modes(self.stiffness * stiffness, self.mass * mass)
 
     def ranges(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Nested logarithmic ranges of the factors over a box of log parameters (d,).
+        """Return lower and upper ends of the logarithms of stiffness and mass factors over a box.
+
+        Factors are ratios to nominal stiffnesses and masses.
+
+        Args:
+            lower: Logarithms of the parameters over nominal values, lower ends, shape (d,).
+            upper: Upper ends.
 
         Returns:
-            Lower and upper ends of log stiffness and log mass factors, each (2, n).
+            Two arrays of shape (2, n), stiffness first.
         """
         rising = self.powers > 0
         ends = np.where(rising, self.powers * lower, self.powers * upper).sum(-1)
@@ -76,7 +86,15 @@ class Chain:
 
 
 def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
-    """Squared angular frequencies (S, n) and shapes (S, floor, mode) of chains (S, n)."""
+    """Return squared angular frequencies and mass-normalised shapes of chains of n masses.
+
+    Args:
+        stiffness: Spring stiffnesses, shape (S, n), in N/m.
+        mass: Masses, shape (S, n), in kg.
+
+    Returns:
+        Frequencies (S, n), rising, in 1/s², and shapes (S, floor, mode).
+    """
     root = np.sqrt(mass)
     values, vectors = np.linalg.eigh(
         chain_matrix(stiffness) / root[..., :, None] / root[..., None, :]
@@ -85,7 +103,15 @@ def chain_modes(stiffness: Array, mass: Array) -> tuple[Array, Array]:
 
 
 def eigenvalue_ranges(model: Chain, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Least and greatest squared frequencies over a box of log parameters, each (n,), proved."""
+    """Return proved least and greatest squared angular frequencies over a box, each (n,).
+
+    They rise with every stiffness and fall with every mass, so that two corners give them.
+
+    Args:
+        model: The chain.
+        lower: Logarithms of the parameters over nominal values, lower ends, shape (d,).
+        upper: Upper ends.
+    """
     low, high = model.ranges(lower, upper)
     stiffness = model.stiffness * np.exp(np.stack([low[0], high[0]]))
     mass = model.mass * np.exp(np.stack([high[1], low[1]]))

@@ -65,7 +65,7 @@ class Evidence:
         return Joint(names, False, "parameter of the measured frame", named=True) if names else None
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
-        """Cut at the joint level α, of a claim at the level at which all hold together."""
+        """Return the α-cut of a number, of a claim at the level where all claims hold jointly."""
         if self.joint and isinstance(number, Claimed):
             return number.cut(alpha / len(self.joint.names))
         return number.cut(alpha)
@@ -75,7 +75,15 @@ class Evidence:
         return [mode.ranges(lambda x: self.cut(x, alpha)) for mode in self.measured]
 
     def violation(self, points: Array, modes: list[ModeCut]) -> Array:
-        """Distance of modes at points (S, d) beyond their ranges, in half widths; <= 0 inside."""
+        """Return how far modes lie outside their measured ranges, in half widths; ≤ 0 inside.
+
+        Args:
+            points: Parameters, shape (S, d), in SI units.
+            modes: Ranges of the measured modes at a level.
+
+        Returns:
+            One column for each frequency and measured amplitude, shape (S, q).
+        """
         values, vectors = self.chain.modes(points)
         columns = []
         for mode, cut in zip(self.measured, modes, strict=True):
@@ -126,9 +134,10 @@ class Identified:
 
     @property
     def numbers(self) -> dict[str, FuzzyNumber]:
-        """The parameters as fuzzy numbers that hold together, for an envelope.
+        """Identified parameters as fuzzy numbers, by name, for an envelope.
 
-        Below the lowest level the prior's support holds.
+        Their cuts are the sides of the boxes; below the lowest level the prior's support holds.
+        Claims of the measurement are joined: they hold together.
         """
         rule, priors = self.evidence.joint, self.evidence.prior
         numbers: dict[str, FuzzyNumber] = {}
@@ -151,11 +160,15 @@ class Identified:
         return dict(zip(self.names, map(float, (self.upper - self.lower)[0] / widths), strict=True))
 
     def samples(self, number: int = 200, *, row: int = 0, seed: int = 0) -> Array:
-        """Points of the set at level `alpha[row]`, (number, d), about uniform in logarithms.
+        """Return points (number, d) of the set at level `alpha[row]`, about uniform in logarithms.
 
-        `evidence.chain.modes` gives their modes, which lie in all measured cuts.
+        Their modes lie in all measured cuts. The walks may leave the box by `LEEWAY`, so that the
+        points test what is proved.
 
-        The walks may leave the box by `LEEWAY`, so that the points test what is proved.
+        Args:
+            number: Number of points.
+            row: Index of the level.
+            seed: Seed of the walks.
 
         Raises:
             FailedError: No point of the set was met, or one lies outside the box or has a frequency
@@ -183,7 +196,7 @@ class Identified:
         return points
 
     def _require_contained(self, points: Array, row: int) -> None:
-        """Refuse a box, or predictions of frequencies, that a point of the set lies outside.
+        """Raise if a point of the set (S, d) lies outside the box or its predicted frequencies.
 
         Raises:
             FailedError: One does.
@@ -203,7 +216,7 @@ class Identified:
                 raise FailedError(text, "keep the case and report it")
 
     def predictions(self) -> Ends:
-        """Proved ends of the natural frequencies of all n modes, measured or not, (A, n), in Hz."""
+        """Return proved ends of all n natural frequencies on each level, (A, n) each, in Hz."""
         chain = self.evidence.chain
         logs = [np.log(ends / chain.nominal) for ends in (self.lower, self.upper)]
         ranges = [eigenvalue_ranges(chain, low, high) for low, high in zip(*logs, strict=True)]
@@ -218,10 +231,10 @@ def identify(
     *,
     alpha: Sequence[float] = ALPHA,
 ) -> Identified:
-    """Parameters of a frame that agree with its measured natural modes.
+    """Return boxes of a frame's parameters that agree with its measured natural modes.
 
     Args:
-        frame: The frame; damping, motion and outputs do not matter.
+        frame: The frame; damping, initial motion and outputs do not matter.
         prior: Fuzzy numbers of the parameters, of "E", "I", "c1" … (columns of a storey), "l1" …,
             "m1" …, in SI units.
         measured: The measured modes, by rising number.
@@ -278,7 +291,10 @@ def _require_input(
 
 
 def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]], float]:
-    """Ends of log parameters by level until none agree, and that level."""
+    """Return the enclosing box of each level, until one is proved empty, and that level or 1.
+
+    The ends are logarithms of the parameters over nominal values, shape (d,) each.
+    """
     boxes: list[tuple[Array, Array]] = []
     for level in map(float, levels):
         cuts = [evidence.cut(x, level) for x in evidence.prior.values()]
@@ -295,7 +311,13 @@ def _boxes(evidence: Evidence, levels: Array) -> tuple[list[tuple[Array, Array]]
 
 
 def _outward(logs: Array, evidence: Evidence, sign: int) -> Array:
-    """Parameters of log ends (A, d), rounded outward but not beyond the priors."""
+    """Return parameters (A, d) from their logarithms, rounded outwards but within the priors.
+
+    Args:
+        logs: Logarithms of the ends over nominal values, shape (A, d).
+        evidence: The priors.
+        sign: 1 for upper ends, −1 for lower ones.
+    """
     ends = evidence.chain.nominal * np.exp(logs) * (1 + sign * 4e-16)
     limits = np.array([widest(x) for x in evidence.prior.values()])
     return np.asarray(

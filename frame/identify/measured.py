@@ -42,6 +42,7 @@ class MeasuredMode:
     reference: int = 0
 
     def __post_init__(self) -> None:
+        """Refuse numbers of mode, floors and reference, and frequencies, that are not allowed."""
         floors, mode = [*self.shape], f"mode {self.mode}"
         require(self.mode >= 1, f"{mode}: number", value=self.mode, allowed="numbers from 1 on")
         are_positive = min(floors, default=1) >= 1
@@ -61,7 +62,7 @@ class MeasuredMode:
         }
 
     def ranges(self, cut: Callable[[FuzzyNumber], Cut]) -> ModeCut:
-        """Ranges of the mode from a cut of each of its quantities."""
+        """Return ranges of eigenvalue and amplitudes, from a function that cuts fuzzy numbers."""
         low, high = cut(self.frequency)
         shape = {floor: cut(number) for floor, number in self.shape.items()}
         if self.reference:
@@ -96,17 +97,17 @@ def measured_mode(
     frequency_deviation: float | None = None,
     shape_deviation: float | None = None,
 ) -> MeasuredMode:
-    """A mode from repeated values; the claim is the mean of the normal law of each.
+    """Return a mode from repeated measurements; claims are the means of normal laws.
 
     Args:
         mode: Its number by rising frequency, from 1.
         frequencies: Measured values, in Hz.
         shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
             that of the reference floor, the highest near the largest: no chance decides.
-        frequency_deviation: Standard deviation of one value as a share of it, where it is known
+        frequency_deviation: Standard deviation of one value as a fraction of it, where it is known
             from elsewhere; from the values' own scatter otherwise, which takes two at least.
-        shape_deviation: The same of any amplitude, as a share of the largest of the mode. Those of
-            all floors are taken to scatter alike.
+        shape_deviation: The same of any amplitude, as a fraction of the largest of the mode. Those
+            of all floors are taken to scatter alike.
 
     Raises:
         RefusedError: Values are too few or contradict their deviation, counts differ, or an
@@ -144,14 +145,23 @@ def measured_mode(
 
 
 def _scatter(ratios: Array, deviation: float | None) -> float:
-    """Squared deviation of the reference over its amplitude, if not known from the ratios' own."""
+    """Return the squared relative deviation of the reference amplitude.
+
+    Without a known deviation it is estimated from the variance of the ratios (n,).
+    """
     if deviation is not None:
         return deviation**2
     return float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2)) if len(ratios) > 1 else 0.0
 
 
 def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:
-    """The mean of measured values as a claim.
+    """Return the mean of measured values as a fuzzy number with a claim.
+
+    Args:
+        values: Measured values, shape (n,).
+        deviation: Standard deviation of a value; None to estimate it from the values.
+        what: Name of the values for messages.
+        key: Name of the argument with the deviation for messages.
 
     Raises:
         RefusedError: Their scatter is unknown, or contradicts the deviation.

@@ -52,7 +52,11 @@ class LinearProgram:
     upper: Array
 
     def least(self, objective: Array) -> float:
-        """Proved lower bound of cᵀx over the set; infinite where the set is proved empty."""
+        """Return a proved lower bound of cᵀx over the set; infinite if the set is proved empty.
+
+        It holds for any multipliers, whatever the accuracy of the solver (Neumaier, Shcherbina
+        2004).
+        """
         ends = np.column_stack([self.lower, self.upper])
         result = linprog(objective, A_ub=self.rows, b_ub=self.right, bounds=ends, method="highs")
         if result.status == 2 and self.empty():
@@ -63,7 +67,10 @@ class LinearProgram:
         return self._proved(objective, multipliers)
 
     def empty(self) -> bool:
-        """True if it is proved that no x of the box satisfies A x <= b, by phase one."""
+        """Return True if no x of the box satisfies A x <= b, by proof.
+
+        Phase one: the least t with A x − t <= b is proved positive.
+        """
         size = self.rows.shape[0]
         phase_one = LinearProgram(
             csr_array(hstack([self.rows, csr_array(-np.ones((size, 1)))])),
@@ -75,6 +82,10 @@ class LinearProgram:
         return phase_one.least(cost) > 0
 
     def _proved(self, objective: Array, multipliers: Array) -> float:
+        """Return the lower bound of cᵀx that multipliers y ≤ 0 (r,) prove, less its rounding.
+
+        It is yᵀb + min (c − Aᵀy)ᵀx over the box, the latter by the sign of each reduced cost.
+        """
         reduced_costs = objective - self.rows.T @ multipliers
         ends = np.where(reduced_costs > 0, reduced_costs * self.lower, reduced_costs * self.upper)
         reach = np.maximum(np.abs(self.lower), np.abs(self.upper))
@@ -85,7 +96,7 @@ class LinearProgram:
 
 @dataclass(eq=False)
 class Rows:
-    """Variables with their ends, and inequalities between them."""
+    """Rows of a linear program: variables with their ends, and inequalities between them."""
 
     lower: list[float] = field(default_factory=list)
     upper: list[float] = field(default_factory=list)
@@ -93,7 +104,7 @@ class Rows:
     right: list[float] = field(default_factory=list)
 
     def variable(self, low: float, high: float) -> Linear:
-        """A new variable; one without width is a constant."""
+        """Add a variable between two ends and return it; without width it is a constant."""
         if low == high:
             return {CONSTANT: low}
         self.lower.append(low)
@@ -101,7 +112,7 @@ class Rows:
         return {len(self.lower) - 1: 1.0}
 
     def range(self, expression: Linear) -> tuple[float, float]:
-        """Ends of an expression over the variables' ends."""
+        """Return least and greatest value of an expression over the ends of its variables."""
         low = high = expression.get(CONSTANT, 0.0)
         for at, a in expression.items():
             if at != CONSTANT:
@@ -110,13 +121,13 @@ class Rows:
         return low, high
 
     def at_most(self, expression: Linear, limit: float = 0.0) -> None:
-        """Require an expression to be at most a limit."""
+        """Add the inequality expression ≤ limit."""
         row = len(self.right)
         self.right.append(limit - expression.get(CONSTANT, 0.0))
         self.entries += [(row, at, a) for at, a in expression.items() if at != CONSTANT]
 
     def product(self, x: Linear, y: Linear) -> Linear:
-        """Variable that stands for a product, between its four planes."""
+        """Add and return a variable for the product x y, between four planes (McCormick 1976)."""
         (a, b), (c, d) = self.range(x), self.range(y)
         if a == b or c == d:
             return scaled(y, a) if a == b else scaled(x, c)
@@ -128,7 +139,7 @@ class Rows:
         return z
 
     def exponential(self, y: Linear) -> Linear:
-        """Variable that stands for exp(y), between three tangents and the secant."""
+        """Add and return a variable for exp(y), between three tangents and the secant."""
         low, high = self.range(y)
         if low == high:
             return {CONSTANT: float(np.exp(low))}
@@ -141,7 +152,7 @@ class Rows:
         return x
 
     def program(self) -> LinearProgram:
-        """The linear program of all rows."""
+        """Return the linear program of all variables and inequalities."""
         row, column, value = np.array(self.entries, float).reshape(-1, 3).T
         shape, places = (len(self.right), len(self.lower)), (row.astype(int), column.astype(int))
         rows = csr_array((value, places), shape=shape)
@@ -176,7 +187,7 @@ class Relaxation:
     shapes: Mapping[tuple[int, int], Linear]
 
     def ends(self, expression: Linear) -> tuple[float, float]:
-        """Proved ends of an expression that is not constant."""
+        """Return proved least and greatest value of an expression that is not constant."""
         objective = np.zeros(len(self.program.lower))
         for at, a in expression.items():
             if at != CONSTANT:
@@ -187,16 +198,19 @@ class Relaxation:
 def enclosure(
     chain: Chain, lower: Array, upper: Array, modes: list[ModeCut]
 ) -> tuple[Array, Array] | None:
-    """Smallest box that is proved to hold every parameter that agrees with the measured modes.
+    """Return the ends of a box proved to contain all parameters that agree with the modes.
+
+    Each end is bounded by linear programs, in at most `PASSES` passes over ever smaller boxes.
 
     Args:
         chain: The frame.
-        lower: Lower ends of a box that holds them, of log parameters over nominal values, (d,).
+        lower: Lower ends of the first box, logarithms of parameters over nominal values, shape
+            (d,).
         upper: Upper ends.
         modes: Ranges of the measured modes at a level.
 
     Returns:
-        Its ends; None where no parameters agree.
+        Lower and upper ends, shape (d,) each; None where no parameters agree.
     """
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
     for _ in range(PASSES):
@@ -228,11 +242,11 @@ def relaxation(
     modes: list[ModeCut],
     amplitudes: Mapping[tuple[int, int], tuple[float, float]],
 ) -> Relaxation | None:
-    """The linear program over a box of log parameters (d,); None where it proves it empty.
+    """Return the linear relaxation of all chains over a box; None if their set is proved empty.
 
     Args:
         chain: The frame.
-        lower: Lower ends of the log parameters over their nominal values.
+        lower: Lower ends of the box, logarithms of parameters over nominal values, shape (d,).
         upper: Upper ends.
         modes: Ranges of the measured modes at a level.
         amplitudes: Known ends of amplitudes that were not measured, by mode and floor.
@@ -265,7 +279,7 @@ class _Chains:
         self.low, self.high = np.exp(low), np.exp(high)  # factors of stiffness and mass, (2, n)
 
     def _exponential(self, powers: Array) -> Linear:
-        """Factor of a stiffness or mass."""
+        """Return the factor of a stiffness or mass: exp of a sum of log parameters times powers."""
         exponent: Linear = {CONSTANT: 0.0}
         for log, power in zip(self.logs, powers, strict=True):
             if power:
@@ -275,7 +289,13 @@ class _Chains:
     def require_balance(
         self, shape: Mapping[int, Linear], share: Linear, eigenvalue: float
     ) -> None:
-        """Balance of forces at each floor; λ is `share` of its greatest value `eigenvalue`."""
+        """Add the balance of storey shears and inertia forces at each floor.
+
+        Args:
+            shape: Amplitude by floor.
+            share: λ over its greatest value.
+            eigenvalue: Greatest value of λ, in 1/s².
+        """
         rows, chain, n = self.rows, self.chain, len(self.mass)
         unit, below = float(chain.stiffness.mean()), {CONSTANT: 0.0}
         shears = []
@@ -292,10 +312,14 @@ class _Chains:
             rows.at_most(total(force, net_force, -1.0))
 
     def amplitudes(self, eigenvalue: float, cut: ModeCut) -> dict[int, tuple[float, float]] | None:
-        """Ends of all amplitudes; None where those between measured floors cannot be bounded.
+        """Return ends of the amplitude of each floor; None if unmeasured ones cannot be bounded.
 
-        Floors between two measured ones are a chain between moved supports, whose matrix K − λ M
-        is positive definite while λ stays below its own least frequency.
+        Floors between two measured ones are a chain between moved supports, whose matrix K − λ M is
+        positive definite while λ stays below its own least frequency.
+
+        Args:
+            eigenvalue: Greatest value of λ, in 1/s².
+            cut: Ranges of the mode.
         """
         n, amplitudes = len(self.mass), dict(cut.shape)
         k = np.array([self.rows.range(x) for x in self.stiffness]) * self.chain.stiffness[:, None]
@@ -319,7 +343,11 @@ class _Chains:
         return amplitudes
 
     def require_frequency(self, cut: ModeCut) -> None:
-        """Two rows by the Rayleigh quotient of the mode's shape at the middle of the box."""
+        """Add two inequalities by the Rayleigh quotient of the mode shape at the middle of the box.
+
+        Its distance from the eigenvalue is bounded by the residual (Kato and Temple). Nothing is
+        added if the bounds of the neighbouring eigenvalues overlap it.
+        """
         chain, low, high, k = self.chain, self.low, self.high, cut.mode - 1
         below = self.most[k - 1] if k else -np.inf
         above = self.least[k + 1] if k + 1 < len(self.least) else np.inf

@@ -21,7 +21,13 @@ Violation = Callable[[Array], Array]
 
 
 def inner_point(violation: Violation, box: Ends, chance: np.random.Generator) -> Array | None:
-    """A point of the set, shape (d,), from the middle of the box or random starts; None if none."""
+    """Return a point (d,) at which no range is violated, by least squares; None if none is found.
+
+    Args:
+        violation: Violation of the ranges at points.
+        box: Lower and upper ends of the box, shape (d,) each.
+        chance: Random number generator.
+    """
     for start in range(STARTS):
         share = chance.random(len(box.lower)) if start else 0.5
         point = box.lower + (box.upper - box.lower) * share
@@ -41,12 +47,19 @@ def inner_point(violation: Violation, box: Ends, chance: np.random.Generator) ->
 def walk(
     violation: Violation, start: Array, box: Ends, number: int, chance: np.random.Generator
 ) -> Array:
-    """Ends of walks that hit and run from a point of the set: points (number, d) of it.
+    """Return points (number, d) of a set in a box, the ends of random walks (hit and run).
 
     Each step is a point of a random chord, cut at points outside the set (shrinking slice sampler;
     Neal, Annals of Statistics 31, 2003). Every second chord points from one walk to another, as
     long and thin sets need (ter Braak, Statistics and Computing 16, 2006). The ends become uniform
     in a convex set; in others they reach the part in which such chords lie.
+
+    Args:
+        violation: Violation of the ranges at points; the set is where none is positive.
+        start: A point of the set, shape (d,).
+        box: Lower and upper ends of the box, shape (d,) each.
+        number: Number of points.
+        chance: Random number generator.
     """
     points, width = np.tile(start, (max(number, WALKS), 1)), box.upper - box.lower
     ends: Array = np.tile([[-1.0], [1.0]], len(points))

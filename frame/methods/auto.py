@@ -80,7 +80,10 @@ class Auto:
             real("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope of all outputs on all levels, whose first note says why its method was taken."""
+        """Return the envelope on all levels by the methods that the module's docstring lists.
+
+        Its first note says which method gave it and why.
+        """
         follower = ImprovedFollower(0.7 * flow.tolerance(self.tolerance), seed=self.seed)
         if not isinstance(flow.flow, LinearFlow):
             return _noted(follower.run(flow, progress), "improved-graph-follower: not linear")
@@ -115,7 +118,15 @@ class Auto:
         return _noted(replace(searched, outer=outer), why)
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
-        """Proofs to try, in order of their forecast work; the reasons of those that refuse."""
+        """Yield the proofs to try, the one with less forecast work first.
+
+        The branch and bound is yielded twice where both can be tried: on the box as it is, and with
+        parts.
+
+        Args:
+            flow: The motion and its boxes.
+            reasons: Texts to which the refusals of proofs are appended.
+        """
         share, inputs = self.tolerance or SHARE, len(flow.boxes.names)
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
         dual = DualProof(workers=self.workers)
@@ -141,7 +152,10 @@ class Auto:
             yield proof
 
     def _is_close(self, proved: Envelope, flow: UnitFlow) -> bool:
-        """True where a gap is as narrow as asked, and of peaks with many inputs."""
+        """Return whether the gap of a proof is as narrow as asked for.
+
+        Without a tolerance, or with many inputs, only the gaps at the peaks count.
+        """
         if self.tolerance is not None and not self.peaks:
             return bool((proved.error <= self._allowed(flow)).all())
         few = flow.relative and len(flow.boxes.names) <= FEW and self.tolerance is not None
@@ -153,7 +167,15 @@ class Auto:
 
 
 def with_attained(proved: Envelope, searched: Envelope) -> Envelope:
-    """A guarantee with what a search attains inside it, and both peaks in words."""
+    """Return a guaranteed envelope with the bounds that a search attains inside it.
+
+    Args:
+        proved: The guaranteed envelope.
+        searched: Attained bounds of the same outputs on the same levels.
+
+    Returns:
+        The envelope with tighter inner bounds and errors, and a note on both peaks.
+    """
     assert proved.inner is not None
     peak = np.maximum(np.abs(searched.lower), np.abs(searched.upper)).max((0, 1))
     ends, places = [], []
@@ -178,7 +200,7 @@ def with_attained(proved: Envelope, searched: Envelope) -> Envelope:
 
 
 def _gap(proved: Envelope) -> float:
-    """Greatest gap of a peak, as a share of it."""
+    """Return the largest gap between proved and attained peak, as a fraction of the peak."""
     assert proved.inner is not None
     ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
     most = np.maximum(*(outer.max(1) for outer, _ in ends))
@@ -187,5 +209,6 @@ def _gap(proved: Envelope) -> float:
 
 
 def _noted(envelope: Envelope, why: str) -> Envelope:
+    """Return the envelope with a text as its first note, which is logged as well."""
     LOG.info("envelope: %s", why)
     return replace(envelope, notes=(why, *envelope.notes))

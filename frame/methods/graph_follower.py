@@ -2,7 +2,7 @@
 
 This differs from the paper in: 1. One storage serves all outputs, both sides and all levels: levels
 are treated from the narrowest box to the widest, so that every stored graph is admissible and
-α-cuts are nested by construction. 2. A new graph is computed only where the Taylor model promises
+α-cuts are nested by construction. 2. A new graph is computed only where the Taylor model predicts
 more than an explicit tolerance.
 """
 
@@ -18,7 +18,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.calculus.box_quadratic import local_maximum
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Index, Places, Storage
-from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
+from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import real, require
@@ -27,13 +27,12 @@ from alphacut.fuzzy.result import Nature
 
 @dataclass(eq=False)
 class Followed:
-    """Outcome of the Graph Follower.
+    """Bounds that the Graph Follower has found, and the graphs (trajectories) behind them.
 
     Args:
-        bounds: Upper bounds of ±output after post-processing, shape (A, T, m, 2), the sides last:
-            (−output, output).
+        bounds: Upper bounds of (−output, output) after post-processing, shape (A, T, m, 2).
         best: Index of the graph that attains each, shape (A, T, m, 2).
-        left: What Taylor models still promise at most, same shape.
+        predicted_gain: Gain over the bounds that Taylor models still predict, same shape.
         guess: Index of the best stored graph when a node was reached, same shape (Figs. 21 to 23).
         new: Index of the graph computed there, or −1 where the guess stays, same shape.
         storage: All graphs.
@@ -41,7 +40,7 @@ class Followed:
 
     bounds: Array
     best: Index
-    left: Array
+    predicted_gain: Array
     guess: Index
     new: Index
     storage: Storage
@@ -52,7 +51,7 @@ class GraphFollower:
     """Graph Follower: envelopes of any structure from few trajectories ("graphs").
 
     At each node Taylor models of the trajectories computed so far point to the inputs that move the
-    output furthest. Where they promise enough, the trajectory of those inputs is computed as well.
+    output furthest. Where they predict enough, the trajectory of those inputs is computed as well.
 
     Args:
         order: Degree κ of the Taylor models, 1 or 2.
@@ -86,30 +85,30 @@ class GraphFollower:
         real("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope of all outputs on all levels.
+        """Return the envelope of all outputs on all levels, estimated or attained.
 
-        Its error is what the models still promise, and twice what an independent sample finds
-        beyond the bounds. Where neighbouring trajectories part there is none, and the bounds are
-        attained, no more.
+        Its error is the gain that the models still predict, and twice what an independent sample
+        finds beyond the bounds. Where neighbouring trajectories diverge there is none, and the
+        bounds are attained only.
         """
         start_time = time.perf_counter()
         followed = self.follow(flow, subprogress(progress, 0.0, 0.8))
         missed, count = independent_excess(flow, followed.bounds, subprogress(progress, 0.8, 1.0))
-        is_parted = needs_parting(followed.storage.steepest, followed.bounds[0])
-        error = followed.left.max(-1) + SAFETY * missed[:, None]
+        diverges = trajectories_diverge(followed.storage.steepest, followed.bounds[0])
+        error = followed.predicted_gain.max(-1) + SAFETY * missed[:, None]
         return flow.envelope(
             followed.bounds,
             followed.storage.points[followed.best],
-            None if is_parted else error,
+            None if diverges else error,
             method=self.name,
-            nature=Nature.ATTAINED if is_parted else Nature.ESTIMATED,
+            nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=len(followed.storage) + count,
             seconds=time.perf_counter() - start_time,
             facts={"order": self.order, "gain": self.tolerance},
         )
 
     def follow(self, flow: UnitFlow, progress: Progress | None = None) -> Followed:
-        """Follows the graphs on all levels of `flow.boxes`."""
+        """Return the bounds on all levels of `flow.boxes`, from the narrowest box to the widest."""
         storage = Storage(flow)
         storage.add(flow.boxes.to_unit(flow.boxes.modal)[None])
         levels = len(flow.boxes.alpha)
@@ -123,45 +122,59 @@ class GraphFollower:
         return out
 
     def _sweep(self, out: Followed, level: int, progress: Progress) -> None:
+        """Sweep over the nodes of a level, computing a graph where a gain is predicted.
+
+        It sets `guess`, `new` and `left` of the level.
+        """
         storage, box = out.storage, out.storage.flow.boxes.unit(level)
         if not (box[1] > box[0]).any():
             return
         nodes = out.bounds.shape[1]
-        promise, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
-        self._ask(storage, tuple(np.indices(promise.shape).reshape(3, -1)), box, promise, target)
+        predicted, target = storage.top.copy(), np.zeros((*storage.top.shape, len(box[0])))
+        self._predict(
+            storage, tuple(np.indices(predicted.shape).reshape(3, -1)), box, predicted, target
+        )
         for node in range(nodes):
             progress(node / nodes)
             out.guess[level, node] = storage.best[node]
-            points = self._new(out, level, node, promise, target)
+            points = self._new(out, level, node, predicted, target)
             if points:
                 won = storage.add(np.array(points))
                 ahead = tuple(indices[won[0] > node] for indices in won)
-                self._ask(storage, ahead, box, promise, target)
+                self._predict(storage, ahead, box, predicted, target)
         limit = self.tolerance * storage.flow.scale[:, None]
-        out.left[level] = np.clip(promise - storage.top, 0.0, limit)
+        out.predicted_gain[level] = np.clip(predicted - storage.top, 0.0, limit)
 
     def _new(
-        self, out: Followed, level: int, node: int, promise: Array, target: Array
+        self, out: Followed, level: int, node: int, predicted: Array, target: Array
     ) -> list[Array]:
-        """Parameters of the new graphs for the bounds of a node."""
+        """Return the unit coordinates (d,) of the graphs to compute at a node.
+
+        Args:
+            out: Bounds and graphs so far; `new` is set.
+            level: Row of the level.
+            node: Index of the node.
+            predicted: Values that Taylor models predict, shape (T, m, 2).
+            target: Their unit coordinates, shape (T, m, 2, d).
+        """
         storage, points = out.storage, list[Array]()
         limit = self.tolerance * storage.flow.scale[:, None]
-        for entry in np.argwhere(promise[node] > storage.top[node] + limit):
+        for entry in np.argwhere(predicted[node] > storage.top[node] + limit):
             point = target[node, *entry]
             if not storage.holds(point) and all(np.abs(point - x).max() > 1e-9 for x in points):
                 out.new[level, node, *entry] = len(storage) + len(points)
                 points.append(point)
         return points
 
-    def _ask(
+    def _predict(
         self,
         storage: Storage,
         places: Places,
         box: tuple[Array, Array],
-        promise: Array,
+        predicted: Array,
         target: Array,
     ) -> None:
-        """Sets what the Taylor models of the best graphs promise at places, and at which points."""
+        """Set the predictions of the best graphs' Taylor models at places, and their points."""
         bend = float(self.order > 1)
-        promise[places], optima = storage.promised(places, box, local_maximum, bend=bend)
+        predicted[places], optima = storage.predicted(places, box, local_maximum, bend=bend)
         target[places] = np.clip(optima, *box)

@@ -16,7 +16,9 @@ Places = tuple[Array, ...]
 
 
 class Storage:
-    """All graphs computed so far; arrays over places have shape (T, m, 2), (−output, output) last.
+    """All graphs (trajectories) computed so far, and the best of them at each place.
+
+    Arrays over places have shape (T, m, 2): node, output, and side (−output, output).
 
     Attributes:
         flow: Computes graphs.
@@ -38,11 +40,11 @@ class Storage:
         return len(self.points)
 
     def holds(self, point: Array, near: float = 1e-9) -> bool:
-        """True if the graph of `point` is stored, or one as near."""
+        """Return whether a graph at `point` (d,) is stored, up to the distance `near`."""
         return bool((np.abs(self.points - point).max(1, initial=0.0) < near).any())
 
     def add(self, points: Array) -> Places:
-        """Computes and stores the graphs at unit coordinates (S, d); places where one is best."""
+        """Compute and store the graphs at unit coordinates (S, d); return where one is now best."""
         jet, top = self.flow.taylor(points), self.top.reshape(-1)
         self.steepest = np.maximum(self.steepest, np.abs(jet.first).max((0, 1, 2)))
         holder = np.full(top.shape, -1)
@@ -59,7 +61,7 @@ class Storage:
         self.points = np.vstack([self.points, points])
         return places
 
-    def promised(
+    def predicted(
         self,
         places: Places,
         box: tuple[Array, Array],
@@ -68,17 +70,17 @@ class Storage:
         bend: float = 1.0,
         reach: Array | float = np.inf,
     ) -> tuple[Array, Array]:
-        """Optima of the Taylor models of the best graphs at K places (eq. 22).
+        """Return the maxima of the best graphs' Taylor models over a box at K places (eq. 22).
 
         Args:
-            places: Where.
-            box: Lower and upper ends of the parameters, each (d,).
+            places: Node, output and side of each place.
+            box: Lower and upper ends of the unit coordinates, each (d,).
             maximise: Maximum of g·x + x·H·x/2 over boxes, from g, H and their ends.
-            bend: Factor on second derivatives.
+            bend: Factor on second derivatives; 0 for linear models.
             reach: Distance from each graph's parameters up to which its model is trusted.
 
         Returns:
-            What they promise, shape (K,), and at which unit coordinates, shape (K, d).
+            Predicted values, shape (K,), and their unit coordinates, shape (K, d).
         """
         side, at = 2.0 * places[2] - 1, self.points[self.best[places]]
         g, H = side[:, None] * self.first[places], bend * side[:, None, None] * self.second[places]

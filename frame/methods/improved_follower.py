@@ -2,9 +2,9 @@
 
 The same idea as `graph_follower` (storage, Taylor models, tolerance, post-processing), turned
 around: instead of one node after the other, every round asks the models of the best graphs at all
-nodes, takes the proposal that promises most in each window of time, and advances these graphs
-together as arrays. Nodes before and after a discovery profit alike, which is what backward sweeps
-are for; the points spread at the start look for basins independently of any model.
+nodes, takes the proposal of largest predicted gain in each window of time, and advances these
+graphs together as arrays. Nodes before and after a discovery profit alike, which is what backward
+sweeps are for; the points spread at the start look for basins independently of any model.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from alphacut.frame.calculus.box_quadratic import global_maximum, local_maximum
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.envelope import Envelope
 from alphacut.frame.methods.graph_storage import Places, Storage
-from alphacut.frame.methods.independent import SAFETY, independent_excess, needs_parting
+from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 from alphacut.fuzzy.refused import real
@@ -75,48 +75,59 @@ class ImprovedFollower:
         real("budget", self.budget, whole=True, least=1)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope of two passes from different points, corrected by what their models promise.
+        """Return the envelope of two passes from different points, with an estimated error.
 
-        The error is twice what the models still promise and what an independent sample finds
-        beyond the bounds, and twice what one pass leads beyond the other. Where neighbouring
-        trajectories part there is none, and the bounds are attained, no more.
+        The error is twice what the Taylor models still predict and what an independent sample finds
+        beyond the bounds, and twice the difference of the two passes. Where neighbouring
+        trajectories diverge there is none, and the bounds are attained only.
         """
         start_time, second_pass = time.perf_counter(), replace(self, seed=self.seed + 1)
-        first = self.pursue(flow, subprogress(progress, 0.0, 0.4))
-        second = second_pass.pursue(flow, subprogress(progress, 0.4, 0.8))
+        first = self.run_pass(flow, subprogress(progress, 0.0, 0.4))
+        second = second_pass.run_pass(flow, subprogress(progress, 0.4, 0.8))
         better = second.bounds > first.bounds
         bounds = np.where(better, second.bounds, first.bounds)
-        where = np.where(better[..., None], second.where, first.where)
-        limit = self.tolerance * flow.scale[:, None]
-        closed = [np.where(x.left <= limit, x.left, 0.0) for x in (first, second)]
-        open_ = [np.where(x.left > limit, x.left, 0.0) for x in (first, second)]
-        promised = np.maximum(*closed) + np.maximum(*open_)
-        gap = around(np.abs(second.bounds - first.bounds).max(-1))
+        points = np.where(better[..., None], second.points, first.points)
         missed, count = independent_excess(flow, bounds, subprogress(progress, 0.8, 1.0))
-        small = self.tolerance / 2 * flow.scale
-        error = SAFETY * (promised.max(-1) + small + gap + missed[:, None])
-        parts = needs_parting(
-            np.maximum(first.storage.steepest, second.storage.steepest), bounds[0]
-        )
-        notes = (f"stopped at the budget of {self.budget} trajectories",)
+        steepest = np.maximum(first.storage.steepest, second.storage.steepest)
+        diverges = trajectories_diverge(steepest, bounds[0])
+        limit = self.tolerance * flow.scale[:, None]
+        is_stopped = any((x.predicted_gain > limit).any() for x in (first, second))
+        note = f"stopped at the budget of {self.budget} trajectories"
         return flow.envelope(
             bounds,
-            where,
-            None if parts else error,
+            points,
+            None if diverges else self._error(first, second, missed, flow.scale),
             method=self.name,
-            nature=Nature.ATTAINED if parts else Nature.ESTIMATED,
+            nature=Nature.ATTAINED if diverges else Nature.ESTIMATED,
             evaluations=len(first.storage) + len(second.storage) + count,
             seconds=time.perf_counter() - start_time,
             facts={"gain": self.tolerance, "order": 2},
-            notes=notes * bool(np.any(open_)),
+            notes=(note,) if is_stopped else (),
         )
 
-    def pursue(self, flow: UnitFlow, progress: Progress) -> Pursued:
-        """Pursues all levels of `flow.boxes`, from the narrowest box to the widest."""
+    def _error(self, first: PassBounds, second: PassBounds, missed: Array, scale: Array) -> Array:
+        """Return the estimated error of the better bounds of two passes, shape (A, T, m).
+
+        Args:
+            first: Bounds of one pass.
+            second: Bounds of the other.
+            missed: Excess of an independent sample, shape (A, m).
+            scale: Factor from a tolerance to the allowed error, shape (m,).
+        """
+        gains, limit = [first.predicted_gain, second.predicted_gain], self.tolerance * scale
+        small = [np.where(gain <= limit[:, None], gain, 0.0) for gain in gains]
+        large = [np.where(gain > limit[:, None], gain, 0.0) for gain in gains]  # the budget ended
+        predicted = np.maximum(*small) + np.maximum(*large)
+        difference = around(np.abs(second.bounds - first.bounds).max(-1))
+        missing = predicted.max(-1) + limit / 2 + difference + missed[:, None]
+        return np.asarray(SAFETY * missing)
+
+    def run_pass(self, flow: UnitFlow, progress: Progress) -> PassBounds:
+        """Return the bounds of one pass on all levels, from the narrowest box to the widest."""
         levels, storage = len(flow.boxes.alpha), Storage(flow)
         d, places = len(flow.boxes.names), storage.top.size // 2
         bounds, left = np.zeros((2, levels, *storage.top.shape))
-        out = Pursued(bounds, np.zeros((*bounds.shape, d)), left, storage)
+        out = PassBounds(bounds, np.zeros((*bounds.shape, d)), left, storage)
         at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             search = _Level(storage, flow.boxes.unit(level), self.tolerance)
@@ -125,15 +136,16 @@ class ImprovedFollower:
             points = self._start(storage, *search.box)[: max(1, limit - len(storage))]
             while len(points):
                 for chunk in np.array_split(points, -(-len(points) // at_once)):
-                    search.ask(storage.add(chunk))
+                    search.predict(storage.add(chunk))
                     tick(min(1.0, (len(storage) - first) / max(1, limit - first)))
                 points = search.proposals(min(BATCH, limit - len(storage)))
             # post-processing of the level
-            out.bounds[level], out.where[level] = storage.top, storage.points[storage.best]
-            out.left[level] = np.maximum(search.promise - storage.top, 0.0)
+            out.bounds[level], out.points[level] = storage.top, storage.points[storage.best]
+            out.predicted_gain[level] = np.maximum(search.predicted - storage.top, 0.0)
         return out
 
     def _start(self, storage: Storage, lower: Array, upper: Array) -> Array:
+        """Return the first unit coordinates of a level, modal and spread ones, shape (S, d)."""
         boxes = storage.flow.boxes
         modal = boxes.to_unit(boxes.modal)[None]
         if not (upper > lower).any():
@@ -145,49 +157,57 @@ class ImprovedFollower:
 
 
 @dataclass(frozen=True, eq=False)
-class Pursued:
-    """Outcome of one pass.
+class PassBounds:
+    """Bounds of one pass, and the graphs (trajectories) behind them.
 
     Args:
         bounds: Attained bounds of (−output, output), shape (A, T, m, 2).
-        where: Their unit coordinates, shape (A, T, m, 2, d).
-        left: What the models still promise, shape (A, T, m, 2); more than the tolerance where the
-            budget ended the search.
+        points: Their unit coordinates, shape (A, T, m, 2, d).
+        predicted_gain: Gain over the bounds that the models still predict, shape (A, T, m, 2);
+            more than the tolerance where the budget ended the search.
         storage: All graphs.
     """
 
     bounds: Array
-    where: Array
-    left: Array
+    points: Array
+    predicted_gain: Array
     storage: Storage
 
 
 class _Level:
-    """Promises of the models of stored graphs in one box, and their places."""
+    """Predictions of the stored graphs' Taylor models in one box, by place (T, m, 2).
+
+    Attributes:
+        predicted: Predicted values of (−output, output), shape (T, m, 2).
+        target: Their unit coordinates, shape (T, m, 2, d).
+    """
 
     def __init__(self, storage: Storage, box: tuple[Array, Array], tolerance: float) -> None:
         self.storage, self.box, self.tolerance = storage, box, tolerance
         self.reach = REACH * np.maximum((box[1] - box[0]) / 2, 1e-300)
-        self.promise = storage.top.copy()
+        self.predicted = storage.top.copy()
         self.target = np.zeros((*storage.top.shape, len(box[0])))
         if len(storage):
-            self.ask(tuple(np.indices(storage.top.shape).reshape(3, -1)))
+            self.predict(tuple(np.indices(storage.top.shape).reshape(3, -1)))
 
-    def ask(self, places: Places) -> None:
-        """Ask the models that hold the bounds of places about more."""
+    def predict(self, places: Places) -> None:
+        """Set the predictions at places from the Taylor models of the best graphs there."""
         if len(places[0]) and (self.box[1] > self.box[0]).any():
             few = len(self.box[0]) <= 4
-            optima = self.storage.promised(
+            optima = self.storage.predicted(
                 places, self.box, global_maximum if few else local_maximum, reach=self.reach
             )
-            self.promise[places], self.target[places] = optima
+            self.predicted[places], self.target[places] = optima
 
     def proposals(self, count: int) -> Array:
-        """Most promising points of every window of time, apart from others, (≤ count, d)."""
+        """Return the points of largest predicted gain, one per window of time, (≤ count, d).
+
+        A gain must exceed the tolerance; points near stored or other new ones are left out.
+        """
         chosen, top = list[Array](), self.storage.top
         windows = np.array_split(np.arange(len(top)), max(1, min(count, len(top))))
         for window in windows:
-            gains = (self.promise - top)[window] / self.storage.flow.scale[:, None]
+            gains = (self.predicted - top)[window] / self.storage.flow.scale[:, None]
             for k in np.argsort(-gains, axis=None)[:TRIES]:
                 t, o, side = np.unravel_index(k, gains.shape)
                 entry = (window[t], o, side)
@@ -195,7 +215,7 @@ class _Level:
                     break
                 point = np.clip(self.target[entry], *self.box)
                 if self.storage.holds(point, near=1e-7):
-                    self.promise[entry] = top[entry]  # the model promised too much
+                    self.predicted[entry] = top[entry]  # the model was wrong
                 elif all(np.abs(point - neighbour).max() > SPACING for neighbour in chosen):
                     chosen.append(point)
                     break
@@ -203,7 +223,7 @@ class _Level:
 
 
 def around(gap: Array) -> Array:
-    """Largest of values (A, T, m) at the nodes near by, and a tenth of the largest of all."""
+    """Return the largest of values (A, T, m) at nodes nearby, at least a tenth of the largest."""
     from scipy.ndimage import maximum_filter1d
 
     near = maximum_filter1d(gap, 2 * (gap.shape[1] // 40) + 1, axis=1)

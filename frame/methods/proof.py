@@ -88,7 +88,7 @@ class Proof:
                 real(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Guaranteed envelope of all outputs on all levels.
+        """Return the guaranteed envelope of all outputs on all levels.
 
         Raises:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance.
@@ -97,7 +97,7 @@ class Proof:
         return prove(replace(self, tolerance=tolerance), flow, progress)
 
     def peak_gap(self, scale: Array, peak: Array) -> Array:
-        """The tolerance of each output, shape (m,)."""
+        """Return the tolerance of each output, shape (m,)."""
         del peak
         return scale * self._gaps[-1]
 
@@ -108,7 +108,7 @@ class Proof:
         return (self.gap,) if self.gap else (0.1 * tolerance, tolerance)
 
     def forecast(self, flow: LinearFlow, boxes: Boxes) -> float:
-        """Expected work on the box, in evaluations of a mode's motion at a node.
+        """Return the expected work on the box, in evaluations of a mode's motion at a node.
 
         Raises:
             UnprovedError: There are too many inputs, or matrices are no polynomials of them.
@@ -125,7 +125,7 @@ class Proof:
         return float(BOXES_OF_INPUT**d)
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[PartBounds]:
-        """Bounds on each level of a part.
+        """Return proved and attained bounds on each level of a part of the box.
 
         Raises:
             UnprovedError: The error of the modal model cannot be bounded within the tolerance.
@@ -157,10 +157,9 @@ class Proof:
     def _modelled(
         self, flow: LinearFlow, boxes: Boxes, scale: Array
     ) -> tuple[ModalModel, Array, float]:
-        """Modal model of a part with its proved error (T, m) and the gap that it leaves room for.
+        """Return a modal model of a part, its proved error (T, m), and the gap that this allows.
 
-        That error exceeds the sampled one some thirty times, so the polynomials are refined until
-        it takes little of the gap.
+        Gaps are tried from the narrowest; the error may take a fifth of the gap.
 
         Raises:
             GapError: It takes too much of all gaps.
@@ -177,7 +176,14 @@ class Proof:
     def _proved(
         self, flow: LinearFlow, boxes: Boxes, scale: Array, gap: float
     ) -> tuple[ModalModel, Array]:
-        """Modal model of a part with its proved error (T, m), which leaves room for a gap."""
+        """Return a modal model of a part and its proved error (T, m), at most a fifth of `gap`.
+
+        The proved error exceeds the sampled one some thirty times; the degree is raised until it is
+        small enough.
+
+        Raises:
+            UnprovedError: No degree suffices.
+        """
         aim, before, largest = gap / 30, 0, np.inf
         for _ in range(ATTEMPTS):
             how = {"budget": self.budget, "scale": scale, "energy": True}
@@ -196,9 +202,11 @@ class Proof:
         raise self._refusal(model, largest / gap)
 
     def _refusal(self, model: ModalModel, share: float) -> UnprovedError:
-        """Refusal of a part of which the model's error takes too large a share of the gap.
+        """Return the error to raise if a model's error takes the fraction `share` of the gap.
 
-        Halving the inputs that share in the error divides it by 2^(degree + 1) or so.
+        Halving the inputs that contribute to the error divides it by 2^(degree + 1) or so. A
+        `GapError` names the input to bisect; where too many bisections are needed it is a
+        `BisectionError`.
         """
         what = f"the proved error of the modes, {share:.3g} of it, takes too much of the gap"
         cure = "narrower or fewer fuzzy inputs, or a wider gap, can be proved"
@@ -210,7 +218,7 @@ class Proof:
 
 
 def tail_shares(model: ModalModel) -> Array:
-    """Share of each input in the terms of highest degree of a modal model, shape (d,)."""
+    """Return each input's fraction in the terms of highest degree of a modal model, (d,)."""
     index, top = model.eigenvalue.index, model.eigenvalue.index.sum(1) == model.degree
     weight = np.zeros(len(index))
     for polynomial in (model.eigenvalue, model.coefficient):

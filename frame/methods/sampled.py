@@ -43,14 +43,14 @@ class Sampled:
         real("samples", self.samples, whole=True, least=1)
 
     def points(self, lower: Array, upper: Array) -> Array:
-        """Points of a box [lower, upper], shape (samples, d)."""
+        """Return Sobol points of a box, denser towards its faces, shape (samples, d)."""
         from scipy.stats import qmc
 
         unit = qmc.Sobol(len(lower), rng=np.random.default_rng(self.seed)).random(self.samples)
         return np.asarray((lower + upper) / 2 - (upper - lower) / 2 * np.cos(np.pi * unit))
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope of all outputs on all levels."""
+        """Return the attained envelope of all outputs on all levels."""
         start_time, levels = time.perf_counter(), len(flow.boxes.alpha)
         shape = (levels, len(flow.time), len(flow.outputs), 2)
         bounds, at = np.full(shape, -np.inf), np.zeros((*shape, len(flow.boxes.names)))
@@ -75,7 +75,14 @@ class Sampled:
 
 
 def take(values: Array, points: Array, bounds: Array, at: Array) -> None:
-    """Keep the best of trajectories (S, T, m) at `points` (S, d) in (T, m, 2) and (T, m, 2, d)."""
+    """Update attained bounds and their inputs in place by a batch of trajectories.
+
+    Args:
+        values: Outputs, shape (S, T, m).
+        points: Their unit coordinates, shape (S, d).
+        bounds: Largest values of (−output, output) so far, shape (T, m, 2).
+        at: Unit coordinates of these, shape (T, m, 2, d).
+    """
     signed = np.stack([-values, values], -1)
     best = signed.argmax(0)
     top = np.take_along_axis(signed, best[None], 0)[0]

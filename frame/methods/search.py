@@ -13,9 +13,9 @@
 
 Two searches do all of this and share nothing: neither the seed nor the points that they start from
 nor the degree of their polynomials. Passes go on until both agree. The better bound is stated, and
-its error is what Newton's method still promises, and `UNSEEN` times the largest difference of the
-two searches on its output and level. Where the polynomials miss more than `ROUGH` of a peak they
-lead nowhere, and bounds are only called attained.
+its error is the gain that Newton's method still predicts, and `UNSEEN` times the largest difference
+of the two searches on its output and level. Where the polynomials miss more than `ROUGH` of a peak
+they lead nowhere, and bounds are only called attained.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Search:
                 real(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
-        """Envelope of all outputs on all levels, estimated or, of rough polynomials, attained.
+        """Return the envelope on all levels: estimated or, with rough polynomials, attained.
 
         Raises:
             ModalError: The structure has no oscillating modes over the box, or is not linear.
@@ -167,7 +167,19 @@ class Search:
         narrower: Optima | None,
         tick: Progress,
     ) -> tuple[Optima, Array]:
-        """Optima in a box, and what they may miss, shape (N,)."""
+        """Search all N bounds in the box of one level until both searches agree.
+
+        Args:
+            searches: The two independent searches.
+            lower: Lower ends of the box in unit coordinates, shape (d,).
+            upper: Upper ends.
+            tolerance: Wanted error, in units of `scale`.
+            narrower: Optima of the next narrower level; None on the narrowest.
+            tick: Called with the completed fraction.
+
+        Returns:
+            The better optima of both, and their estimated errors, shape (N,).
+        """
         box = lower, upper, SMALL * tolerance
         for number, search in enumerate(searches):
             search.start(*box, subprogress(tick, 0.2 * number, 0.2 * (number + 1)))
@@ -206,7 +218,14 @@ class _IndependentSearch:
         self.narrower: Optima | None = None
 
     def start(self, lower: Array, upper: Array, small: float, tick: Progress) -> None:
-        """Find optima in a box from a sample of it, and from those of the box before."""
+        """Find optima in a box from a sample of it, and from those of the narrower box.
+
+        Args:
+            lower: Lower ends of the box in unit coordinates, shape (d,).
+            upper: Upper ends.
+            small: Gain below which Newton's method stops.
+            tick: Called with the completed fraction.
+        """
         self.box = lower, upper, small
         unit = None
         if self.number:
@@ -228,11 +247,11 @@ class _IndependentSearch:
             self._follow(np.ones(len(rows), bool), subprogress(tick, 0.5, 1.0))
 
     def improve(self, count: int, tick: Progress) -> None:
-        """Solve some bounds anew from fresh points, and follow what is better.
+        """Maximise some bounds anew from fresh points; try better points at nodes nearby.
 
         Args:
             count: Passes so far; each draws twice as many bounds.
-            tick: Takes the share of the pass that is done.
+            tick: Called with the completed fraction of the pass.
         """
         optima, outputs = self.optima, len(self.response.outputs)
         rng = np.random.default_rng((self.seed, self.number, count, len(optima.value)))
@@ -253,7 +272,10 @@ class _IndependentSearch:
         self._follow(improved, subprogress(tick, 0.5, 1.0))
 
     def _follow(self, fresh: Mask, tick: Progress) -> None:
-        """Try at every node what is fresh near by, and refine it, until nothing improves."""
+        """Try the points of bounds under the mask at nodes nearby, and refine what they improve.
+
+        Improved bounds are tried in the next round, until nothing improves or after `ROUNDS`.
+        """
         for done in range(ROUNDS):
             ends = [(done + half) / ROUNDS for half in (0.0, 0.5, 1.0)]
             ticks = [subprogress(tick, *pair) for pair in pairwise(ends)]
@@ -268,7 +290,14 @@ class _IndependentSearch:
 def _evaluate(
     response: Response, optima: Optima, box: tuple[Array, Array, float], tick: Progress
 ) -> None:
-    """Take the values of a response at the points of optima, and refine them on it."""
+    """Evaluate a response at the points of optima and refine them, in place, on it.
+
+    Args:
+        response: Exact motions or polynomials.
+        optima: Optima of another response.
+        box: Lower and upper ends, and the gain below which Newton's method stops.
+        tick: Called with the completed fraction.
+    """
     rows = np.arange(len(optima.value))
     optima.value[:] = -np.inf
     optima.offer(response, optima.point.copy(), rows)
@@ -282,14 +311,14 @@ def _compared(
     box: tuple[Array, Array, float],
     tick: Progress,
 ) -> tuple[Optima, Array]:
-    """The better of two sets of optima, and the differences of their values, shape (N,).
+    """Return the better of two sets of N optima, and the differences of their values (N,).
 
     Args:
-        response: Whose values count; the first optima are its own.
+        response: Response whose values count; the first optima are its own.
         first: Optima of one search.
         second: Optima of the other one.
-        box: Lower and upper ends, and what Newton's method may leave.
-        tick: Takes the share done.
+        box: Lower and upper ends, and the gain below which Newton's method stops.
+        tick: Called with the completed fraction.
     """
     improved = copy.deepcopy(second)
     _evaluate(response, improved, box, tick)
@@ -304,7 +333,7 @@ def _compared(
 
 
 def _leading(model: ModalModel, flow: UnitFlow, *, enough: bool) -> Response:
-    """What the second search works on: its polynomials, or exact motions that they lead."""
+    """Return the response of the second search: its polynomials if `enough`, or exact motions."""
     if enough:
         return model.in_units(flow.scale)
     return ExactResponse.from_model(
@@ -313,18 +342,27 @@ def _leading(model: ModalModel, flow: UnitFlow, *, enough: bool) -> Response:
 
 
 def _rough(model: ModalModel, flow: UnitFlow) -> bool:
+    """Return whether the polynomials miss more than `ROUGH` of an output's peak."""
     peak = np.abs(flow.flow.values(flow.boxes.modal[None])[0]).max(0)
     return bool((model.error.max(0) > ROUGH * peak).any())
 
 
 def _polynomials(response: Response) -> ModalModel:
+    """Return the polynomials of a response."""
     return response.model if isinstance(response, ExactResponse) else response
 
 
 def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask, tick: Progress) -> Rows:
-    """Try at each node the fresh points of nodes near by; problems that improved.
+    """Try the points of bounds under the mask at nodes up to 16 away; return improved rows.
 
-    Envelopes consist of segments of graphs (the idea of the Graph Follower).
+    An envelope consists of segments of single motions, so that neighbours have points in common.
+
+    Args:
+        response: Exact motions or polynomials.
+        optima: Optima of all N bounds, improved in place.
+        grid: Rows of the optima by node, shape (T, 2 m).
+        fresh: Bounds whose points are tried elsewhere, shape (N,).
+        tick: Called with the completed fraction.
     """
     better = []
     for done, shift in enumerate(SHIFTS):
@@ -338,7 +376,15 @@ def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask, tick
 
 
 def _missed(difference: Array, outputs: int, agreement: float) -> Array:
-    """Bounds of what may be missed, shape (N,), from differences of two searches, same shape."""
+    """Return the estimated error of each bound, shape (N,), from the searches' differences.
+
+    It is `UNSEEN` times the largest difference on the same output, at least the agreement.
+
+    Args:
+        difference: Differences of the two searches, shape (N,).
+        outputs: Number of outputs m; N = T m 2.
+        agreement: Largest difference at which searches agree.
+    """
     by_output = difference.reshape(-1, outputs, 2).max((0, 2))
     largest = np.broadcast_to(
         np.repeat(by_output, 2), (difference.size // (2 * outputs), 2 * outputs)
@@ -347,7 +393,7 @@ def _missed(difference: Array, outputs: int, agreement: float) -> Array:
 
 
 def _rounding(model: ModalModel, peak: Array) -> Array:
-    """Least error of trajectories in doubles, given their peaks (m,), shape (T, m)."""
+    """Return the error of trajectories in double precision, shape (T, m), for peaks (m,)."""
     rates = np.abs(model.eigenvalue.coefficients[0])
     largest = max(rates.max(), frequencies(model.flow.system).max())
     late: Array = 64 * np.finfo(float).eps + round_off(largest**2, rates.min(), model.time)

@@ -61,7 +61,7 @@ class CriticalMeasures:
     def from_peaks(
         cls, peaks: Sequence[Peaks], measures: Sequence[float], output: str, limit: float
     ) -> CriticalMeasures:
-        """Critical measures from the peaks under each record as it is.
+        """Return the critical measures of records from the peaks under each record as it is.
 
         Args:
             peaks: Peaks of each record, R of them on the same levels.
@@ -81,30 +81,30 @@ class CriticalMeasures:
         return cls(low, reached, np.maximum(inner, reached), high)
 
     def band(self, measure: Array) -> Ends:
-        """Least and greatest share of the records under which a structure exceeds the limit.
+        """Return bounds of the fraction of the records under which a structure exceeds the limit.
 
-        No structure within the α-cut exceeds the limit for a share of this suite's records outside
-        the band.
+        Every structure within the α-cut has its fraction, for this suite of records, inside the
+        band.
 
         Args:
             measure: Where the band is wanted, shape (X,).
 
         Returns:
-            Both ends, each of shape (A, X).
+            Lower and upper ends, each of shape (A, X).
         """
         return Ends(*(_counts(end, measure) / len(self.low) for end in (self.high, self.low)))
 
     def confidence_band(self, measure: Array) -> Ends:
-        """Limits of the probability of exceedance if the records were independent draws.
+        """Return 95 % limits of the probability of exceedance if records are independent draws.
 
-        At each measure, with 95 %: the lower Clopper–Pearson limit of the least count and the upper
-        one of the greatest (Clopper, Pearson 1934).
+        The lower Clopper–Pearson limit of the least count and the upper one of the greatest
+        (Clopper, Pearson 1934) are taken at each measure.
 
         Args:
             measure: Where the band is wanted, shape (X,).
 
         Returns:
-            Both ends, each of shape (A, X).
+            Lower and upper limits, each of shape (A, X).
         """
         from scipy.special import betaincinv  # which takes time to import
 
@@ -116,12 +116,12 @@ class CriticalMeasures:
 
     @property
     def median(self) -> Ends:
-        """Median of the lognormal fit, exp of the mean logarithm, each end of shape (A,)."""
+        """Bounds of the median of the lognormal fit, exp of the mean logarithm, shape (A,) each."""
         return Ends(*(np.exp(np.log(end).mean(0)) for end in (self.low, self.high)))
 
     @property
     def dispersion(self) -> Ends:
-        """Standard deviation of the logarithms, each end of shape (A,).
+        """Bounds of the standard deviation of the logarithms, shape (A,) each.
 
         For values within their intervals it is within ‖h‖ / √(R − 1) of that of the middles, h the
         half widths: subtracting the mean does not lengthen a vector.
@@ -139,10 +139,10 @@ class CriticalMeasures:
 
 
 def any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
-    """Critical measures of the event that any of several limits is exceeded.
+    """Return the critical measures of the event that any of several limits is exceeded.
 
-    That of a structure is the least of its own; what the limits are reached by may be different
-    structures, so that the inner upper end is no more than the inner lower one.
+    That of a structure is the least of its own. Different structures may reach the limits, so that
+    `high_reached` is no more than `low_reached`.
     """
     low, reached, high = (
         np.min([getattr(x, name) for x in limits], axis=0)
@@ -152,5 +152,10 @@ def any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
 
 
 def _counts(critical: Array, measure: Array) -> Array:
-    """Records whose critical measure is below a measure, shape (A, X)."""
+    """Return the number of records with a critical measure below each measure, (A, X).
+
+    Args:
+        critical: Critical measures, shape (R, A).
+        measure: Measures, shape (X,).
+    """
     return np.asarray((critical[:, :, None] < np.asarray(measure)).sum(0))

@@ -34,20 +34,21 @@ def output_of(peak: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Peaks:
-    """Largest magnitude of each output over time, or its largest value, "max q3" or "min q3".
+    """Bounds of the largest magnitude of each output over time, or of its largest value.
 
-    Of "min q3" it is the largest value of −q3.
+    The latter is named "max q3", or "min q3" for the largest value of −q3.
 
     Args:
         alpha: Levels, rising, shape (A,).
         outputs: Names of the peaks, m of them.
-        lower: Magnitude at the nodes that each motion reaches, as the bounds have it, (A, m).
-        upper: Magnitude at the nodes that none passes, as the bounds have it, shape (A, m).
-        error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope
-            and of the steps between nodes, shape (A, m); 0 of guaranteed bounds, which contain it.
-        reached: Magnitude that a motion in the cut is known to reach, shape (A, m).
+        lower: Least peak at the nodes over each cut, as the envelope bounds it, shape (A, m).
+        upper: Greatest peak at the nodes over each cut, as the envelope bounds it, shape (A, m).
+        error: Distance by which peaks may lie outside `lower` and `upper`: that of the envelope and
+            of the steps between nodes, shape (A, m); 0 of guaranteed bounds, which contain it.
+        reached: Peak that some motion in the cut is known to reach, shape (A, m).
         least_proved: Peak that each motion in the cut is proved to have at least, shape (A, m).
-        least_reached: Peak that a motion in the cut is known to keep to; infinite where none is.
+        least_reached: Peak that some motion in the cut is known not to exceed; infinite without
+            one.
         natures: Nature of each output's bounds, m of them.
     """
 
@@ -62,9 +63,10 @@ class Peaks:
     natures: tuple[Nature, ...]
 
     def most(self, output: str) -> Ends:
-        """Ends between which the greatest peak in each cut lies; infinite where nothing excludes.
+        """Return a lower and an upper bound of the greatest peak in each cut, shape (A,) each.
 
-        Attained bounds exclude nothing: a motion that was not looked at may peak higher.
+        Attained bounds exclude nothing, since other motions may peak higher: the upper one is
+        infinite.
         """
         k = self.outputs.index(output)
         attained = self.natures[k] is Nature.ATTAINED
@@ -72,9 +74,9 @@ class Peaks:
         return Ends(self.reached[:, k], above)
 
     def least(self, output: str) -> Ends:
-        """Ends between which the least peak in each cut lies.
+        """Return a lower and an upper bound of the least peak in each cut, shape (A,) each.
 
-        Each cut holds the highest one, none of whose motions peaks above its greatest.
+        Each cut contains the highest one, whose motions peak no higher than its greatest peak.
         """
         k = self.outputs.index(output)
         is_proved = self.natures[k] is not Nature.ATTAINED
@@ -90,7 +92,11 @@ class Peaks:
         return output.startswith(("max ", "min "))
 
     def named(self, peaks: Mapping[str, str]) -> Peaks:
-        """Some peaks under names of their own, such as those of several limits of one output."""
+        """Return some peaks under other names.
+
+        Args:
+            peaks: Peak by new name, such as several limits of one output.
+        """
         columns = [self.outputs.index(peak) for peak in peaks.values()]
         names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
         ends = {name: getattr(self, name)[:, columns] for name in names}
@@ -98,16 +104,17 @@ class Peaks:
         return replace(self, outputs=tuple(peaks), natures=natures, **ends)
 
     def nature(self, outputs: Iterable[str]) -> Nature:
-        """Weakest nature of some outputs' bounds."""
+        """Return the weakest nature of some peaks' bounds."""
         return Nature.weakest(self.natures[self.outputs.index(name)] for name in outputs)
 
 
 def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
-    """Fuzzy peaks of an envelope.
+    """Return the fuzzy peaks of an envelope's outputs.
 
     Args:
         envelope: The envelope.
-        names: Outputs, of whose magnitude they are, or "max q3", "min q3"; all outputs if empty.
+        names: Outputs, for the peaks of their magnitudes, or "max q3", "min q3"; all outputs if
+            empty.
     """
     names = tuple(names) or tuple(map(str, envelope.outputs))
     columns = [list(map(str, envelope.outputs)).index(output_of(name)) for name in names]
@@ -144,7 +151,13 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
 
 
 def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Array, Array]:
-    """Upper and lower bounds of |q|, of q ("max q") or of −q ("min q"), shape (A, T, m) each."""
+    """Return upper and lower bounds of |q|, or of q ("max q") or −q ("min q"), each (A, T, m).
+
+    Args:
+        band: Lower and upper bounds of the outputs.
+        names: Names of the m peaks.
+        columns: Output of each peak.
+    """
     upper, lower = [], []
     for name, k in zip(names, columns, strict=True):
         least, most = band.lower[..., k], band.upper[..., k]
@@ -160,7 +173,7 @@ def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Ar
 
 
 def _least_reached(envelope: Envelope, like: Array) -> Array:
-    """Peak that a motion in each cut is known to keep to, with its steps, shape (A, m)."""
+    """Return the peak that some motion of each cut does not exceed, steps included, (A, m)."""
     if envelope.least_peaks is None:
         return np.full_like(like, np.inf)
     between = 0.0 if envelope.between is None else envelope.between.max(0)
@@ -168,7 +181,7 @@ def _least_reached(envelope: Envelope, like: Array) -> Array:
 
 
 def joined(first: Peaks, second: Peaks) -> Peaks:
-    """Peaks of different names on the same levels."""
+    """Return the peaks of two sets with different names on the same levels as one set."""
     names = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
     ends = {name: np.hstack([getattr(first, name), getattr(second, name)]) for name in names}
     outputs, natures = (*first.outputs, *second.outputs), (*first.natures, *second.natures)
@@ -176,7 +189,7 @@ def joined(first: Peaks, second: Peaks) -> Peaks:
 
 
 def tightest(first: Peaks, second: Peaks) -> Peaks:
-    """Peaks of the same motions on the same levels, from two envelopes of them.
+    """Return the better of two sets of peaks of the same motions, output by output.
 
     Of each output they have the tighter of two proved bounds, or else the bounds of the stronger
     nature and of the smaller error, and the larger of the magnitudes that are reached.
@@ -196,7 +209,7 @@ def _column(peaks: Peaks, output: str) -> Peaks:
 
 
 def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:
-    """Peaks of an output by the better of two envelopes, or by both."""
+    """Return the better of two sets of peaks of one output."""
     columns = [_column(x, output) for x in (first, second) if output in x.outputs]
     if len(columns) == 1:
         return columns[0]
@@ -220,7 +233,7 @@ def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:
 
 
 def within_steps(size: Array, between: Array | None) -> Array:
-    """Bound of a magnitude in the step to each node, shape (…, T, m).
+    """Return upper bounds of a magnitude over the step before each node, shape (…, T, m).
 
     Args:
         size: The magnitude at the nodes, shape (…, T, m).
@@ -234,7 +247,7 @@ def within_steps(size: Array, between: Array | None) -> Array:
 
 
 def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
-    """Refuse limits that are none, or not of these outputs.
+    """Refuse an empty set of limits, limits that are not positive, and unknown outputs.
 
     Raises:
         RefusedError: There is no limit, one is not positive, or it names no output.
@@ -248,16 +261,15 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Passing:
-    """Degrees to which a limit is exceeded at some time.
+    """Degrees to which exceeding a limit at some time is possible and necessary.
 
     Args:
         possibility: Lower and upper bound, from 0 to 1.
-        necessity: Likewise.
-        margin: Limit less peak on each level: lower and upper ends, shape (A, 2), in SI units;
-            −inf where nothing excludes a greater peak. Of any limit: the least share of a limit
-            that is left.
-        lowest: Lowest level looked at; below it nothing is known.
-        nature: Worth of the bounds that both degrees rest on.
+        necessity: Lower and upper bound, from 0 to 1.
+        margin: Limit less greatest and less least peak on each level, shape (A, 2), in SI units;
+            −inf where nothing excludes a greater peak. Of any limit: as fractions of the limits.
+        lowest: Lowest level computed; below it nothing is known.
+        nature: Nature of the bounds that both degrees rest on.
     """
 
     possibility: tuple[float, float]
@@ -282,20 +294,20 @@ class Passing:
 
 
 def verdict_words(outcome: str, lowest: float) -> str:
-    """An outcome for people, with the level from which on it holds if that is not 0."""
+    """Return the outcome as a text, with the level from which on it holds if that is not 0."""
     holds_from = bool(lowest) and outcome in ("exceeded", "not exceeded")
     return f"{outcome} from α = {lowest:g} up" if holds_from else outcome
 
 
 def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
-    """Degrees to which the magnitude of each output exceeds its limit.
+    """Return possibility and necessity that the magnitude of each output exceeds its limit.
 
     Args:
         peaks: Fuzzy peaks of the outputs.
         limits: Largest magnitude allowed by output, in SI units.
 
     Returns:
-        One for each limit, and one for `ANY` beside several.
+        One answer for each limit by output, and one named `ANY` if there are several.
 
     Raises:
         RefusedError: There is no limit, one is not positive, or it names no output.
@@ -308,6 +320,7 @@ def passing(peaks: Peaks, limits: Mapping[str, float]) -> dict[str, Passing]:
 
 
 def _passing_of(peaks: Peaks, output: str, limit: float) -> Passing:
+    """Return the degrees to which one output exceeds its limit."""
     most, least, alpha = peaks.most(output), peaks.least(output), peaks.alpha
     possible = _highest(alpha, most.lower > limit), _excluded(alpha, most.upper <= limit)
     keeps = np.broadcast_to(least.upper <= limit, alpha.shape)
@@ -318,7 +331,7 @@ def _passing_of(peaks: Peaks, output: str, limit: float) -> Passing:
 
 
 def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing:
-    """Degrees to which any limit is exceeded: as possible as the most possible of them."""
+    """Return the degrees to which any limit is exceeded: as possible as the most possible one."""
     passings = list(answers.values())
     possible = tuple(max(x.possibility[k] for x in passings) for k in (0, 1))
     least = max(x.necessity[0] for x in passings)
@@ -334,12 +347,12 @@ def _any(answers: Mapping[str, Passing], limits: Mapping[str, float]) -> Passing
 
 
 def _highest(alpha: Array, holds: Mask) -> float:
-    """Level that is certain: the highest on which something holds, 0 without one."""
+    """Return the highest level at which the mask (A,) holds, 0 without one."""
     return float(alpha[holds][-1]) if holds.any() else 0.0
 
 
 def _excluded(alpha: Array, excluded: Mask) -> float:
-    """Level that is not reached: the lowest from which on all are excluded, 1 without one."""
+    """Return the lowest level from which on the mask (A,) holds on all levels, 1 without one."""
     open_ = np.flatnonzero(~excluded)
     first = open_[-1] + 1 if len(open_) else 0
     return float(alpha[first]) if first < len(alpha) else 1.0

@@ -45,18 +45,17 @@ Sampler = Callable[[np.random.Generator, int], Array]
 
 @dataclass(frozen=True, eq=False)
 class Probability:
-    """Probability that a magnitude exceeds its limit within the duration, by level.
+    """Bounds of the probability that a magnitude exceeds its limit, by level; always attained.
 
     Args:
         lower: Least probability over the fuzzy points tried, shape (A,).
         upper: Greatest one, shape (A,).
         error: What peaks between nodes may add to either, estimated, shape (A,).
         interval: Ends of the interval that holds the probabilities of all fuzzy points of a level
-            with probability `CONFIDENCE`, whatever the draws are, shape (2, A).
-        limits: Other limits, shape (L,), in SI units; shares of their limits for `ANY`.
+            with probability `CONFIDENCE` over the draws, shape (2, A).
+        limits: Other limits, shape (L,), in SI units; as fractions of their limits for `ANY`.
         curve: Least and greatest probability of exceeding each of them, shape (2, A, L).
         evaluations: Motions computed.
-        nature: Always attained.
     """
 
     lower: Array
@@ -81,7 +80,9 @@ def probabilities(
     rng: np.random.Generator,
     progress: Progress | None = None,
 ) -> dict[str, Probability]:
-    """Fuzzy probability of exceeding each limit, and `ANY` of several, from the same motions.
+    """Return bounds of the probability of exceeding each limit, and `ANY` of several.
+
+    All probabilities come from the same motions: those of all fuzzy points with all random draws.
 
     Args:
         model: A linear structure, moved by the exact propagator, or a general system, by the
@@ -94,7 +95,7 @@ def probabilities(
         alpha: Levels.
         samples: Random draws.
         rng: Source of the draws.
-        progress: Takes the share done.
+        progress: Called with the completed fraction.
 
     Raises:
         RefusedError: A parameter is both fuzzy and random, a limit is not positive or names no
@@ -139,7 +140,7 @@ def probabilities(
 
 
 def _tried(cuts: Boxes, level: int) -> Array:
-    """Corners of an α-cut and points inside, shape (S, d)."""
+    """Return corners of an α-cut and points inside it, shape (S, d), in SI units."""
     lower, upper = cuts.unit(level)
     if not (upper > lower).any():
         return cuts.modal[None]
@@ -149,11 +150,12 @@ def _tried(cuts: Boxes, level: int) -> Array:
 
 
 def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> Probability:
-    """Probability that peaks pass 1.
+    """Return bounds of the probability that a ratio of peak to limit exceeds 1.
 
     Args:
-        event: Peaks over their limit: at least, at most, at most within steps; (3, points, draws).
-        level: Level of each point.
+        event: Ratios, shape (3, points, draws): lower bound and upper bound at the nodes, and upper
+            bound within the steps.
+        level: Row of the level of each point, shape (points,).
         scale: The limit.
         spreads: Whether there are random inputs.
     """
@@ -177,13 +179,13 @@ def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> 
 
 
 def _interval(least: Array, most: Array, draws: int, level: Array) -> Array:
-    """Ends of the intervals of Clopper and Pearson of all points of each level, shape (2, A).
+    """Return ends of the Clopper–Pearson intervals of all points of each level, shape (2, A).
 
     Args:
-        least: Draws that surely pass the limit, by point, shape (points,).
-        most: Draws that may, motions between nodes among them, shape (points,).
+        least: Draws that surely exceed the limit, by point, shape (points,).
+        most: Draws that may exceed it, also between nodes, shape (points,).
         draws: Independent draws at each point.
-        level: Level of each point, shape (points,).
+        level: Row of the level of each point, shape (points,).
     """
     from scipy.stats import beta
 
@@ -195,7 +197,15 @@ def _interval(least: Array, most: Array, draws: int, level: Array) -> Array:
 
 
 def _bounds(peak: Array, level: Array, limits: Array) -> tuple[Array, Array]:
-    """Least and greatest share of peaks above each limit, nested over levels, (A, L) each."""
+    """Return least and greatest fraction of peaks above each limit, over points, (A, L) each.
+
+    Points of higher levels count for the lower ones, so that the bounds are nested.
+
+    Args:
+        peak: Peaks, shape (points, draws).
+        level: Row of the level of each point, shape (points,).
+        limits: Limits, shape (L,).
+    """
     rows = np.sort(peak, axis=1)
     share = np.array([1 - np.searchsorted(x, limits, side="right") / len(x) for x in rows])
     parts = [share[level >= k] for k in range(level.max() + 1)]

@@ -28,15 +28,14 @@ from alphacut.fuzzy.result import Nature
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Scales of the supports: 1 are those of the inputs.
+    """Scales of the supports about the modal values; 1 for those of the inputs.
 
     Args:
         admissible: Largest scale tried at which exceeding a limit is excluded; None where it is at
             none, not even at scale 0.
-        clear: Largest scale tried at which no motion that was looked at exceeds a limit; None
-            where it is at none.
-        passed: Least scale tried at which a motion that is known exceeds a limit; infinite
-            where none was met.
+        clear: Largest scale tried at which no computed motion exceeds a limit; None where it is at
+            none.
+        passed: Least scale tried at which a computed motion exceeds a limit; infinite without one.
         supports: Supports at the scale `admissible`, by input, in SI units.
         nature: Weakest nature of the envelopes that `admissible` rests on.
         envelopes: Number of envelopes computed.
@@ -51,7 +50,7 @@ class Tolerances:
 
 
 def scaled(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
-    """Supports at a scale about the modal values, as intervals."""
+    """Return intervals: supports scaled about their modal values; crisp ones at scale 0."""
     middles = {name: (number.modal, number.support) for name, number in inputs.items()}
     return {
         name: Interval(modal - scale * (modal - low), modal + scale * (high - modal))
@@ -74,7 +73,9 @@ def tolerances(
     at_one: Peaks | None = None,
     progress: Progress | None = None,
 ) -> Tolerances:
-    """Largest scale of the supports at which no magnitude exceeds its limit.
+    """Return the largest scale of the supports at which no magnitude exceeds its limit.
+
+    Scales are bisected, each by an envelope on the scaled supports.
 
     Args:
         model: The structure, whose outputs have the limits.
@@ -84,14 +85,14 @@ def tolerances(
         step: Distance of nodes, in s.
         most: Largest scale that is tried.
         precision: Distance of both scales, relative to `most`, at which the search ends.
-        error: Error of the peaks that is aimed at, as a share of each.
-        at_one: Peaks on the supports at scale 1, on their first level, where these are known;
-            that scale is then looked at whatever the others say.
-        progress: Takes the share done.
+        error: Error of the peaks that is aimed at, as a fraction of each.
+        at_one: Peaks on the supports at scale 1, on their first level, where these are known; that
+            scale is then used whatever the others say.
+        progress: Called with the completed fraction.
 
     Raises:
         RefusedError: A limit or a number is out of range, or supports at scale `most` reach values
-            without a meaning.
+            that are not allowed.
     """
     real("most", most, positive=True)
     real("precision", precision, positive=True, most=1)
@@ -138,7 +139,7 @@ def tolerances(
 
 
 class _Step(NamedTuple):
-    """State of one scale: passing is excluded, passing is known, worth of both."""
+    """State of a scale: whether exceeding is excluded, whether a motion exceeds, and nature."""
 
     within: bool
     passed: bool
@@ -146,6 +147,7 @@ class _Step(NamedTuple):
 
 
 def _step_of(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
+    """Return the state of a scale from the peaks on its supports."""
     ends = [(peaks.most(name), limit) for name, limit in limits.items()]
     within = all(most.upper[0] <= limit for most, limit in ends)
     passed = any(most.lower[0] > limit for most, limit in ends)
@@ -153,7 +155,14 @@ def _step_of(peaks: Peaks, limits: Mapping[str, float]) -> _Step:
 
 
 def _halved(holds: Callable[[float], bool], low: float, high: float, near: float) -> float:
-    """Largest scale at which something holds, from one at which it does and one at which not."""
+    """Return by bisection the largest scale at which a condition holds, to the distance `near`.
+
+    Args:
+        holds: The condition.
+        low: A scale at which it holds.
+        high: A scale at which it does not.
+        near: Distance at which the bisection ends.
+    """
     while high - low > near:
         middle = (low + high) / 2
         low, high = (middle, high) if holds(middle) else (low, middle)
