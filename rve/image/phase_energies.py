@@ -19,7 +19,8 @@ def phase_energies(
 ) -> PhaseEnergies:
     """Parts of K and G of each phase in the three moduli, of which nothing is proved.
 
-    Strains and stresses are two approximations: the mean of both, whose distance is the error.
+    Strains and stresses are two approximations: the mean of both, whose distance is the error. The
+    parts of either add up to the work of its loads to rounding.
 
     Args:
         solution: Of one image.
@@ -28,15 +29,15 @@ def phase_energies(
         count: Number of phases.
         aspect: Height of a pixel over its width.
     """
-    by_strain = _parts(displacement_element(aspect), solution.upper, images, phase, count)
-    by_stress = _parts(airy_element(aspect), solution.lower, images, phase, count)
+    by_strain = energy_parts(displacement_element(aspect), solution.upper, images, phase, count)
+    by_stress = energy_parts(airy_element(aspect), solution.lower, images, phase, count)
     # the compliance S = C⁻¹ has ∂S = −S ∂C S
     stiffness = np.linalg.inv(by_stress.sum(axis=(0, 1)))
     moduli = [square_moduli(x) for x in (by_strain, stiffness @ by_stress @ stiffness)]
     return PhaseEnergies((moduli[0] + moduli[1]) / 2, abs(moduli[0] - moduli[1]))
 
 
-def _parts(
+def energy_parts(
     element: Element, side: SideSolution, images: ModuliImages, phase: Rows, count: int
 ) -> Array:
     """Energies of unit strains or stresses by K and G of each phase, shape (count, 2, 3, 3)."""

@@ -23,7 +23,7 @@ from alphacut.rve.image.fields.side import (
 )
 from alphacut.rve.image.model import ImageModel
 from alphacut.rve.image.moduli import ModuliInterval, PlaneModuli
-from alphacut.rve.image.phase_energies import phase_energies
+from alphacut.rve.image.phase_energies import energy_parts, phase_energies
 from alphacut.rve.image.phase_images import moduli_images
 from alphacut.rve.image.solve import solve_image
 from alphacut.stochastic import HermiteMap
@@ -254,6 +254,20 @@ def test_energies_of_a_disc_of_pixels_are_near_those_of_a_round_particle():
     for end in (solution.bounds.lower, solution.bounds.upper):
         assert work == pytest.approx(square_moduli(end), rel=1e-3)
     assert (found.errors < 1e-3 * work).all()
+    for make, side in ((displacement_element, solution.upper), (airy_element, solution.lower)):
+        parts = energy_parts(make(1.0), side, images, inside, 2).sum(axis=(0, 1))
+        work = work_of_loads(make(1.0), side, images)
+        assert abs(parts - work).max() < 1e-10 * abs(work).max()
+
+
+def work_of_loads(element, side, images):
+    """Mean of σ_a : ε_b with the uniform fields of the loads a alone on the other side."""
+    fields = np.concatenate([side.fields, np.zeros_like(side.fields)])
+    division = np.ones((fields.shape[-1] // images.bulk[0].shape[-1],) * 2)
+    pairs = zip(element.parts, coefficients(element, images.bulk[0], images.shear[0]), strict=True)
+    weights = [(rows, np.kron(values, division)) for rows, values in pairs]
+    modes = np.tile(element.mean_modes(np.eye(3)), 2)
+    return energies(element, fields, modes, weights).value.sum(axis=0)[:3, 3:]
 
 
 def test_too_few_iterations_raise(monkeypatch):
