@@ -114,16 +114,23 @@ class EnvelopeTask:
             **self.options(structure),
         }
 
-    def close_peaks(self, structure: Structure, work: Work) -> Peaks:
-        """Peaks of the limited outputs by the method that bounds peaks most closely."""
+    def close_peaks(self, structure: Structure, work: Work, nodes: int = 1) -> Peaks:
+        """Peaks of the limited outputs by the method that bounds peaks most closely.
+
+        Args:
+            structure: The structure.
+            work: Where parts of a proof and progress go.
+            nodes: Nodes in each step.
+        """
+        magnitudes = all(name == output_of(name) for name in self.limited)
         return peaks(
             frame.envelope(
                 structure.observing("limits", outputs_of(self.limited)),
                 structure.inputs(self.fuzzy),
                 duration=self.duration,
-                step=self.section.step,
+                step=self.section.step / nodes,
                 alpha=self.section.alpha,
-                method=frame.Auto(PEAK_ERROR, peaks=True),
+                method=frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes),
                 relative=True,
                 store=work.parts,
                 interruptible=False,

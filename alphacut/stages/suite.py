@@ -29,6 +29,8 @@ FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
 PERIODS = np.geomspace(0.05, 4.0, 45)
 """Periods of response spectra, in s."""
+NODES = 2
+"""Nodes in a step at which peaks are bounded; the error between nodes falls with its square."""
 MAX_OFFSET = 0.01
 """Mean of a record as a share of its peak that is said."""
 QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
@@ -166,7 +168,7 @@ def stage_name(record: SuiteRecord) -> str:
 
 def compute(task: EnvelopeTask, structure: Structure, work: Work) -> StageResult:
     """Peaks of the outputs under one record."""
-    return StageResult({"peak": by_output(task.close_peaks(structure, work))})
+    return StageResult({"peak": by_output(task.close_peaks(structure, work, NODES))})
 
 
 def peaks_by_record(

@@ -30,8 +30,6 @@ HUGE = 1e300
 """Less than this is no value."""
 LEAST_SPREAD = 1e-30
 """Radius in SI units of a variable that does not vary, so that scaled ones stay finite."""
-LOOSE = 0.1
-"""Gap that suffices far below the peak, as a share of how far."""
 AT_PEAKS = 6
 """Multiple of the slabs that nodes are worth whose bounds lie above the peak."""
 FLOORS = 1.0, 0.25
@@ -146,7 +144,13 @@ class Level:
         return cls(structure, models, tables(models.single, excitation, structure.order), sources)
 
     def bounds(
-        self, enough: Array, slabs: int, steps: int, workers: int, tick: Progress | None = None
+        self,
+        enough: Array,
+        below: float,
+        slabs: int,
+        steps: int,
+        workers: int,
+        tick: Progress | None = None,
     ) -> tuple[Array, Array]:
         """Upper bounds of (−output, output), shape (T, m, 2), and inputs that lead there.
 
@@ -155,6 +159,7 @@ class Level:
 
         Args:
             enough: Gap of each output at which its bounds are left, shape (m,).
+            below: Gap that suffices far below the peak, as a share of how far.
             slabs: Most slabs of a bound away from the peaks.
             steps: Most evaluations of the dual function for each.
             workers: Threads.
@@ -169,7 +174,7 @@ class Level:
         problems[0].run(np.arange(0), 1, 1, 0.0, 0.0)  # compiles before there are threads
         passes = (
             (1, 1, 0.0, 0.0),
-            (slabs, steps, LOOSE, FLOORS[0]),
+            (slabs, steps, below, FLOORS[0]),
             (AT_PEAKS * slabs, steps, 1.0, FLOORS[1]),
         )
         with ThreadPoolExecutor(workers) as pool:

@@ -51,6 +51,8 @@ NEAR = 1e-3
 """Share of the box about the modal inputs over which modes are enclosed if any part of the box can
 be proved."""
 
+CORNERS = 3
+"""Corners of the box that a descent to the smallest peak visits."""
 DOUBT = 0.1
 """Share of a gap that modes may take which are not enclosed."""
 
@@ -63,6 +65,7 @@ class DualProof:
         gap: Distance of proved and attained bounds that suffices, as a share of each output's peak;
             what the remainders leave may be more.
         peaks: The same of the bounds above a peak, above which the box of inputs is parted.
+        below: Gap that suffices below a peak, as a share of how far; at 1 peaks alone are bounded.
         slabs: Most parts of the modes' ranges for a bound.
         steps: Most evaluations of the dual function for each of them.
         parts: Most parts of the box that a peak is worth, and that are refused.
@@ -83,13 +86,14 @@ class DualProof:
     name: ClassVar[str] = "dual"
     gap: float = 2e-3
     peaks: float = 0.019
+    below: float = 0.1
     slabs: int = 24
     steps: int = 40
     parts: int = 32
     workers: int | None = None
 
     def __post_init__(self) -> None:
-        for key in ("gap", "peaks", "slabs", "steps", "parts"):
+        for key in ("gap", "peaks", "below", "slabs", "steps", "parts"):
             if not getattr(self, key) > 0:
                 raise RefusedError(key, getattr(self, key), "a positive number")
 
@@ -178,7 +182,7 @@ class _Bounding:
         """Bounds of what is asked for, and what may hold a higher peak."""
         if self.needed.all():
             self._require_narrow()
-            effort = self.proof.slabs, self.proof.steps, self.goal.workers
+            effort = self.proof.below, self.proof.slabs, self.proof.steps, self.goal.workers
             gap, tick = self.proof.gap * self.goal.peak, self.goal.tick
             bounds, self.unit = self.level.bounds(gap, *effort, tick)
             self.outer = np.minimum(self.outer, bounds)
@@ -219,9 +223,21 @@ class _Bounding:
         outputs = range(len(self.top))
         with ThreadPoolExecutor(self.goal.workers) as pool:
             bounds, units = zip(*pool.map(partial(least_peak, self.level), outputs), strict=True)
-        points = np.unique(self.box.inputs(np.stack(units)), axis=0)
-        reached = np.abs(self.flow.values(points)).max(1).min(0)
-        return Ends(np.array(bounds), reached)
+        return Ends(np.array(bounds), self._small_peaks(np.stack(units)))
+
+    def _small_peaks(self, unit: Array) -> Array:
+        """A small peak that is reached of each output (m,), by a descent over corners.
+
+        Args:
+            unit: Coordinates near each output's smallest peak, shape (m, d).
+        """
+        d = unit.shape[-1]
+        moves = 1 - 2 * np.eye(d + 1, d)  # one coordinate changes its sign, or none
+        for _ in range(CORNERS):
+            tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
+            peaks = np.abs(self.flow.values(self.box.inputs(tried))).max(1)
+            unit = tried[peaks.argmin(0)]
+        return np.asarray(peaks.min(0))
 
     def _require_narrow(self) -> None:
         """Refuse a part whose remainders are worth more than `WIDE` of a peak, if bisections help.

@@ -56,6 +56,7 @@ class Auto:
         seed: Of the search and the follower.
         workers: Threads of the proof, which do not change the result; all cores unless given.
         peaks: Whether the error is that of the peaks, and a proof with a wider gap is kept.
+        magnitudes: Whether nothing is read off bounds below the peaks, which may be wide then.
 
     Raises:
         RefusedError: The tolerance is not positive.
@@ -74,6 +75,7 @@ class Auto:
     seed: int = 0
     workers: int | None = None
     peaks: bool = False
+    magnitudes: bool = False
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
@@ -130,6 +132,8 @@ class Auto:
         share, inputs = self.tolerance or SHARE, len(flow.boxes.names)
         proof = Proof(None, self.tolerance, BOXES, workers=self.workers)
         dual = DualProof(workers=self.workers)
+        if self.magnitudes:
+            dual = replace(dual, below=1.0)
         if self.tolerance and not self.peaks:
             pass  # it leaves wide gaps below the peaks, however narrow it has them there
         elif flow.relative and inputs <= (MOST_PARAMETERS if self.tolerance else FEW):

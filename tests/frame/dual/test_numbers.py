@@ -183,7 +183,7 @@ def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
 
     monkeypatch.setattr(Problem, "improve", improve)
     over, _, _ = level_of(*CASES["matrices"], np.arange(0, 3.01, 0.02))
-    over.bounds(np.full(len(over.structure.order), 1e-6), 2, 20, workers=1)
+    over.bounds(np.full(len(over.structure.order), 1e-6), 0.1, 2, 20, workers=1)
     assert len(tops) > 3
     assert {len(seen) for seen in tops.values()} == {1}
 

@@ -230,7 +230,7 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
     both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
     level = Level.of(replace(springs, start=both), {}, time, ("velocity",))
-    outer, _ = level.bounds(np.full(1, 1e-6), 40, 100, 1)
+    outer, _ = level.bounds(np.full(1, 1e-6), 0.1, 40, 100, 1)
     omega = np.sqrt(np.array([1.0, 1, 3])[:, None] * np.linspace(0.969, 1.031, 201))
     fine = np.arange(len(time) * parts - parts + 1) * 0.25 / parts
     waves = np.sin(omega * fine[:, None, None]) / omega
