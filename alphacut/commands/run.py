@@ -19,7 +19,7 @@ from alphacut.io.netcdf import read_summary
 from alphacut.io.provenance import FORMAT, command, door, versions
 from alphacut.report.comparison import comparison
 from alphacut.report.markup import write_markup
-from alphacut.report.page import render_page
+from alphacut.report.page import comparison_page, render_page
 from alphacut.report.tables import run_text, tables, text_table, write_csv, write_tables
 from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
@@ -114,12 +114,14 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
     """Shows two runs side by side, and writes the table where it is requested."""
     folders = options.folder
     require(len(folders) == 2, "FOLDER", value=f"{len(folders)} folders", allowed="one or two")
-    require(not options.out, "--out", value=options.out, allowed="none where two are compared")
     first, second = (read_summary(ResultsFolder.opened(Path(name))) for name in folders)
     table = comparison(first, second)
     allowed = "two runs with a quantity in common"
     require(bool(table[1]), "FOLDER", value=" and ".join(folders), allowed=allowed)
     named, files = {"comparison": table}, list[Path]()
+    if options.out:
+        write_text(Path(options.out), comparison_page(first, second, table))
+        files.append(Path(options.out))
     if options.csv:
         files += write_csv(named, Path(options.csv))
     if options.tables:

@@ -40,7 +40,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
         if key in results.answers:
             yield key, partial(draw, results.answers[key])
     for task in results.tasks:
-        yield from envelope.drawings(task, results.envelopes[task.name].arrays)
+        yield from envelope.drawings(task, results)
 
 
 def _material(results: Results) -> Iterator[Drawing]:

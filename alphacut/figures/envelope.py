@@ -24,19 +24,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def drawings(
-    task: EnvelopeTask, dataset: xarray.Dataset
-) -> Iterator[tuple[str, Callable[[], Figure]]]:
+def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
     """Name and function of each figure of a study."""
-    for output in task.figures or map(str, dataset["output"].values):
+    dataset, structure = results.envelopes[task.name].arrays, results.structure
+    assert structure is not None
+    for name in task.figures or map(str, dataset["output"].values):
+        output = Output(name, structure.unit(name))
         number = f"fig{task.figures[output]}-" if output in task.figures else ""
         yield f"{number}envelope-{task.name}-{output}", partial(envelope, dataset, output, task)
 
 
-def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure:
+def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Figure:
     """Nested bands between lower and upper envelope, the error of the lowest, the modal motion."""
     figure, axes = style.figure()
-    shown = dataset.sel(output=output)
+    shown = dataset.sel(output=str(output))
     alpha, time = dataset["alpha"].values, dataset["time"].values
     for level, shade in enumerate(style.colours(alpha)[:-1]):
         band = shown.isel(alpha=level)
@@ -45,31 +46,30 @@ def envelope(dataset: xarray.Dataset, output: str, task: EnvelopeTask) -> Figure
         axes.plot(time, shown.isel(alpha=-1)[side], color=style.INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=style.INK, lw=0.3)
     nature = str(dataset.attrs["nature"])
-    words = nature + error_band(axes, time, shown.isel(alpha=0), nature)
+    words = nature + error_band(axes, time, shown.isel(alpha=0), nature, output.unit)
     time_axes(axes, time, output)
-    title = f"{Output(output).words}; fuzzy: {', '.join(task.fuzzy)}; {words}"
+    title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {words}"
     style.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     style.alpha_legend(axes, alpha)
     return figure
 
 
-def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str) -> str:
+def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: str) -> str:
     """Draws the error outside the lowest band, and says how large it is."""
     if "error" not in lowest or nature == "guaranteed":
         return ""
     error = lowest["error"]
     for end in (lowest["lower"] - error, lowest["upper"] + error):
         axes.plot(time, end, color=style.GREY, lw=0.7, ls="--")
-    unit = Output(str(lowest["output"].values)).unit
     return f", ± {engineering(float(error.max()), unit, digits=2)} (dashed)"
 
 
-def time_axes(axes: Axes, time: Array, output: str) -> None:
+def time_axes(axes: Axes, time: Array, output: Output) -> None:
     """Axes of an output over time."""
     axes.set_xlim(time[0], time[-1])
     axes.set_xlabel("time t (s)")
-    name = Output(output).words.removesuffix(f" ({output})")
-    style.prefix_axis(axes, name, Output(output).unit)
+    name = output.words.removesuffix(f" ({output})")
+    style.prefix_axis(axes, name, output.unit)
 
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
@@ -91,7 +91,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     shown = dataset.sel(output=output).isel(time=slice(0, len(flow.time)))
     for side in ("lower", "upper"):
         axes.plot(flow.time, shown[side], color=style.INK, lw=1.3)
-    time_axes(axes, flow.time, output)
+    time_axes(axes, flow.time, Output(output, structure.unit(output)))
     level = f"α = {float(dataset['alpha']):g}"
     style.title(axes, f"{output} at {level}: {count} random motions (blue) and their envelope")
     return figure

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from alphacut.frame.questions.peaks import verdict_words
-from alphacut.frame.structures.quantities import Output
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
 from alphacut.questions.question import Row, limit_words
-from alphacut.report.results import Table
+from alphacut.report.results import Table, unit_of
 
 HEAD = ("at the lowest α", "first", "second", "second over first")
 
@@ -33,7 +32,8 @@ def _peaks(first: Document, second: Document) -> Iterator[Row]:
     """Greatest peak and width of the peak of each output that both runs have."""
     for study, output, pair in _pairs(first.get("envelopes", {}), second.get("envelopes", {})):
         where = "" if study == "all" else f" ({study})"
-        unit, upper = Output(output).unit, [peak["upper"][0] for peak in pair]
+        unit = unit_of(first["envelopes"][study], output)
+        upper = [peak["upper"][0] for peak in pair]
         widths = [peak["upper"][0] - peak["lower"][0] for peak in pair]
         yield _row(f"greatest peak of {output}{where}", unit, *upper)
         yield _row(f"width of the peak of {output}{where}", unit, *widths)
@@ -41,7 +41,8 @@ def _peaks(first: Document, second: Document) -> Iterator[Row]:
     for output in statistics[0].keys() & statistics[1].keys():
         for word in statistics[0][output]["proved"]:
             peaks = [values[output]["proved"][word][0] for values in statistics]
-            yield _row(f"{word} of the records' peaks of {output}", Output(output).unit, *peaks)
+            unit = unit_of(first["records"], output)
+            yield _row(f"{word} of the records' peaks of {output}", unit, *peaks)
 
 
 def _pairs(

@@ -11,7 +11,6 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
@@ -30,6 +29,7 @@ from alphacut.report.results import (
     material,
     motion,
     natures,
+    unit_of,
     width_text,
 )
 from alphacut.report.tables import tables
@@ -80,12 +80,8 @@ def render_page(folder: ResultsFolder) -> str:
 
 
 def page(summary: Document, folder: ResultsFolder) -> str:
-    """The page for a summary; all texts of it are escaped."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    loader = FileSystemLoader(Path(__file__).parent)
-    templates = Environment(autoescape=True, loader=loader, undefined=StrictUndefined)
-    return templates.get_template("report.html").render(
+    """The page for a summary."""
+    return rendered(
         title=summary["title"],
         name=summary["case"],
         about=" ".join(summary.get("about", "").split()),
@@ -94,6 +90,22 @@ def page(summary: Document, folder: ResultsFolder) -> str:
             plot(name, envelope, folder) for name, envelope in summary.get("envelopes", {}).items()
         ],
     )
+
+
+def comparison_page(first: Document, second: Document, table: Table) -> str:
+    """The page for two summaries with the table of both side by side."""
+    title, name = (f"{first[key]} and {second[key]}" for key in ("title", "case"))
+    sections = [("Side by side", [("table", *table)])]
+    return rendered(title=title, name=name, about="", sections=sections, envelopes=[])
+
+
+def rendered(**parts: object) -> str:
+    """The template of the page with its parts; all texts of it are escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = FileSystemLoader(Path(__file__).parent)
+    templates = Environment(autoescape=True, loader=loader, undefined=StrictUndefined)
+    return templates.get_template("report.html").render(parts)
 
 
 def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
@@ -112,7 +124,7 @@ def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
         "nature": str(nature),
         "alpha": dataset["alpha"].values.tolist(),
         "outputs": outputs,
-        "units": [Output(output).unit for output in outputs],
+        "units": [unit_of(study, output) for output in outputs],
         "step": float(time[1] - time[0]),
         **{
             side: [

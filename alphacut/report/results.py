@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from alphacut.frame.questions.peaks import output_of
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
@@ -106,7 +107,7 @@ def motion(summary: Document) -> Table:
     for name, study in studies.items():
         where = f" ({name})" if len(studies) > 1 else ""
         for output, peak in study["peak"].items():
-            scaled = scales(output, peak, summary.get("structure", {}))
+            scaled = scales(output, unit_of(study, output), peak, summary.get("structure", {}))
             for label, factor in scaled if output in (study.get("drawn") or [output]) else ():
                 nature, error = Nature(peak["nature"]), max(peak["error"])
                 cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
@@ -121,6 +122,11 @@ def motion(summary: Document) -> Table:
         titles[0] = "nominal"
     head = ("peak of", *titles, "± error", "reached", "gap", "limit", "exceeded")
     return filled(head, rows)
+
+
+def unit_of(part: Document, output: str) -> str:
+    """SI unit of an output, or of its peak of one side, in a study or under a suite."""
+    return part.get("units", {}).get(output_of(output)) or Output(output).unit
 
 
 def reached(peak: Document, factor: float) -> tuple[str, str]:
@@ -144,9 +150,10 @@ def nominal(peak: Document, factor: float, nature: Nature) -> str:
     return between(middle, middle, nature) if near else between(low, high, nature, 3)
 
 
-def scales(output: str, peak: Document, structure: Document) -> Iterator[tuple[str, float]]:
+def scales(
+    output: str, unit: str, peak: Document, structure: Document
+) -> Iterator[tuple[str, float]]:
     """Label and factor from SI of each unit in which an output is shown."""
-    unit = Output(output).unit
     if unit == "m/s^2":
         yield f"{output}, g", 1 / GRAVITY
         return

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.manifest import ResultsFolder
@@ -26,6 +25,7 @@ from alphacut.report.results import (
     motion,
     natures,
     peak_gap,
+    unit_of,
 )
 
 if TYPE_CHECKING:
@@ -66,7 +66,8 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
     for name, study in summary.get("envelopes", {}).items():
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
-            filled_tables[f"envelope_{name}-{output}"] = over_time(data, output)
+            unit = unit_of(study, output)
+            filled_tables[f"envelope_{name}-{output}"] = over_time(data, output, unit)
     if "records" in summary:
         filled_tables["spectra"] = spectra(summary["records"]["spectra"])
     return write_csv(filled_tables, folder)
@@ -164,7 +165,7 @@ def peaks(studies: Document) -> Table:
                 values = ends(peak["lower"][level], peak["upper"][level], nature, DIGITS)
                 reached = rounded(peak["reached"][level], "upper", Nature.ATTAINED, DIGITS)
                 error = f"{peak['error'][level]:.2g}"
-                first = (name, output, Output(output).unit, f"{alpha:g}")
+                first = (name, output, unit_of(study, output), f"{alpha:g}")
                 last = _number(reached), f"{peak_gap(peak, level):.2g}"
                 rows.append((*first, *values, error, str(nature), *last))
     head = ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature")
@@ -178,11 +179,11 @@ def records(part: Document) -> Table:
         measures = tuple(_number(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
         for output, peak in record["peak"].items():
             ends: Row = (_number(peak["upper"][0]), _number(peak["reached"][0]))
-            rows.append((name, *measures, output, Output(output).unit, *ends, peak["nature"]))
+            rows.append((name, *measures, output, unit_of(part, output), *ends, peak["nature"]))
     for output, statistics in part["statistics"].items():
         for word in statistics["proved"]:
             ends = tuple(_number(statistics[x][word][0]) for x in ("proved", "reached"))
-            rows.append((f"{word} of all", "", "", output, Output(output).unit, *ends, ""))
+            rows.append((f"{word} of all", "", "", output, unit_of(part, output), *ends, ""))
     head = ("record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit")
     return (*head, "greatest peak", "peak reached", "nature"), rows
 
@@ -221,9 +222,9 @@ MAKERS = {
 """Part of the summary of each table, and the function that makes it."""
 
 
-def over_time(data: xarray.Dataset, output: str) -> Table:
+def over_time(data: xarray.Dataset, output: str, unit: str) -> Table:
     """Bounds of one output by time, those of each level beside each other with their error."""
-    series, unit = data.sel(output=output), Output(output).unit
+    series = data.sel(output=output)
     nature = Nature(data.attrs["nature"])
     words = {"lower": f"{nature} lower", "upper": f"{nature} upper", "error": "error"}
     words["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"

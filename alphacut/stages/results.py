@@ -62,6 +62,12 @@ class Results:
         results |= {f"envelope_{name}": data for name, data in self.envelopes.items()}
         return {name: data for name, data in results.items() if data is not None}
 
+    @property
+    def _units(self) -> dict[str, str]:
+        """SI unit of each output of the structure."""
+        assert self.structure is not None
+        return {str(name): self.structure.unit(name) for name in self.structure.outputs}
+
     def document(self) -> Document:
         """Everything in numbers, for summary.json."""
         results = {name: getattr(self, name) for name in NAMES}
@@ -79,11 +85,11 @@ class Results:
         if self.envelopes:
             numbers["envelopes"] = {
                 name: envelope.document(data, tasks[name].fuzzy)
-                | {"drawn": list(tasks[name].figures)}
+                | {"drawn": list(tasks[name].figures), "units": self._units}
                 for name, data in self.envelopes.items()
             }
         if self.suite is not None:
-            numbers["records"] = self.suite
+            numbers["records"] = self.suite | {"units": self._units}
         if self.learned is not None:
             numbers["update"] = self.learned
         return {**numbers, **self.answers}

@@ -38,7 +38,11 @@ def test_two_runs_stand_side_by_side(runs, capsys):
 
 def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     a, b = runs
-    assert main(["report", str(a), str(b), "--quiet", "--csv", str(tmp_path)]) == 0
+    page = tmp_path / "both.html"
+    words = ["--quiet", "--csv", str(tmp_path), "--tables", str(tmp_path), "--out", str(page)]
+    assert main(["report", str(a), str(b), *words]) == 0
+    assert "greatest peak of q2" in page.read_text(encoding="utf-8")
+    assert "greatest peak of q2" in (tmp_path / "comparison.md").read_text(encoding="utf-8")
     with (tmp_path / "comparison.csv").open(encoding="utf-8") as file:
         assert len(list(csv.reader(file))) > 5
     assert main(["report", str(a), "--quiet", "--tables", str(tmp_path)]) == 0
@@ -53,7 +57,6 @@ def test_the_comparison_and_all_tables_are_written(runs, tmp_path):
     ("words", "message"),
     [
         (["{a}", "{a}", "{a}"], "3 folders"),
-        (["{a}", "{b}", "--out", "x.html"], "--out"),
         (["{a}", "nowhere"], "nowhere"),
     ],
 )
