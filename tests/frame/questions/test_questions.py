@@ -90,6 +90,21 @@ def test_any_of_several_limits_is_as_possible_as_the_most_possible(proved):
     assert answers[ANY].possibility[0] >= answers["q1"].possibility[0]
 
 
+def test_the_margin_of_any_limit_is_the_least_share_and_a_limit_of_0_has_all_or_none():
+    """Peaks of 0.5, −0.2 and 0.9 below limits of 2, 0 and 1: 75 % is left, all, and 10 %."""
+    row, nature = np.array([[0.5, -0.2, 0.9]]), (Nature.GUARANTEED,) * 3
+    found = Peaks(
+        np.zeros(1), ("q1", "max q2", "q3"), row, row, 0 * row, row, row, row + np.inf, nature
+    )
+    limits = {"q1": 2.0, "max q2": 0.0, "q3": 1.0}
+    assert passing(found, limits)[ANY].margin == pytest.approx(np.full((1, 2), 0.1))
+    assert passing(found, {"q1": 2.0, "max q2": 0.0})[ANY].margin == pytest.approx(0.75)
+    above = {"q1": 2.0, "max q2": -0.3}
+    assert passing(found, above)[ANY].margin == pytest.approx(-1 / 3)
+    passed = replace(found, upper=row + 0.4, lower=row + 0.4, least_proved=row + 0.4)
+    assert passing(passed, limits | {"q3": 9.0})[ANY].margin == pytest.approx(-1.0)
+
+
 def test_attained_bounds_exclude_nothing_and_say_so():
     motion = envelope(
         FRAME, INPUTS, duration=5, step=0.02, alpha=(0, 1), method="quasi-monte-carlo"
