@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from alphacut.frame import StoreyFrame, envelope, parts
 from alphacut.frame.calculus.unproved import UnprovedError
@@ -17,32 +16,24 @@ from alphacut.frame.dual.level import Problem
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
+from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Crisp, Triangular
 from tests.frame.dual.test_dual_proof import CASES, level_of
+from tests.frame.verification.test_exact_motion import UNFORCED
 
 
 def shear_motion(masses, springs, ratio, ground, parts):
-    """Roof of a shear frame, each interval of the record in equal parts, by one exponential."""
-    n, step = len(masses), ground.step / parts
+    """Roof of a shear frame at times that divide each interval of the record into equal parts."""
+    n = len(masses)
     K = np.diag(springs) + np.diag(np.append(springs[1:], 0))
     K = K - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
     root = np.sqrt(masses)
     squared, U = np.linalg.eigh(K / root / root[:, None])
     D = (root[:, None] * U) @ np.diag(2 * ratio * np.sqrt(squared)) @ (root[:, None] * U).T
-    A = np.zeros((2 * n + 2, 2 * n + 2))
-    A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n, : 2 * n] = -np.hstack([K, D]) / masses[:, None]
-    A[n : 2 * n, 2 * n] = -1
-    A[2 * n, 2 * n + 1] = 1
-    advance, state, roof = expm(A * step), np.zeros(2 * n), [0.0]
-    a = ground.acceleration
-    for i in range(len(a) - 1):
-        z = np.r_[state, a[i], (a[i + 1] - a[i]) / ground.step]
-        for _ in range(parts):
-            z = advance @ z
-            roof.append(z[n - 1])
-        state = z[: 2 * n]
-    return np.array(roof)
+    arrays = np.diag(masses), D, K, np.eye(2 * n)[[n - 1]], np.zeros(2 * n), np.ones(n)
+    motion = LinearMotion(*arrays, ground.acceleration, ground.step, *UNFORCED)
+    times = np.arange((len(ground.acceleration) - 1) * parts + 1) * ground.step / parts
+    return motion.outputs(times)[0][:, 0]
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,9 @@
-"""Motions under records of every kind against matrix exponentials at the union of nodes and samples,
-written without the program's own.
-"""
+"""Motions under records of every kind against the exact motion, which shares no code with them."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from alphacut.frame import Accelerogram, Exact, LinearFlow, Midpoint, StoreyFrame, envelope
 from alphacut.frame.boxes import boxes
@@ -15,7 +11,9 @@ from alphacut.frame.dynamics.integrators import Integrator, RungeKutta4
 from alphacut.frame.dynamics.record_load import linear_load
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.structures.linear import evaluate
+from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Interval
+from tests.frame.verification.test_exact_motion import UNFORCED
 
 STEPS = [0.01, 0.017, 1 / 128, 1 / 256, 0.05, 0.3, np.pi / 50, 0.1 / 3]
 NODES = [0.1, 0.05, 0.02, 0.013]
@@ -56,30 +54,13 @@ def random_structure(rng: np.random.Generator) -> StoreyFrame:
 
 
 def motion(frame: StoreyFrame, time: np.ndarray) -> np.ndarray:
-    """Outputs at the nodes, one matrix exponential from each time to the next."""
+    """Outputs at times by the exact motion that judges proofs."""
     m, rows = evaluate(frame, (), np.zeros((1, 0)), derivatives=False)
-    M, D, K = (x.value[0] for x in (m.mass, m.damping, m.stiffness))
-    n, a, dt = len(M), frame.ground.acceleration, frame.ground.step
-    A = np.zeros((2 * n + 2, 2 * n + 2))
-    A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n, : 2 * n] = -np.linalg.solve(M, np.hstack([K, D]))
-    A[n : 2 * n, 2 * n] = -1.0
-    A[2 * n, 2 * n + 1] = 1.0
-    state = np.concatenate([m.q0.value[0, :, 0], m.v0.value[0, :, 0]])
-    samples = np.arange(len(a)) * dt
-    knots = np.union1d(time, samples[samples < time[-1]])
-    out, advance = [rows.value[0] @ state], {}
-    for begin, end in pairwise(knots):
-        k = int(np.floor((begin + end) / 2 / dt))
-        slope = (a[k + 1] - a[k]) / dt if k + 1 < len(a) else 0.0
-        level = a[k] + slope * (begin - k * dt) if k + 1 < len(a) else 0.0
-        length = round(end - begin, 14)
-        if length not in advance:
-            advance[length] = expm(A * length)
-        state = (advance[length] @ [*state, level, slope])[: 2 * n]
-        if end in time:
-            out.append(rows.value[0] @ state)
-    return np.array(out)
+    arrays = [x.value[0] for x in (m.mass, m.damping, m.stiffness, rows)]
+    start = np.concatenate([m.q0.value[0, :, 0], m.v0.value[0, :, 0]])
+    ground, floors = frame.ground, np.ones(len(frame.masses))
+    exact = LinearMotion(*arrays, start, floors, ground.acceleration, ground.step, *UNFORCED)
+    return exact.outputs(time)[0]
 
 
 def deviation(frame: StoreyFrame, step: float) -> float:

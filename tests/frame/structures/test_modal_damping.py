@@ -2,15 +2,17 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh, expm
+from scipy.linalg import eigh
 
 from alphacut.frame import Accelerogram, MatrixStructure, StoreyFrame, envelope
 from alphacut.frame.calculus.jet import Jet
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.structures.modes import modal_damping
+from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.fuzzy import Interval, Triangular
 from alphacut.fuzzy.refused import RefusedError
+from tests.frame.verification.test_exact_motion import UNFORCED
 
 RATIOS = (0.02, 0.05, 0.08)
 RECORD = Accelerogram(0.05, 3 * np.random.default_rng(8).standard_normal(60))
@@ -30,24 +32,18 @@ FUZZY = {
 
 
 def exact(k1, m3, zeta1, zeta3, duration=3.0, step=0.05):
-    """Motion by modes of SciPy and the exponential of the state, (T, 3)."""
+    """Motion with the damping that modes of SciPy give, (T, 3)."""
     k, m = np.array([k1, 8e6, 6e6]), np.array([2e4, 2e4, m3])
     below = np.eye(3) - np.eye(3, k=-1)
     K, M = below.T @ np.diag(k) @ below, np.diag(m)
     squared, shape = eigh(K, M)
     damping = 2 * np.array([zeta1, RATIOS[1], zeta3]) * np.sqrt(squared)
     D = M @ shape @ np.diag(damping) @ shape.T @ M
-    A = np.zeros((8, 8))
-    A[:3, 3:6], A[3:6, :3], A[3:6, 3:6] = np.eye(3), -np.linalg.solve(M, K), -np.linalg.solve(M, D)
-    A[3:6, 6], A[6, 7] = -1.0, 1.0
-    turn, state, out = expm(A * step), np.zeros(6), [np.zeros(3)]
-    a = np.append(RECORD.acceleration, 0.0)
-    for i in range(round(duration / step)):
-        slope = (a[i + 1] - a[i]) / step if i < len(a) - 2 else 0.0
-        start = a[i] if i < len(a) - 2 else 0.0
-        state = (turn @ np.array([*state, start, slope]))[:6]
-        out.append(np.array([state[2], state[1] - state[0], state[3]]))
-    return np.array(out)
+    rows = np.zeros((3, 6))
+    rows[[0, 1, 1, 2], [2, 1, 0, 3]] = 1, 1, -1, 1
+    arrays = M, D, K, rows, np.zeros(6), np.ones(3)
+    motion = LinearMotion(*arrays, RECORD.acceleration, RECORD.step, *UNFORCED)
+    return motion.outputs(step * np.arange(round(duration / step) + 1))[0]
 
 
 def test_motions_are_those_of_an_independent_calculation():
