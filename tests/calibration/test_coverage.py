@@ -82,4 +82,4 @@ def one_gap(monkeypatch):
 @pytest.mark.parametrize("fault", [one_tail, one_gap])
 def test_half_a_level_is_seen(fault, monkeypatch):
     fault(monkeypatch)
-    assert lacking("normal", (10,), 400, np.random.default_rng(3))
+    assert lacking("normal", (10,), 120, np.random.default_rng(3))

@@ -192,7 +192,7 @@ def random_frame(rng):
 SEED = int(np.random.default_rng().integers(2**31))
 
 
-ALWAYS = 3
+ALWAYS = 1
 """Random frames that are tested always; thirty in all are with `-m slow`."""
 
 

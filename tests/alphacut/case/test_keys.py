@@ -11,6 +11,8 @@ from alphacut.case.keys import allowed, every_key, json_schema, sections
 
 ROOT = Path(__file__).parents[3]
 CASES = sorted((ROOT / "cases").glob("*.toml"))
+SCHEMA = json_schema()
+VALIDATOR = jsonschema.Draft202012Validator(json.loads(SCHEMA))
 
 
 def test_each_key_says_what_it_is():
@@ -19,18 +21,18 @@ def test_each_key_says_what_it_is():
 
 def test_the_schema_is_that_of_the_models():
     text = (ROOT / "cases/case.schema.json").read_text(encoding="utf-8")
-    assert text == json_schema(), "python -m alphacut.case.keys > cases/case.schema.json"
+    assert text == SCHEMA, "python -m alphacut.case.keys > cases/case.schema.json"
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
 def test_shipped_cases_fit_the_schema(path):
-    jsonschema.validate(tomllib.loads(path.read_text(encoding="utf-8")), json.loads(json_schema()))
+    VALIDATOR.validate(tomllib.loads(path.read_text(encoding="utf-8")))
 
 
 def test_the_schema_refuses_an_unknown_key():
     case = {"title": "x", "stages": ["modulus"], "nothing": 1}
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(case, json.loads(json_schema()))
+        VALIDATOR.validate(case)
 
 
 def test_the_page_has_every_section_of_the_models():

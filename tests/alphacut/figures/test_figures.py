@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 
 import numpy as np
 import pytest
@@ -20,8 +21,8 @@ def kept(folder):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
 
 
-def test_figures_are_drawn_once_and_anew_where_the_case_changed(tmp_path):
-    folder = run(tmp_path)
+def test_figures_are_drawn_once_and_anew_where_the_case_changed(results, tmp_path):
+    folder = shutil.copytree(results, tmp_path / "out")
     drawn = folder / "figures" / "decision.png"
     os.utime(drawn, (1, 1))
     run(tmp_path)

@@ -103,7 +103,7 @@ duration = "2 s"
 step = "0.02 s"
 [decision]
 limits = ["drift1 <= 1 %", "drift1 <= 3 %", "max drift1 <= 60 mm", "min drift1 >= -60 mm",
-          "min drift1 >= -20 mm", "min q2 >= 1 m"]
+          "min drift1 >= -20 mm", "min q2 >= 1 m", "q1 <= 1 m"]
 """
 
 
@@ -122,6 +122,7 @@ def test_an_output_has_several_limits_of_each_side_and_of_its_magnitude(tmp_path
         "min drift1 >= -60 mm": "not exceeded",
         "min drift1 >= -20 mm": "exceeded",
         "min q2": "exceeded",
+        "q1": "not exceeded",  # no output of the frame's own
         "any of them": "exceeded",
     }
     band = summary["envelopes"]["all"]

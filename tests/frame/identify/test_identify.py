@@ -278,7 +278,7 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
     count: int, share: float
 ) -> None:
     rng, held = np.random.default_rng(count), 0
-    for _ in range(500):  # all floors scatter alike, that of the largest amplitude, too
+    for _ in range(250):  # all floors scatter alike, that of the largest amplitude, too
         rows = np.array([[share], [1.0]]) + 0.02 * rng.standard_normal((2, count))
         mode = measured_mode(
             1, 2 + 0.01 * rng.standard_normal(count), {1: rows[0], 2: rows[1]}, shape_deviation=0.02,
@@ -286,18 +286,18 @@ def test_shapes_of_known_deviation_hold_the_truth_as_often_as_claimed(
         )  # fmt: skip
         low, high = mode.shape[1].cut(0.1)
         held += low <= share <= high
-    assert 0.86 <= held / 500 <= 0.94
+    assert 0.84 <= held / 250 <= 0.96
 
 
 def test_among_equal_amplitudes_the_highest_floor_is_the_reference() -> None:
     rng, held, shape = np.random.default_rng(5), 0, {1: 0.9, 2: -1.0, 3: 1.0, 4: 0.93}
-    for _ in range(300):
+    for _ in range(120):
         rows = {floor: [x + 0.02 * rng.standard_normal()] for floor, x in shape.items()}
         mode = measured_mode(2, [2.0], rows, frequency_deviation=0.01, shape_deviation=0.02)
         assert mode.reference == 4
         low, high = mode.shape[2].cut(0.1)
         held += low <= -1 / 0.93 <= high
-    assert 0.85 <= held / 300 <= 0.95
+    assert 0.82 <= held / 120 <= 0.98
 
 
 def test_a_reference_is_near_the_largest_and_its_size_counts() -> None:
@@ -328,7 +328,7 @@ def test_at_level_1_a_prior_that_agrees_is_a_point() -> None:
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_scatter_that_chance_explains_is_not_refused(count: int) -> None:
     rng = np.random.default_rng(count)
-    for _ in range(300):
+    for _ in range(100):
         values = 2.0 * (1 + 0.01 * rng.standard_normal(count))
         measured_mode(1, values, frequency_deviation=0.01)
 
@@ -349,12 +349,12 @@ def test_modes_and_priors_beyond_the_frame_are_refused() -> None:
 def test_ratios_of_noisy_amplitudes_are_not_biased(known):
     """A tenth of noise makes the mean ratio a hundredth too large, more than 1000 rows scatter."""
     rng, inside = np.random.default_rng(), 0
-    for _ in range(100):
+    for _ in range(50):
         rows = {1: 0.6 + 0.1 * rng.normal(size=1000), 2: 1 + 0.1 * rng.normal(size=1000)}
         mode = measured_mode(1, 2 + 0.01 * rng.normal(size=1000), rows, shape_deviation=known)
         low, high = mode.shape[1].cut(0.05)
         inside += low <= 0.6 <= high
-    assert inside >= 85
+    assert inside >= 42
 
 
 def test_amplitudes_whose_reference_is_mostly_noise_are_refused():
@@ -382,14 +382,14 @@ def test_samples_are_in_the_set_and_their_modes_in_the_predictions(
     found = identify(FRAME, prior, measured(truth, rng, **shown), alpha=(0.05, 0.5))  # type: ignore[arg-type]
     predicted = found.predictions()
     for row, level in enumerate(found.alpha):
-        points = found.samples(150, row=row, seed=2)
-        assert points.shape == (150, 3)
+        points = found.samples(80, row=row, seed=2)
+        assert points.shape == (80, 3)
         assert agree(found, points, float(level)).all()
         assert ((found.lower[row] <= points) & (points <= found.upper[row])).all()
         hertz = np.sqrt(found.evidence.chain.modes(points)[0]) / (2 * np.pi)
         assert ((predicted.lower[row] <= hertz) & (hertz <= predicted.upper[row])).all()
-        assert (found.samples(150, row=row, seed=2) == points).all()
-        assert (found.samples(150, row=row, seed=3) != points).any()
+    assert (found.samples(80, row=1, seed=2) == points).all()
+    assert (found.samples(80, row=1, seed=3) != points).any()
 
 
 def test_samples_outside_a_box_that_is_too_narrow_refuse_it(rng: np.random.Generator) -> None:

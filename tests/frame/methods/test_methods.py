@@ -44,6 +44,15 @@ KINDS = {
 MOTION = {"duration": 4.0, "step": 0.05, "alpha": (0, 0.5, 1), "relative": True, "progress": False}
 
 
+@pytest.fixture(scope="module")
+def proofs():
+    """The proof of each kind of structure."""
+    return {
+        kind: envelope(*case, method=frame.Proof(tolerance=1e-5), **MOTION)
+        for kind, case in KINDS.items()
+    }
+
+
 def trajectories(system, inputs, points, step=0.05, duration=4.0):
     """Exact motions at the nodes of `MOTION`."""
     flow = frame.LinearFlow(system, tuple(inputs), duration, step, frame.Exact())
@@ -71,13 +80,13 @@ def attained(found, system, inputs):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(kind):
+def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(proofs, kind):
     system, inputs = KINDS[kind]
-    found = envelope(system, inputs, method=frame.Proof(tolerance=1e-4), **MOTION)
+    found = proofs[kind]
     peak = np.abs(found.upper).max((0, 1))
     assert found.nature is Nature.GUARANTEED
-    assert (found.error.max((0, 1)) <= 1e-4 * peak * 1.3).all()
-    assert attained(found, system, inputs) <= 1e-4 * peak.max()
+    assert (found.error.max((0, 1)) <= 1e-5 * peak * 1.3).all()
+    assert attained(found, system, inputs) <= 1e-5 * peak.max()
     for level, alpha in enumerate(found.alpha):
         values = trajectories(system, inputs, drawn(inputs, alpha))
         assert (values <= found.upper[level] + 1e-12 * peak).all()
@@ -85,9 +94,9 @@ def test_a_proof_contains_every_motion_and_nearly_attains_its_bounds(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_happens_between_nodes_is_in_the_bound_of_that(kind):
+def test_what_happens_between_nodes_is_in_the_bound_of_that(proofs, kind):
     system, inputs = KINDS[kind]
-    found = envelope(system, inputs, method=frame.Proof(tolerance=1e-3), **MOTION)
+    found = proofs[kind]
     fine = trajectories(system, inputs, drawn(inputs, 0.0, 60), step=0.005)
     ends = np.maximum(found.upper[0, 1:], found.upper[0, :-1]) + found.between[1:]
     top = fine[:, 1:].reshape(len(fine), -1, 10, len(found.outputs)).max((0, 2))
@@ -95,9 +104,9 @@ def test_what_happens_between_nodes_is_in_the_bound_of_that(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_search_attains_its_bounds_and_its_error_covers_the_proof(kind):
+def test_a_search_attains_its_bounds_and_its_error_covers_the_proof(proofs, kind):
     system, inputs = KINDS[kind]
-    proof = envelope(system, inputs, method=frame.Proof(tolerance=1e-6), **MOTION)
+    proof = proofs[kind]
     found = envelope(system, inputs, method=frame.Search(1e-4), **MOTION)
     peak = np.abs(proof.upper).max((0, 1))
     assert found.nature is Nature.ESTIMATED
@@ -112,9 +121,9 @@ def test_a_search_attains_its_bounds_and_its_error_covers_the_proof(kind):
                                     frame.GraphFollower(order=1, tolerance=1e-3),
                                     frame.ImprovedFollower(tolerance=1e-3)], ids=repr)  # fmt: skip
 @pytest.mark.parametrize("kind", ["dampers", "matrices"])
-def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(kind, method):
+def test_a_follower_stays_within_proved_bounds_and_says_what_it_misses(proofs, kind, method):
     system, inputs = KINDS[kind]
-    proof = envelope(system, inputs, method=frame.Proof(tolerance=1e-5), **MOTION)
+    proof = proofs[kind]
     found = envelope(system, inputs, method=method, **MOTION)
     assert found.nature is Nature.ESTIMATED
     off = np.maximum(np.abs(found.upper - proof.upper), np.abs(found.lower - proof.lower))
@@ -152,7 +161,7 @@ def test_auto_takes_the_proof_else_the_search_else_the_follower_and_says_why():
     )
     for system, inputs, tolerance, nature, why in cases:
         method = frame.Auto(tolerance=tolerance)
-        found = envelope(system, inputs, method=method, **{**MOTION, "step": 0.02})
+        found = envelope(system, inputs, method=method, **{**MOTION, "step": 0.02, "duration": 2.0})
         assert found.nature is nature
         assert found.notes[0].startswith(why)
 
@@ -164,8 +173,9 @@ def test_more_inputs_than_a_proof_takes_are_searched_to_their_error():
         (2e4,) * 3, stiffness=(8e6,) * 3, damping_ratio=0.03, q0=(0.01, 0.02, 0.03)
     )
     inputs = {x: Interval(0.9 * system.parameters[x], 1.1 * system.parameters[x]) for x in names}
-    found = envelope(system, inputs, method=frame.Search(1e-3), **{**MOTION, "alpha": (0,)})
-    values = trajectories(system, inputs, drawn(inputs, 0.0, 20_000))
+    motion = {**MOTION, "alpha": (0,), "duration": 1.6}
+    found = envelope(system, inputs, method=frame.Search(1e-3), **motion)
+    values = trajectories(system, inputs, drawn(inputs, 0.0, 10_000), duration=1.6)
     assert (values <= found.upper[0] + found.error[0]).all()
     corners = values[-(2 ** len(names)) :]
     assert (corners <= found.upper[0] + found.error[0]).all()

@@ -49,13 +49,12 @@ def reference(folder):
     return bits(folder, "1", [sys.executable])
 
 
-@pytest.mark.parametrize("workers", [2, 5])
-def test_any_number_of_workers(folder, reference, workers):
-    assert bits(folder, str(workers), [sys.executable]) == reference
+def test_any_number_of_workers(folder, reference):
+    assert bits(folder, "5", [sys.executable]) == reference
 
 
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
-@pytest.mark.parametrize("processes", [1, 2, 3])
+@pytest.mark.parametrize("processes", [1, 3])
 def test_any_number_of_mpi_processes(folder, reference, processes):
     command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py.futures"]
     assert bits(folder, f"mpi{processes}", command) == reference

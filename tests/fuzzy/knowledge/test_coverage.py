@@ -19,28 +19,28 @@ SEVEN = [2.01, 1.96, 2.03, 1.88, 2.10, 1.99, 2.05]
 @pytest.mark.parametrize("law", ["normal", "Cauchy", "coin 0.1"])
 def test_coverage_is_as_claimed_for_any_law(law, claim):
     for n in (1, 5, 20):
-        score, excess = held(law, claim, n, 300, np.random.default_rng(n))
+        score, excess = held(law, claim, n, 150, np.random.default_rng(n))
         assert score.min() > -4
         if law != "coin 0.1" and claim == "next value":
-            assert excess.max() < 1 / (n + 1) + 4 * 0.5 / np.sqrt(300)
+            assert excess.max() < 1 / (n + 1) + 4 * 0.5 / np.sqrt(150)
 
 
 @pytest.mark.parametrize(("law", "claim"), [(x, y) for x in NAMED for y in NAMED[x]])
 def test_coverage_under_a_named_law_is_exact(law, claim):
-    score, _ = held(law, claim, 5, 400, np.random.default_rng(2), named=law)
+    score, _ = held(law, claim, 5, 200, np.random.default_rng(2), named=law)
     assert np.abs(score).max() < 4
 
 
 @pytest.mark.parametrize("law", ["uniform", "arcsine", "skewed beta", "coin 0.1"])
 def test_coverage_of_a_mean_within_bounds(law):
-    score, _ = held(law, "mean", 8, 300, np.random.default_rng(4))
+    score, _ = held(law, "mean", 8, 150, np.random.default_rng(4))
     assert score.min() > -4
 
 
 @pytest.mark.parametrize("claim", FREE)
 @pytest.mark.parametrize("censored", [2.0, 3.5, 5.0])
 def test_coverage_of_censored_values_counts_what_they_leave_undecided(claim, censored):
-    score, _ = held("normal", claim, 20, 300, np.random.default_rng(5), censored=censored)
+    score, _ = held("normal", claim, 20, 150, np.random.default_rng(5), censored=censored)
     assert score.min() > -4
 
 
