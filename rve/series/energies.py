@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -14,7 +14,7 @@ from alphacut.rve.series.means import Mean, finer_count
 from alphacut.rve.series.multipoles import LOADS, Contrast, modulus, multipoles
 from alphacut.stochastic import RadiusMap, gauss_rule
 
-SAFETY, NOISE = 1.6, 1e-9
+SAFETY, NOISE = 1.6, 1e-12
 
 
 def complex_moduli(radius: Array, bulk: Array, shear: Array, *, harmonics: int) -> Array:
@@ -47,32 +47,17 @@ def phase_energies(radius: Array, matrix: Phase, inclusion: Phase, *, harmonics:
 
 
 def mean_energies(
-    energies_of: Callable[..., Array],
-    radius_map: RadiusMap,
-    matrix: Phase,
-    inclusions: Sequence[Phase],
-    means: Sequence[Mean],
+    radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], means: Sequence[Mean]
 ) -> list[PhaseEnergies]:
-    """Energies of means over θ, one for each inclusion.
-
-    Args:
-        energies_of: `phase_energies` of the series at hand.
-        radius_map: Radii over θ.
-        matrix: Material outside the particle.
-        inclusions: Materials of the particle.
-        means: Mean stiffness for each of them.
-    """
+    """Energies of means over θ, one for each inclusion."""
     return [
-        _energies_of_mean(energies_of, radius_map, (matrix, inclusion), mean)
+        _energies_of_mean(radius_map, matrix, inclusion, mean)
         for inclusion, mean in zip(inclusions, means, strict=True)
     ]
 
 
 def _energies_of_mean(
-    energies_of: Callable[..., Array],
-    radius_map: RadiusMap,
-    phases: tuple[Phase, Phase],
-    mean: Mean,
+    radius_map: RadiusMap, matrix: Phase, inclusion: Phase, mean: Mean
 ) -> PhaseEnergies:
     """Energies of one inclusion; the farther of two finer means tells the error, as of moduli."""
     nodes, terms, law = mean.curve.theta.size, mean.terms, radius_map.distribution
@@ -82,8 +67,9 @@ def _energies_of_mean(
         rule = gauss_rule(law, points=nodes)
         levels.append((rule.nodes, rule.weights, terms))
     values, *finer = (
-        np.tensordot(weights, energies_of(radius_map(theta), *phases, harmonics=n), 1)
+        weights @ phase_energies(radius_map(theta), matrix, inclusion, harmonics=n).reshape(-1, 12)
         for theta, weights, n in levels
     )
-    distance = np.max([abs(values - judge) for judge in finer], axis=0)
-    return PhaseEnergies(values, SAFETY * distance + NOISE * values.sum(axis=(0, 1)))
+    values, distance = values.reshape(2, 2, 3), np.max([abs(values - x) for x in finer], axis=0)
+    errors = SAFETY * distance.reshape(2, 2, 3) + NOISE * values.sum(axis=(0, 1))
+    return PhaseEnergies(values, errors)

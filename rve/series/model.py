@@ -5,7 +5,7 @@ It refuses, with the error it would have, where particles nearly touch (r > 0.99
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import ClassVar
@@ -15,7 +15,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.certificate import certified
 from alphacut.rve.result import HomogenisedStiffness
-from alphacut.rve.series.energies import mean_energies, phase_energies
+from alphacut.rve.series.energies import mean_energies
 from alphacut.rve.series.means import Mean, settled_means
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import CellModuli
@@ -79,11 +79,11 @@ class SeriesModel:
         results = [self._result(*pair, seconds) for pair in zip(means, cells, strict=True)]
         if not self.energies:
             return results
-        energies = mean_energies(self._energies, radius_map, matrix, inclusions, means)
+        energies = self._energies(radius_map, matrix, inclusions, means)
         pairs = zip(results, energies, strict=True)
         return [replace(result, energies=energy) for result, energy in pairs]
 
-    _energies: ClassVar[Callable[..., Array]] = staticmethod(phase_energies)
+    _energies = staticmethod(mean_energies)
 
     def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
         return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)

@@ -24,7 +24,7 @@ def space_stiffness(phase: Phase) -> Array:
 def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
     share = np.asarray(fraction, float)
-    bulks, shears = zip(matrix.bulk_and_shear, inclusion.bulk_and_shear, strict=True)
+    bulks, shears = np.transpose([matrix.bulk_and_shear, inclusion.bulk_and_shear]).tolist()
     ends = [
         [
             harmonic_about(share, pair, x)

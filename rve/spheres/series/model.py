@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,7 +12,7 @@ from alphacut.rve.series.means import Mean
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.truncation import CellModuli
 from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
-from alphacut.rve.spheres.series.energies import phase_energies
+from alphacut.rve.spheres.series.energies import mean_energies
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness, unknowns
 
 
@@ -22,7 +22,7 @@ class SphereSeriesModel(SeriesModel):
 
     accuracy: float = 1e-9
     LEAST: ClassVar[float] = 1e-11
-    _energies: ClassVar[Callable[..., Array]] = staticmethod(phase_energies)
+    _energies = staticmethod(mean_energies)
 
     def _moduli(self, radii: Array, matrix: Phase, inclusions: Sequence[Phase]) -> CellModuli:
         return cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)

@@ -50,26 +50,17 @@ def cubic_stiffness(
     """
 
     def solve(radii: Array, degree: int) -> Array:
-        return moduli_of_degree(radii, matrix, inclusions, degree)
+        """By mean stress less that of the far field, from force dipoles."""
+        (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
+        axial, sheared = (
+            _dipoles(radii, matrix, inclusions, degree, shear=shear) for shear in (False, True)
+        )
+        scale = 8 * np.pi * mu * (1 - nu) * radii[:, None] ** 3 / VOLUME
+        axial[..., 0] /= -3 * (1 - 2 * nu)
+        dipoles = np.concatenate([axial, sheared], axis=-1)
+        return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
 
     return TRUNCATION.settle(radius, len(inclusions), solve, tolerance=tolerance)
-
-
-def moduli_of_degree(
-    radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int
-) -> Array:
-    """K, (C11 − C12)/2 and C44 by multipoles up to a degree, shape (n, m, 3), in Pa.
-
-    The mean stress differs from that of the far field by the force dipoles of the spheres.
-    """
-    (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
-    axial, sheared = (
-        _dipoles(radius, matrix, inclusions, degree, shear=shear) for shear in (False, True)
-    )
-    scale = 8 * np.pi * mu * (1 - nu) * radius[:, None] ** 3 / VOLUME
-    axial[..., 0] /= -3 * (1 - 2 * nu)
-    dipoles = np.concatenate([axial, sheared], axis=-1)
-    return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
 
 
 def _dipoles(
