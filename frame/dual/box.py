@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,16 +72,21 @@ class Box:
         points[..., self.active] += ((self.high - self.low) / 2)[self.active] * unit
         return np.clip(points, self.low, self.high)
 
-    def level(self, nodes: Rows | slice = slice(None), allowed: Array | None = None) -> Level:
-        """Models of all outputs at some nodes; `allowed` as of `Models.of`.
+    def level(
+        self,
+        nodes: Rows | slice = slice(None),
+        allowed: Array | None = None,
+        outputs: Rows | slice = slice(None),
+    ) -> Level:
+        """Models of some outputs, all unless given, at some nodes; `allowed` as of `Models.of`.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
         try:
-            moved = sources(self.system, self.structure)
-            time = self.time[nodes]
-            return Level.of(self.structure, self.loads, time, moved, allowed)
+            structure = with_outputs(self.structure, outputs)
+            moved, time = sources(self.system, structure), self.time[nodes]
+            return Level.of(structure, self.loads, time, moved, allowed)
         except UnprovedError as refusal:
             if refusal.along is not None:
                 refusal.along = int(self.active[refusal.along])
@@ -169,6 +174,12 @@ def over_box(system: LinearSystem, names: Sequence[str], low: Array, high: Array
     }
     p |= {names[int(i)]: inputs[column] for column, i in enumerate(active)}
     return classical(system, p)
+
+
+def with_outputs(structure: Classical, outputs: Rows | slice) -> Classical:
+    """The structure of which some outputs alone are read."""
+    rows, factor, order = structure.rows, structure.factor, structure.order
+    return replace(structure, rows=rows[outputs], factor=factor[outputs], order=order[outputs])
 
 
 def sources(system: LinearSystem, structure: Classical) -> tuple[str, ...]:

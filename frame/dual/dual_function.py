@@ -17,6 +17,7 @@ the rest count by magnitude.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -84,13 +85,16 @@ def roundings(modes: int, sources: int, inputs: int) -> int:
     return 2 * modes * (sources + 2) + 2 * inputs**2 + 4 * inputs + 4 * sources + 32
 
 
-def require_in_range(data: Data) -> None:
+def require_in_range(fields: Mapping[str, Array]) -> None:
     """Refuse models and tables out of the range in which the dual function cannot overflow.
+
+    Args:
+        fields: Fields of `Data` by name.
 
     Raises:
         UnprovedError: A number is not finite or larger than `LARGEST`.
     """
-    for name, values in data._asdict().items():
+    for name, values in fields.items():
         if not (np.abs(values) <= LARGEST).all():
             raise UnprovedError(f"dual function: {name} is not finite or above {LARGEST:g}")
 
@@ -213,28 +217,45 @@ def dual(
 def most_of_mode(
     mu: Array, k: int, slab: Rows, node: int, side: float, data: Data, values: Array
 ) -> tuple[float, int]:
-    """The first line of D for one mode, and the point of its table at which it is met."""
-    sources, count = data.share.shape[1], int(data.points[0])
-    first = k * (2 + sources)
-    w, g = data.omega[k], data.decay[k]
-    best, at = -1e300, 0
-    for row in range(slab[2], slab[3] + 1):
-        begin, end = row * count + slab[0], row * count + slab[1] + 1
-        for i in range(begin, end):
-            values[i] = -mu[first] * w[i] - mu[first + 1] * g[i]
-        for s in range(sources):
-            e, m = data.table[k, s, node], mu[first + 2 + s]
-            c, r = side * data.share[k, s], side * data.reach[k, s]
-            for i in range(begin, end):
+    """The first line of D for one mode, and the point of its table at which it is met.
+
+    Loops run over slices from 0, without which they are not compiled to vector instructions: over
+    all rows of the slab at once, then over each for the maximum of each column.
+    """
+    count, width = int(data.points[0]), slab[1] + 1 - slab[0]
+    first, end = slab[2] * count + slab[0], slab[3] * count + slab[1] + 1
+    maximand(mu, k, first, node, side, data, values[first:end])
+    highest = np.full(width, -1e300)
+    for begin in range(first, end, count):
+        of_row = values[begin : begin + width]
+        for i in range(width):
+            highest[i] = of_row[i] if of_row[i] > highest[i] else highest[i]
+    column = 0
+    for i in range(width):
+        column = i if highest[i] > highest[column] else column
+    at = first + column
+    while values[at] != highest[column]:
+        at += count
+    return highest[column], at
+
+
+@loops
+def maximand(
+    mu: Array, k: int, first: int, node: int, side: float, data: Data, values: Array
+) -> None:
+    """Write what is maximised at consecutive points of a mode's table, from `first` on."""
+    sources, end = data.share.shape[1], first + len(values)
+    z = k * (2 + sources)
+    w, g, along, across = data.omega[k, first:end], data.decay[k, first:end], mu[z], mu[z + 1]
+    for s in range(sources):
+        e, m = data.table[k, s, node, first:end], mu[z + 2 + s]
+        c, r = side * data.share[k, s], side * data.reach[k, s]
+        if s == 0:
+            for i in range(len(values)):
+                values[i] = c * e[i] + abs(r * e[i] - m) - along * w[i] - across * g[i]
+        else:
+            for i in range(len(values)):
                 values[i] += c * e[i] + abs(r * e[i] - m)
-        top = values[begin]
-        for i in range(begin, end):
-            top = max(top, values[i])
-        if top > best:
-            best, at = top, begin
-            while values[at] != top:
-                at += 1
-    return best, at
 
 
 @loops

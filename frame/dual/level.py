@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.frame.calculus.monomials import monomials
 from alphacut.frame.calculus.rounding import gamma
-from alphacut.frame.calculus.taylor_model import TaylorModel
+from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.dual.dual_function import EXPECTED, Data, require_in_range, roundings
 from alphacut.frame.dual.intervening import Oscillator
 from alphacut.frame.dual.models import Models
@@ -50,6 +50,9 @@ class Tables:
         stray: Bounds of what responses stray from straight lines in the step to a node, the same.
         grids: For each mode its points.
         time: Nodes, shape (T,), in s.
+
+    Raises:
+        UnprovedError: A response is out of the range of the dual function.
     """
 
     value: dict[int, Array]
@@ -57,6 +60,10 @@ class Tables:
     stray: dict[int, Array]
     grids: list[Grid]
     time: Array
+
+    def __post_init__(self) -> None:
+        for value in self.value.values():
+            require_in_range({"table": value})
 
 
 def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -> Tables:
@@ -238,8 +245,9 @@ class Problem:
         """Bounds of one output of a level, on one side."""
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
-        data = Data(*_tables(level, o), *_models(level, o), *group)
-        require_in_range(data)
+        variables = _variables(level, o)
+        data = Data(*_tables(level, o, variables), *_models(level, variables), *group)
+        require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
         out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
         at = np.zeros((total, data.linear.shape[1]))
         return cls(side, enough, constant, data, out, at, attained)
@@ -272,40 +280,31 @@ class Problem:
         self.out[0, nodes] = np.minimum(self.out[0, nodes], out[0])
 
 
-def _ends(models_of_modes: Sequence[Sequence[TaylorModel]]) -> tuple[Array, Array]:
-    """Centres and radii of variables, one row a mode."""
-    return (
-        np.array([[float(x.value) for x in row] for row in models_of_modes]),
-        np.array([[_spread(x) for x in row] for row in models_of_modes]),
-    )
+def _variables(level: Level, o: int) -> TaylorModel:
+    """ω, g and the shares of each mode, in this order, V = (Z,)."""
+    models = ((mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in level.single)
+    return concatenate([x for of_mode in models for x in of_mode], -1)
 
 
-def _tables(level: Level, o: int) -> list[Array]:
+def _tables(level: Level, o: int, variables: TaylorModel) -> list[Array]:
     """The first fields of `Data`: the table, its points, and the ranges of all variables."""
-    grids = level.tables.grids
-    centre, radius = _ends([[mode.omega, mode.decay] for mode in level.single])
-    shares = _ends([[mode.share[s, o] for s in range(len(level.sources))] for mode in level.single])
+    grids, single = level.tables.grids, level.single
+    centre, radius = (x.reshape(len(single), -1) for x in (variables.value, _radii(variables)))
     omega = np.stack([np.tile(g.omega, len(g.quotient)) for g in grids])
     decay = np.stack([(g.quotient[:, None] * g.omega).ravel() for g in grids])
     scaled = [(x - centre[:, [i]]) / radius[:, [i]] for i, x in enumerate((omega, decay))]
     start = np.array([[g.omega[0], g.quotient[0]] for g in grids])
     step = np.array([[g.omega[1], g.quotient[1]] for g in grids]) - start
     points = np.array([len(grids[0].omega), len(grids[0].quotient)], float)
-    ends = np.array(
-        [mode.places(grid) for mode, grid in zip(level.single, grids, strict=True)], float
-    )
+    ends = np.array([mode.places(grid) for mode, grid in zip(single, grids, strict=True)], float)
     value = level.tables.value[int(level.structure.order[o])]
-    return [value, *scaled, start, step, points, ends, centre, radius, *shares]
+    ranges = [x[:, some].copy() for some in (slice(2), slice(2, None)) for x in (centre, radius)]
+    return [value, *scaled, start, step, points, ends, *ranges]
 
 
-def _models(level: Level, o: int) -> list[Array]:
+def _models(level: Level, variables: TaylorModel) -> list[Array]:
     """The next fields of `Data`: scaled models of all variables."""
-    models = [
-        x
-        for mode in level.single
-        for x in (mode.omega, mode.decay, *(mode.share[s, o] for s in range(len(level.sources))))
-    ]
-    linear, quadratic, cubic, remainder = _stacked([_scaled(x, _spread(x)) for x in models])
+    linear, quadratic, cubic, remainder = _scaled(variables, _radii(variables))
     size = np.asarray(np.abs(cubic).sum(1))
     # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
     of_sums = 8 * gamma(roundings(len(level.single), len(level.sources), linear.shape[1]))
@@ -319,44 +318,37 @@ def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
     constant[1] = level.models.added[:, o]
     for k, mode in enumerate(level.single):
         constant[1] += mode.share.size()[:, o] @ tables.error[order][k]
-    d, sources = level.structure.rayleigh.inputs, range(len(level.sources))
+    d, sources = level.structure.rayleigh.inputs, len(level.sources)
     if not level.models.rests:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
-    waves, rows = list[Array](), list[tuple[Array, ...]]()
+    waves, models = list[Array](), list[TaylorModel]()
     for truncated in level.models.rests:
         middle, half = truncated.middle[:, o], truncated.half[:, o]
         waves += [middle, side * half]
-        rows += [
-            _scaled(model[s, o], 1.0)
-            for model in (truncated.share, truncated.doubt)
-            for s in sources
-        ]
+        models += [truncated.share[:, o], truncated.doubt[:, o]]
         constant[0] += side * truncated.share.value[:, o] @ middle
         constant[1] += truncated.doubt.value[:, o] @ half
-    wave, (linear, quadratic, cubic, remainder) = np.concatenate(waves), _stacked(rows)
+    wave, model = np.concatenate(waves), concatenate(models, -1)
+    linear, quadratic, cubic, remainder = _scaled(model, np.ones(len(wave)))
     constant[1] += (remainder + np.abs(cubic).sum(1)) @ np.abs(wave)
     size = np.abs(linear).sum(1) + np.abs(quadratic).sum(1)
-    constant[1] += gamma(roundings(len(level.single), len(sources), d)) * (size @ np.abs(wave))
+    constant[1] += gamma(roundings(len(level.single), sources, d)) * (size @ np.abs(wave))
     constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
     return [wave, linear, quadratic], constant
 
 
-def _stacked(rows: Sequence[tuple[Array, ...]]) -> list[Array]:
-    return [np.stack(column) for column in zip(*rows, strict=True)]
+def _radii(x: TaylorModel) -> Array:
+    return np.maximum(np.maximum(x.spread(), 1e-9 * np.abs(x.value)), LEAST_SPREAD)
 
 
-def _spread(x: TaylorModel) -> float:
-    return max(float(x.spread()), 1e-9 * abs(float(x.value)), LEAST_SPREAD)
-
-
-def _scaled(x: TaylorModel, radius: float) -> tuple[Array, ...]:
-    """Linear, quadratic and cubic coefficients, and the bound of the rest, over radius."""
+def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
+    """Linear, quadratic and cubic coefficients, V first, and the bound of the rest, over radius."""
     # pairs by rows, as the kernel has them
     lists = monomials(x.inputs, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
     remainder = np.asarray(x.rest + gamma(8) * x.size())
-    linear, quadratic, cubic = x.part(1), x.part(2)[order], x.part(3)
-    return tuple(np.asarray(y / radius) for y in (linear, quadratic, cubic, remainder))
+    parts = ((y / radius).T for y in (x.part(1), x.part(2)[order], x.part(3)))
+    return (*(np.ascontiguousarray(y) for y in parts), remainder / radius)
 
 
 def _blocks(nodes: Rows) -> list[Rows]:

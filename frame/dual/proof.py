@@ -161,6 +161,7 @@ class _Bounding:
     Attributes:
         needed: Bounds that are asked for, shape (T, m, 2).
         nodes: Nodes of these, shape (J,).
+        outputs: Outputs of these, rising.
         level: Models of the motion at these.
         outer: Upper bounds of (−output, output) at all nodes, shape (T, m, 2).
         unit: Coordinates of the best inputs, shape (T, m, 2, d).
@@ -173,7 +174,9 @@ class _Bounding:
         self.top = goal.incumbent[k].copy()
         self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
         gap = proof.gap if self.needed.all() else proof.peaks
-        self.level = box.level(self.nodes, DOUBT * gap * goal.peak)
+        self.outputs: Rows = np.flatnonzero(self.needed.any((0, 2)))
+        allowed = DOUBT * gap * goal.peak[self.outputs]
+        self.level = box.level(self.nodes, allowed, self.outputs)
         d = len(box.active)
         self.unit = np.zeros((*self.outer.shape, d))
         self.shares = np.zeros((*self.outer.shape[1:], d))
@@ -246,7 +249,7 @@ class _Bounding:
             UnprovedError: They are.
         """
         for o, s in np.ndindex(self.top.shape) if not self.goal.last else ():
-            problem = Problem.of(self.level, o, s, 0.0)
+            problem = self._problem_of(o, s, 0.0, 0.0)
             problem.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
             node, shares = int(problem.out[1].argmax()), np.zeros(len(self.box.low))
             least, shares[self.box.active] = remainder(problem, node)
@@ -265,11 +268,15 @@ class _Bounding:
     def _problem(self, o: int, s: int) -> tuple[Problem, Rows]:
         """Bounds of one output and side, and the places of those that are above what suffices."""
         enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.top[o, s])
-        problem = Problem.of(self.level, o, s, enough, top)
+        problem = self._problem_of(o, s, enough, top)
         bounds = self.outer[self.nodes, o, s]
         problem.out[0] = bounds
         above = self.needed[self.nodes, o, s] & (bounds > top + enough)
         return problem, np.flatnonzero(above)
+
+    def _problem_of(self, o: int, s: int, enough: float, top: float) -> Problem:
+        """Bounds of one output and side; see `Problem.of`."""
+        return Problem.of(self.level, int(np.searchsorted(self.outputs, o)), s, enough, top)
 
     def _bound(self, o: int, s: int) -> None:
         """Bound an output at nodes where it may pass its peak."""
@@ -286,6 +293,7 @@ class _Bounding:
         worst = int(above[problem.out[0, above].argmax()])
         self.shares[o, s] = remainder(problem, worst)[1]
         best = self.unit[nodes, o, s][self.outer[nodes, o, s].argmax()]
-        low, high, pruned = prune_ends(self.level, problem, (o, s), above, best)
+        index = int(np.searchsorted(self.outputs, o)), s
+        low, high, pruned = prune_ends(self.level, problem, index, above, best)
         self.remaining[:, o, s] = self.box.inputs(np.stack([low, high]))
         self.pruned[nodes, o, s] = pruned

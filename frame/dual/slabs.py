@@ -1,7 +1,7 @@
 """Bounds at nodes: the model's own ascent from below, and the largest dual bound of all slabs.
 
 Where a bound is too far from the model's own value, the ranges of the modes' tables are halved, the
-slab with the largest bound first.
+slab with the largest bound first (best-first search).
 """
 
 from __future__ import annotations
