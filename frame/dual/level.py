@@ -338,7 +338,7 @@ def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
 
 
 def _radii(x: TaylorModel) -> Array:
-    return np.maximum(np.maximum(x.spread(), 1e-9 * np.abs(x.value)), LEAST_SPREAD)
+    return np.asarray(np.maximum(np.maximum(x.spread(), 1e-9 * np.abs(x.value)), LEAST_SPREAD))
 
 
 def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
