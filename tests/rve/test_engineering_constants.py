@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from alphacut.rve import Ellipse, Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
+from alphacut.rve import Ellipse, Phase, SeriesModel, SlicesModel
 from alphacut.rve.axial import AxialStiffness
 from alphacut.rve.engineering_constants import (
     FREE,
@@ -119,15 +119,3 @@ def test_a_cell_turned_by_a_right_angle_exchanges_x_and_y():
     for definition in (PLANE_STRAIN, FREE):
         x, y = (engineering_constants(r)[definition].values for r in results[:2])
         assert x[[0, 1, 3]] == pytest.approx(y[[1, 0, 3]], rel=1e-5)
-
-
-def test_declared_errors_of_prisms_hold_slices_of_an_orthotropic_ellipse():
-    particle = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0), (5e9, 0, 30e9)))
-    radius, outline = HermiteMap(0.2, 0.1, 0.5, 0.1), Ellipse(2.0, 30.0)
-    prism, slices = (
-        model.solve(radius, MATRIX, [particle])[0]
-        for model in (PrismModel(0.4, 4, outline=outline), SlicesModel(4, 0.3, 8, outline))
-    )
-    error = abs(prism.stiffness - slices.stiffness)
-    assert (error <= prism.stiffness_errors + slices.stiffness_errors).all()
-    assert list(engineering_constants(prism)) == [PLANE_STRAIN]  # no isotropic phases

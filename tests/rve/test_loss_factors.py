@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.rve import Ellipse, Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
+from alphacut.rve import Phase, PrismModel, SeriesModel, SlicesModel, VoigtPhase
 from alphacut.rve.loss_factors import bulk_and_shear_losses, loss_factors
 from alphacut.rve.phase_energies import first_order
 from alphacut.rve.series.energies import complex_moduli
@@ -66,21 +66,6 @@ def test_pores_and_rigid_particles_lose_nothing_whatever_their_loss(contrast):
     result = solved(MODELS[0], particle=Phase(20e9 * contrast, 0.2))
     loss = loss_factors(result, np.array([[0.02, 0.02], [0.09, 0.09]]))
     assert np.allclose([*loss.values.values()], 0.02, rtol=1e-6)
-
-
-def test_ellipses_of_an_orthotropic_material_agree_in_slices_and_prisms():
-    particle = VoigtPhase(((90e9, 20e9, 5e9), (20e9, 50e9, 0), (5e9, 0, 30e9)))
-    outline, radius = Ellipse(2.0, 30.0), HermiteMap(0.2, 0.1, 0.6, 0.1)
-    losses = np.array([[0.02, 0.02], [0.005, 0.005]])
-    slices, prism = (
-        loss_factors(model.solve(radius, MATRIX, [particle])[0].averaged("isotropic"), losses)
-        for model in (
-            SlicesModel(3, 0.5, 6, outline=outline, energies=True),
-            PrismModel(0.4, 4, outline=outline),
-        )
-    )
-    for name, value in prism.values.items():
-        assert abs(value - slices.values[name]) <= prism.errors[name] + slices.errors[name]
 
 
 def test_the_loss_of_young_s_modulus_is_the_mean_of_bulk_and_shear_by_energy():

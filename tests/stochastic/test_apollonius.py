@@ -118,7 +118,7 @@ def test_three_discs_against_adaptive_quadrature(radii, periodic):
 
 @pytest.mark.parametrize(
     "seeds",
-    [range(200), pytest.param(range(200, 1000), marks=pytest.mark.slow)],
+    [range(100), pytest.param(range(100, 1000), marks=pytest.mark.slow)],
     ids=["few", "thousand"],
 )
 def test_configurations_tile_their_rectangle_and_match_a_raster(seeds):
@@ -171,7 +171,7 @@ def test_equal_radii_give_scipys_voronoi_cells(seed):
         )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-0.01, 0.2), st.floats(0.01, 1e6))
 def test_areas_do_not_change_with_a_common_growth_and_scale_with_the_length(seed, growth, scale):
     rng = np.random.default_rng(seed)

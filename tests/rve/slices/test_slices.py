@@ -222,7 +222,7 @@ def estimated_and_true(points, *, seed, decades):
     stresses, so the series stands in for slices.
     """
     rng, pairs = np.random.default_rng(seed), []
-    while len(pairs) < 60:
+    while len(pairs) < 30:
         a1, a2, a3, a4 = rng.uniform([0.05, -0.5, 0.1, -0.5], [0.6, 1, 0.95, 1])
         try:
             radius_map = HermiteMap(a1, a2, a3, a4)

@@ -110,7 +110,7 @@ def test_hashin_shtrikman_and_the_traces_enclose():
 def test_declared_error_holds_and_is_no_fable():
     ratios = []
     rng = np.random.default_rng(11)
-    for radius, matrix, inclusion in random_cells(100, 2, highest=0.95):
+    for radius, matrix, inclusion in random_cells(60, 2, highest=0.95):
         tolerance = 10 ** rng.uniform(-8, -2)
         cell = cubic_stiffness([radius], matrix, [inclusion], tolerance=tolerance)
         exact = moduli(radius, matrix, inclusion, tolerance=min(1e-10, tolerance / 1e3))
@@ -120,7 +120,7 @@ def test_declared_error_holds_and_is_no_fable():
         assert cell.errors.max() <= tolerance
         if true.max() > 1e-12:
             ratios.append(cell.errors.max() / true.max())
-    assert len(ratios) > 60
+    assert len(ratios) > 30
     assert np.median(ratios) < 30
 
 
