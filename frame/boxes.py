@@ -17,8 +17,9 @@ from alphacut.frame.structures.quantities import Output, units_of
 from alphacut.fuzzy import FuzzyNumber, Interval
 from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.knowledge.joint import joined_inputs
-from alphacut.fuzzy.refused import RefusedError, require, require_numbers
+from alphacut.fuzzy.refused import require, require_numbers
 from alphacut.fuzzy.result import Nature
+from alphacut.fuzzy.sets.numbers import rising
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 FAR_APART = 1.5
@@ -60,9 +61,7 @@ class Boxes:
         require(
             bool(self.names), "inputs", value=None, allowed="fuzzy numbers by name, one at least"
         )
-        levels = np.asarray(self.alpha)
-        if not (levels.size and levels[0] >= 0 and levels[-1] <= 1 and (np.diff(levels) > 0).all()):
-            raise RefusedError("alpha", levels.tolist(), "levels that rise within [0, 1]")
+        rising(self.alpha)
 
     @property
     def inputs(self) -> Mapping[str, FuzzyNumber]:

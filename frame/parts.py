@@ -135,6 +135,7 @@ class Queue:
     store: PartStore | None = None
 
     def __post_init__(self) -> None:
+        """Start with the whole box as the only open part, and an empty hull of closed parts."""
         shape = (len(self.boxes.alpha), len(self.flow.time), len(self.flow.outputs), 2)
         self.closed, self.inner = np.full(shape, -np.inf), np.full(shape, -np.inf)
         self.at = np.zeros((*shape, len(self.boxes.names)))
@@ -361,7 +362,7 @@ class Queue:
         return bool((ends[0] > boxes.lower[0]).any() or (ends[1] < boxes.upper[0]).any())
 
     def _is_hopeless(self, key: Key, peak: float, shares: Array) -> bool:
-        """Return True if the gap of a peak falls too slowly, or too many inputs share it.
+        """Return True if the gap of a peak falls too slowly, or depends on too many inputs.
 
         Args:
             key: Level, output and side of the peak.

@@ -91,7 +91,7 @@ def envelope(
         integrator: Time stepping of linear structures, an integrator or its name: exact (of auto,
             proof and search unless given), midpoint (of all others), rk4. Of general Lagrangian
             systems it is midpoint.
-        relative: Whether the method's tolerance is a share of each output's peak at the modal
+        relative: Whether the method's tolerance is a fraction of each output's peak at the modal
             parameters and some corners, instead of a number in SI units.
         store: Folder in which a proof keeps the bounds of parts of the boxes, and from which it
             goes on after it was killed; None to keep nothing.
@@ -107,8 +107,8 @@ def envelope(
 
     Raises:
         RefusedError: An unknown name or option, a value outside its range, a support that reaches
-            values without a meaning, or a motion that does not exist.
-        FailedError: A step is too long, or a method cannot do what it is to do.
+            values that are not allowed, or a motion that does not exist.
+        FailedError: A step is too long, or a method finds no bounds.
 
     Example:
         >>> from alphacut.frame import StoreyFrame
@@ -163,7 +163,7 @@ def _problem(
     integrator: str | Integrator | None,
     options: Mapping[str, object],
 ) -> _Problem:
-    """Return method, motion and distinct boxes that the arguments of `envelope` describe.
+    """Return method, flow (trajectories) and distinct boxes from the arguments of `envelope`.
 
     Raises:
         RefusedError: As `envelope`.
@@ -193,7 +193,7 @@ def require_envelope(
     integrator: str | Integrator | None = None,
     **options: object,
 ) -> None:
-    """Refuse what `envelope` refuses, from the first steps of the motion at a few parameters.
+    """Refuse what `envelope` refuses, from the first steps of a few trajectories.
 
     Raises:
         RefusedError: As `envelope`.
@@ -258,15 +258,10 @@ def _method(
         method = "improved-graph-follower" if isinstance(model, LagrangianSystem) else "auto"
     if not isinstance(method, str):
         runs = hasattr(method, "run") and not isinstance(method, type)
-        require(
-            runs,
-            "method",
-            value=repr(method),
-            allowed=f"{', '.join(METHODS)}, or an object as Proof()",
-        )
-        require(
-            not options, "options", value=[*options], allowed="none beside a method that is no name"
-        )
+        allowed = f"{', '.join(METHODS)}, or an object as Proof()"
+        require(runs, "method", value=repr(method), allowed=allowed)
+        allowed = "none beside a method that is no name"
+        require(not options, "options", value=[*options], allowed=allowed)
         return method
     chosen("method", method, METHODS)
     for option in options:

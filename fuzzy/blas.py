@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """The function, which BLAS serves with one thread while it runs."""
+    """Return the function wrapped so that BLAS uses one thread while it runs."""
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> T:

@@ -206,28 +206,21 @@ class IntervalQuasiMonteCarlo:
             RefusedError: There is no random input, or an input is named twice.
         """
         separate = bool(random) and not set(random) & set(inputs)
-        require(
-            separate,
-            "random inputs",
-            value=tuple(random),
-            allowed="one or more, none of them fuzzy",
-        )
+        allowed = "one or more, none of them fuzzy"
+        require(separate, "random inputs", value=tuple(random), allowed=allowed)
         results = []
         for u in self._probabilities(len(random)):
-            quantiles = {
-                name: number.at(p, alpha)
-                for (name, number), p in zip(random.items(), u, strict=True)
-            }
-            results.append(
-                propagate(
-                    function,
-                    {**quantiles, **inputs},
-                    self.method,
-                    alpha=alpha,
-                    knowledge=knowledge,
-                    progress=False,
-                )
+            pairs = zip(random.items(), u, strict=True)
+            quantiles = {name: number.at(p, alpha) for (name, number), p in pairs}
+            bounds = propagate(
+                function,
+                {**quantiles, **inputs},
+                self.method,
+                alpha=alpha,
+                knowledge=knowledge,
+                progress=False,
             )
+            results.append(bounds)
         return IntervalResponse(results)
 
     def _probabilities(self, inputs: int) -> Array:

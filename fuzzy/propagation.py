@@ -158,7 +158,7 @@ def _without_failed(bounds: Bounds, failed: int) -> Bounds:
 
 
 def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
-    """Return the unit of each output, "" where none is given; entries of an array share one."""
+    """Return the unit of each output, "" without one; entries of an array have the array's unit."""
     names = {name.partition("[")[0] for name in outputs}.union(outputs)
     for name in units:
         chosen("unit of", name, sorted(names))

@@ -68,13 +68,14 @@ class Chain:
         return chain_modes(self.stiffness * stiffness, self.mass * mass)
 
     def ranges(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return lower and upper ends of the logarithms of stiffness and mass factors over a box.
+        """Return lower and upper bounds of the logarithms of stiffness and mass factors over a box.
 
         Factors are ratios to nominal stiffnesses and masses.
 
         Args:
-            lower: Logarithms of the parameters over nominal values, lower ends, shape (d,).
-            upper: Upper ends.
+            lower: Lower corner of the box, logarithms of parameters over nominal values, shape
+                (d,).
+            upper: Upper corner.
 
         Returns:
             Two arrays of shape (2, n), stiffness first.

@@ -126,22 +126,39 @@ def measured_mode(
     means = {floor: abs(float(row.mean())) for floor, row in rows.items()}
     largest = max(means.values())
     reference = max(floor for floor, mean in means.items() if mean >= NEAR * largest)
+    # deviation of an amplitude, relative to that of the reference floor
+    deviation = shape_deviation and shape_deviation * largest / means[reference]
     shape = {}
     for floor in [floor for floor in rows if floor != reference]:
         what = f"mode {mode}: amplitudes q{floor}/q{reference} of floor {floor}"
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = rows[floor] / rows[reference]
-        square = _scatter(ratios, shape_deviation and shape_deviation * largest / means[reference])
-        value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
-        key = f"{what}: scatter of floor {reference}"
-        clear = bool(np.isfinite(ratios).all()) and square <= ROUGH**2
-        require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
-        # the reference scatters, too; the last factor is above the second order's
-        share = float(np.hypot(1, ratios.mean())) * largest / means[reference]
-        combined = shape_deviation and shape_deviation * share * float(np.sqrt(1 + 8 * square))
-        unbiased = ratios / (1 + square + 3 * square**2)  # the mean of 1/(1 + x), x normal
-        shape[floor] = _mean(unbiased, combined, what, "shape_deviation")
+        shape[floor] = _mean_ratio(ratios, deviation, what, reference)
     return MeasuredMode(mode, number, shape, reference)
+
+
+def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> Claimed:
+    """Return the mean of amplitude ratios as a fuzzy number, without the bias of the division.
+
+    Args:
+        ratios: Amplitudes of a floor over those of the reference floor, shape (n,).
+        deviation: Standard deviation of either amplitude over the reference's mean, if known.
+        what: Name of the ratios for messages.
+        reference: The reference floor.
+
+    Raises:
+        RefusedError: The reference scatters by more than `ROUGH`, or as `_mean`.
+    """
+    square = _scatter(ratios, deviation)
+    value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
+    key = f"{what}: scatter of floor {reference}"
+    clear = bool(np.isfinite(ratios).all()) and square <= ROUGH**2
+    require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
+    # both amplitudes scatter; the last factor is above the second order's
+    combined = deviation and deviation * float(np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * square))
+    mean_of_inverse = 1 + square + 3 * square**2  # of 1/(1 + x), x normal
+    unbiased = np.asarray(ratios / mean_of_inverse, float)
+    return _mean(unbiased, combined, what, "shape_deviation")
 
 
 def _scatter(ratios: Array, deviation: float | None) -> float:

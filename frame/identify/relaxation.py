@@ -112,7 +112,7 @@ class Rows:
         return {len(self.lower) - 1: 1.0}
 
     def range(self, expression: Linear) -> tuple[float, float]:
-        """Return least and greatest value of an expression over the ends of its variables."""
+        """Return least and greatest value of an expression over the ranges of its variables."""
         low = high = expression.get(CONSTANT, 0.0)
         for at, a in expression.items():
             if at != CONSTANT:
@@ -198,19 +198,19 @@ class Relaxation:
 def enclosure(
     chain: Chain, lower: Array, upper: Array, modes: list[ModeCut]
 ) -> tuple[Array, Array] | None:
-    """Return the ends of a box proved to contain all parameters that agree with the modes.
+    """Return the corners of a box proved to contain all parameters that agree with the modes.
 
-    Each end is bounded by linear programs, in at most `PASSES` passes over ever smaller boxes.
+    Each side is bounded by linear programs, in at most `PASSES` passes over ever smaller boxes.
 
     Args:
         chain: The frame.
-        lower: Lower ends of the first box, logarithms of parameters over nominal values, shape
+        lower: Lower corner of the first box, logarithms of parameters over nominal values, shape
             (d,).
-        upper: Upper ends.
+        upper: Upper corner.
         modes: Ranges of the measured modes at a level.
 
     Returns:
-        Lower and upper ends, shape (d,) each; None where no parameters agree.
+        Lower and upper corner, shape (d,) each; None where no parameters agree.
     """
     amplitudes: dict[tuple[int, int], tuple[float, float]] = {}
     for _ in range(PASSES):
@@ -312,7 +312,7 @@ class _Chains:
             rows.at_most(total(force, net_force, -1.0))
 
     def amplitudes(self, eigenvalue: float, cut: ModeCut) -> dict[int, tuple[float, float]] | None:
-        """Return ends of the amplitude of each floor; None if unmeasured ones cannot be bounded.
+        """Return the range of the amplitude of each floor; None if unmeasured ones have no bounds.
 
         Floors between two measured ones are a chain between moved supports, whose matrix K − λ M is
         positive definite while λ stays below its own least frequency.

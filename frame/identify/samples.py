@@ -47,17 +47,17 @@ def inner_point(violation: Violation, box: Ends, chance: np.random.Generator) ->
 def walk(
     violation: Violation, start: Array, box: Ends, number: int, chance: np.random.Generator
 ) -> Array:
-    """Return points (number, d) of a set in a box, the ends of random walks (hit and run).
+    """Return points (number, d) of a set in a box, reached by random walks (hit and run).
 
     Each step is a point of a random chord, cut at points outside the set (shrinking slice sampler;
     Neal, Annals of Statistics 31, 2003). Every second chord points from one walk to another, as
-    long and thin sets need (ter Braak, Statistics and Computing 16, 2006). The ends become uniform
-    in a convex set; in others they reach the part in which such chords lie.
+    long and thin sets need (ter Braak, Statistics and Computing 16, 2006). The points become
+    uniform in a convex set; in others they reach the part in which such chords lie.
 
     Args:
         violation: Violation of the ranges at points; the set is where none is positive.
         start: A point of the set, shape (d,).
-        box: Lower and upper ends of the box, shape (d,) each.
+        box: Lower and upper corner of the box, shape (d,) each.
         number: Number of points.
         chance: Random number generator.
     """

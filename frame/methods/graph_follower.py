@@ -76,6 +76,7 @@ class GraphFollower:
     tolerance: float = 1e-3
 
     def __post_init__(self) -> None:
+        """Refuse an order other than 1 and 2 and a tolerance that is not positive."""
         require(
             self.order in (1, 2),
             "order",

@@ -126,8 +126,8 @@ class ImprovedFollower:
         """Return the bounds of one pass on all levels, from the narrowest box to the widest."""
         levels, storage = len(flow.boxes.alpha), Storage(flow)
         d, places = len(flow.boxes.names), storage.top.size // 2
-        bounds, left = np.zeros((2, levels, *storage.top.shape))
-        out = PassBounds(bounds, np.zeros((*bounds.shape, d)), left, storage)
+        bounds, gains = np.zeros((2, levels, *storage.top.shape))
+        out = PassBounds(bounds, np.zeros((*bounds.shape, d)), gains, storage)
         at_once = int(np.clip(MOST / (places * (1 + d + d * d)), 1, BATCH))
         for done, level in enumerate(reversed(range(levels))):
             search = _Level(storage, flow.boxes.unit(level), self.tolerance)

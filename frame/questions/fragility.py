@@ -48,6 +48,7 @@ class CriticalMeasures:
     high: Array
 
     def __post_init__(self) -> None:
+        """Refuse measures that are not positive or not in rising order."""
         ends = (self.low, self.low_reached, self.high_reached, self.high)
         rise = all((a <= b * (1 + 1e-9)).all() for a, b in pairwise(ends))
         require(

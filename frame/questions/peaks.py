@@ -65,7 +65,7 @@ class Peaks:
     def most(self, output: str) -> Ends:
         """Return a lower and an upper bound of the greatest peak in each cut, shape (A,) each.
 
-        Attained bounds exclude nothing, since other motions may peak higher: the upper one is
+        Attained bounds exclude nothing, since other trajectories may peak higher: the upper one is
         infinite.
         """
         k = self.outputs.index(output)
@@ -124,19 +124,20 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
     proved = np.array([nature is Nature.GUARANTEED for nature in natures])
     error = np.where(proved, 0.0, envelope.error[..., columns])  # of proved bounds it is in them
     between = None if envelope.between is None else envelope.between[:, columns]
-    size, away = _sided(Ends(envelope.lower, envelope.upper), names, columns)
-    sizes, _ = _sided(envelope.attained, names, columns)
+    most, least = _sided(Ends(envelope.lower, envelope.upper), names, columns)  # (A, T, m)
+    attained, _ = _sided(envelope.attained, names, columns)
     signed = np.array([name != output_of(name) for name in names])
-    floor = np.where(signed, -np.inf, 0.0)
-    upper, lower = size.max(1), away.max(1)
-    above = within_steps(size + error, between).max(1) - upper
-    below = lower - np.maximum(away - error, floor).max(1)
-    least = envelope.least_peaks
-    least_proved = np.zeros_like(upper) if least is None else least.lower[:, columns]
+    floor = np.where(signed, -np.inf, 0.0)  # no peak of a magnitude is lower
+    upper, lower = most.max(1), least.max(1)
+    above = within_steps(most + error, between).max(1) - upper
+    below = lower - np.maximum(least - error, floor).max(1)
+    least_proved = np.zeros_like(upper)
+    if envelope.least_peaks is not None:
+        least_proved = envelope.least_peaks.lower[:, columns]
     least_proved = np.where(signed, -np.inf, least_proved)
     lower = np.where(proved, np.maximum(lower, least_proved), lower)
     upper = np.where(proved, upper + above, upper)
-    reached = np.where(np.isnan(sizes), floor, sizes).max(1)
+    reached = np.where(np.isnan(attained), floor, attained).max(1)
     return Peaks(
         np.asarray(envelope.alpha),
         names,
@@ -161,14 +162,13 @@ def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Ar
     upper, lower = [], []
     for name, k in zip(names, columns, strict=True):
         least, most = band.lower[..., k], band.upper[..., k]
-        pairs = {
-            "max": (most, least),
-            "min": (-least, -most),
-            "": (np.maximum(most, -least), np.maximum(np.maximum(least, -most), 0.0)),
-        }
-        pair = pairs["" if name == output_of(name) else name[:3]]
-        upper.append(pair[0])
-        lower.append(pair[1])
+        if name.startswith("min "):
+            least, most = -most, -least
+        elif name == output_of(name):
+            magnitude = np.maximum(most, -least)
+            least, most = np.maximum(np.maximum(least, -most), 0.0), magnitude
+        upper.append(most)
+        lower.append(least)
     return np.stack(upper, -1), np.stack(lower, -1)
 
 
@@ -189,7 +189,7 @@ def joined(first: Peaks, second: Peaks) -> Peaks:
 
 
 def tightest(first: Peaks, second: Peaks) -> Peaks:
-    """Return the better of two sets of peaks of the same motions, output by output.
+    """Return the better of two sets of peaks of the same response, output by output.
 
     Of each output they have the tighter of two proved bounds, or else the bounds of the stronger
     nature and of the smaller error, and the larger of the magnitudes that are reached.

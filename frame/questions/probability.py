@@ -179,7 +179,7 @@ def _probability(event: Array, level: Array, scale: float, *, spreads: bool) -> 
 
 
 def _interval(least: Array, most: Array, draws: int, level: Array) -> Array:
-    """Return ends of the Clopper–Pearson intervals of all points of each level, shape (2, A).
+    """Return Clopper–Pearson limits over all points of each level, lower and upper, (2, A).
 
     Args:
         least: Draws that surely exceed the limit, by point, shape (points,).

@@ -104,21 +104,20 @@ def tolerances(
         step=step,
         alpha=[0.0],
         method=Auto(error, peaks=True),
-        relative=True,
         interruptible=False,
         progress=False,
     )
     tried: dict[float, _Step] = {}
 
     def step_at(scale: float) -> _Step:
-        if scale in tried:
-            return tried[scale]
-        numbers = scaled(inputs, scale)
-        tried[scale] = _step_of(peaks(bounds(numbers)), limits)
-        if progress:
-            progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
+        """Return the state of a scale, computed once."""
+        if scale not in tried:
+            tried[scale] = _step_of(peaks(bounds(scaled(inputs, scale))), limits)
+            if progress:
+                progress(min(1.0, len(tried) / (2 + np.log2(1 / precision))))
         return tried[scale]
 
+    # the largest scale at which exceeding is excluded, from the largest one known
     near = precision * most
     if at_one is not None and most >= 1:
         tried[1.0] = _step_of(at_one, limits)
@@ -126,6 +125,7 @@ def tolerances(
     if low < most and tried[low].within:
         high = min(scale for scale in tried if scale > low)
         low = _halved(lambda scale: step_at(scale).within, low, high, near)
+    # the same for scales at which a computed motion exceeds a limit
     passed = min((scale for scale, trial in tried.items() if trial.passed), default=np.inf)
     clear = max((scale for scale in tried if scale < passed), default=None)
     if clear is not None and passed < np.inf:

@@ -22,7 +22,7 @@ from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise
 def jointly(
     inputs: Mapping[str, FuzzyNumber | float], *, independent: bool = False, means: str = ""
 ) -> dict[str, FuzzyNumber | float]:
-    """Return the inputs, claimed ones widened: the box of their α-cuts has P >= 1 − α of all.
+    """Return the inputs with claimed ones widened, so that their α-cuts hold jointly: P >= 1 − α.
 
     Args:
         inputs: Fuzzy numbers by name; plain numbers are crisp.

@@ -73,9 +73,9 @@ def law_cuts(
 
 
 def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
-    """Return lower and upper ends of the cuts at the `LEVELS`: mean + factor · deviation.
+    """Return lower and upper bounds of the cuts at the `LEVELS`: mean + factor · deviation.
 
-    The widest ends over all values within their intervals are taken.
+    The widest cuts over all values within their intervals are taken.
     """
     below, above = _factors(data.count, quantile)
     least, most = _scatter(data)

@@ -64,6 +64,7 @@ class Domain:
     interactions: Sequence[Interaction] = ()
 
     def __post_init__(self) -> None:
+        """Store levels and inputs as checked; refuse interactions of unknown inputs."""
         alpha = rising(self.alpha)
         inputs = fuzzy_inputs(self.inputs)
         for name, number in inputs.items():

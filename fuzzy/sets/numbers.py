@@ -257,7 +257,7 @@ class _Nested(FuzzyNumber):
     to_one: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Store levels and ends as tuples of floats; refuse cuts that are not finite and nested."""
+        """Store levels and cuts as tuples of floats; refuse cuts that are not finite and nested."""
         levels = rising(self.alpha)
         low, high = (tuple(map(float, row)) for row in (self.lower, self.upper))
         complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)

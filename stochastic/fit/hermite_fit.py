@@ -57,10 +57,10 @@ class HermiteFit:
             weights: Other weights of the same values, shape (n,), sum 1 (for the bootstrap).
         """
         cumulated = sample.cumulated if weights is None else np.minimum(np.cumsum(weights), 1.0)
-        share = np.concatenate([[0.0], cumulated])
-        share[-1] = 1.0
-        # ∫ h_i (Q − a1 h1 − a3 h3) f_Θ
-        right = np.diff(self._integrals(share), axis=1) @ sample.values - self._ends
+        probability = np.concatenate([[0.0], cumulated])
+        probability[-1] = 1.0
+        # normal equations: ∫ h_i (Q − a1 h1 − a3 h3) f_Θ dθ, Q constant between probabilities
+        right = np.diff(self._integrals(probability), axis=1) @ sample.values - self._ends
         best = np.asarray(np.linalg.solve(self._gram, right), float)
         a2, a4 = best if self.is_monotone(best) else self._nearest_monotone(best)
         return float(max(a2, 0)), float(max(a4, 0))
@@ -76,9 +76,9 @@ class HermiteFit:
             sample: r_n within [a1, a3].
             slopes: Slopes (a2, a4) of the map.
         """
-        share = (np.arange(20_000) + 0.5) / 20_000
-        fitted = self.map(slopes)(self.distribution.quantile(share))
-        return float(np.sqrt(np.mean((sample.quantile(share) - fitted) ** 2)))
+        probability = (np.arange(20_000) + 0.5) / 20_000
+        fitted = self.map(slopes)(self.distribution.quantile(probability))
+        return float(np.sqrt(np.mean((sample.quantile(probability) - fitted) ** 2)))
 
     @cached_property
     def _powers(self) -> Array:

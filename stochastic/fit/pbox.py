@@ -89,7 +89,7 @@ def least_pbox(
 def _core(
     modal: tuple[float, float], required: SlopeBand | None
 ) -> list[tuple[float, float | None]]:
-    """Return the ranges of the ends (a2L, a2U, a4L, a4U) that contain modal and required slopes."""
+    """Return limits of the supports (a2L, a2U, a4L, a4U) with modal and required slopes inside."""
     bands = ((), ()) if required is None else (required.a2, required.a4)
     a2, a4 = ((slope, *band) for slope, band in zip(modal, bands, strict=True))
     return [(0, min(a2)), (max(a2), None), (0, min(a4)), (max(a4), None)]
@@ -131,11 +131,11 @@ def _steps(sample: AreaWeighted, band: float) -> tuple[Array, Array, Array]:
 def _solve(
     fit: HermiteFit, core: list[tuple[float, float | None]], matrix: Array, right: Array
 ) -> list[float]:
-    """Return the ends (a2L, a2U, a4L, a4U) of least p-box area, by a linear program.
+    """Return the supports (a2L, a2U, a4L, a4U) of the p-box of least area, by a linear program.
 
     Args:
         fit: Ends of the map and law of θ.
-        core: Lower and upper limit of each of the four ends.
+        core: Lower and upper limit of each of the four numbers.
         matrix: Constraints of containment, shape (k, 4).
         right: Their right sides, shape (k,).
 

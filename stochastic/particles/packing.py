@@ -108,8 +108,8 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
     centres: Array = np.zeros((0, len(box)))
     while len(centres) < len(order):
         block = slice(len(centres), min(len(order), max(64, int(1.5 * len(centres)))))
-        standing = _Standing(centres, falling[: len(centres)], box)
-        added = _added(standing, falling[block], generator)
+        placed_so_far = _Placed(centres, falling[: len(centres)], box)
+        added = _added(placed_so_far, falling[block], generator)
         if added is None:
             return None
         centres = np.concatenate([centres, added])
@@ -118,7 +118,7 @@ def random_sequential(radii: Array, box: Array, generator: np.random.Generator) 
     return placed
 
 
-class _Standing:
+class _Placed:
     """Particles that have their places, for tests whether proposed ones overlap them.
 
     Args:
@@ -130,7 +130,7 @@ class _Standing:
     def __init__(self, centres: Array, radii: Array, box: Array) -> None:
         classes = list(size_classes(radii)) if len(radii) else []
         self.box = box
-        self.parts = [
+        self.size_classes = [
             (KDTree(centres[k] % box, boxsize=box), centres[k], radii[k]) for k in classes
         ]
 
@@ -142,36 +142,37 @@ class _Standing:
             radii: Their radii, shape (n,), in m.
         """
         hit = np.zeros(len(proposal), bool)
-        for tree, centres, standing in self.parts:
-            open_ = np.flatnonzero(~hit)
-            counts, placed = balls(tree, proposal[open_], radii[open_] + standing.max())
-            which = np.repeat(open_, counts)
-            offset = nearest_image(proposal[which] - centres[placed], self.box)
-            near = np.linalg.norm(offset, axis=1) < radii[which] + standing[placed]
-            hit[which[near]] = True
+        for tree, centres, placed_radii in self.size_classes:
+            candidates = np.flatnonzero(~hit)
+            reach = radii[candidates] + placed_radii.max()
+            counts, placed = balls(tree, proposal[candidates], reach)
+            proposed = np.repeat(candidates, counts)
+            offset = nearest_image(proposal[proposed] - centres[placed], self.box)
+            distance = np.linalg.norm(offset, axis=1)
+            hit[proposed[distance < radii[proposed] + placed_radii[placed]]] = True
         return hit
 
 
-def _added(standing: _Standing, radii: Array, generator: np.random.Generator) -> Array | None:
+def _added(placed_so_far: _Placed, radii: Array, generator: np.random.Generator) -> Array | None:
     """Return centres (n, d) of further particles that overlap neither placed ones nor each other.
 
     None if a particle found no place in `MAX_PROPOSALS` proposals.
     """
-    box = standing.box
+    box = placed_so_far.box
     new = np.full((len(radii), len(box)), np.nan)
-    fresh = _Standing(new[:0], radii[:0], box)
+    fresh = _Placed(new[:0], radii[:0], box)
     for _ in range(MAX_PROPOSALS):
         pending = np.flatnonzero(np.isnan(new[:, 0]))
         if not len(pending):
             return new
         proposal = box * generator.random((len(pending), len(box)))
-        free = ~standing.hit(proposal, radii[pending])
+        free = ~placed_so_far.hit(proposal, radii[pending])
         free[free] = ~fresh.hit(proposal[free], radii[pending[free]])
         chosen = np.flatnonzero(free)
         chosen = chosen[_first_come(proposal[chosen], radii[pending[chosen]], box)]
         new[pending[chosen]] = proposal[chosen]
         done = ~np.isnan(new[:, 0])
-        fresh = _Standing(new[done], radii[done], box)
+        fresh = _Placed(new[done], radii[done], box)
     return None
 
 

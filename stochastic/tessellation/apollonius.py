@@ -120,7 +120,7 @@ class _Walls:
     arcs: Arcs
 
     def _anomalies(self) -> tuple[Array, Array, Array, Array]:
-        """Return the hyperbolic anomalies at both ends of each arc, d + Δ and d − Δ; all (m,)."""
+        """Return hyperbolic anomalies at start and end of each arc, d + Δ and d − Δ; all (m,)."""
         wall = self.arcs.function
         offset = self.pairs.offset[wall]
         near, far = _near_far(
