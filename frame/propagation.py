@@ -168,7 +168,7 @@ def _problem(
     Raises:
         RefusedError: As `envelope`.
     """
-    is_system = isinstance(model, LagrangianSystem) or hasattr(model, "matrices")
+    is_system = isinstance(model, LagrangianSystem) or hasattr(model, "assembly")
     allowed = "a StoreyFrame, a MatrixStructure or a LagrangianSystem"
     require(is_system, "model", value=type(model).__name__, allowed=allowed)
     chosen_method = _method(model, method, options)
@@ -317,7 +317,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
 
 def _require_modal_order(system: LinearSystem, cuts: Boxes) -> None:
     """Refuse modes of unequal damping ratio that may cross over the boxes."""
-    ratios = getattr(system, "ratios", ())
+    ratios = list(system.ratios)
     if len(ratios) < 2:
         return
     values = [system.parameters[x] if isinstance(x, str) else x for x in ratios]

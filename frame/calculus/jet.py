@@ -59,6 +59,15 @@ class Jet:
             self.second[(slice(None), slice(None), *key)],
         )
 
+    @staticmethod
+    def stack(jets: Sequence[Jet]) -> Jet:
+        """Joins jets along a new last axis of V."""
+        return concatenate([x[..., None] for x in jets], -1)
+
+    def contract(self, arrays: Array) -> Jet:
+        """Sum of jets V = (…, e) times arrays of numbers (e, …)."""
+        return self.map(lambda x: np.asarray(np.tensordot(x, arrays, 1)))
+
     def map(self, linear: Callable[[Array], Array]) -> Jet:
         """Linear map of value and derivatives, given as a function of arrays."""
         return Jet(linear(self.value), linear(self.first), linear(self.second))

@@ -83,6 +83,11 @@ class TaylorModel:
         parts = tuple(part.swapaxes(-1, -2) for part in self.parts)
         return TaylorModel(parts, self.rest.swapaxes(-1, -2), self.inputs, self.order)
 
+    @staticmethod
+    def stack(models: Sequence[TaylorModel]) -> TaylorModel:
+        """Joins Taylor models along a new last axis of V."""
+        return concatenate([x[..., None] for x in models], -1)
+
     def part(self, degree: int) -> Array:
         """Coefficients of one degree, shape (monomials, *V)."""
         if degree < len(self.parts):

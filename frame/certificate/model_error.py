@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Array
+from alphacut.frame.calculus.jet import Array, Jet
 from alphacut.frame.calculus.polynomial import LowerGrid, Polynomial
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate.ratio_damping import LoewnerBounds, RatioDamping
@@ -24,7 +24,8 @@ from alphacut.frame.modal.fitting import fit_states
 from alphacut.frame.modal.ground_response import Direct
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.structures import polynomial_dependence
-from alphacut.frame.structures.linear import LinearSystem, Matrices, evaluate, histories
+from alphacut.frame.structures.assembly import Matrices
+from alphacut.frame.structures.linear import LinearSystem, evaluate, histories
 
 MOST_NUMBERS = 60_000_000
 """Values of the defects on their grid, at most: 0.5 GB."""
@@ -124,10 +125,14 @@ def _expanded(grid: LowerGrid, sample: Sample) -> dict[str, Array]:
 
 def _structure(model: ModalModel, unit: Array) -> dict[str, Array]:
     """The matrices that measure what the motion misses."""
-    system = polynomial_dependence.without_ratio(model.flow.system)  # whose damping is a polynomial
-    points = model.boxes.to_physical(unit)
-    matrices, rows = evaluate(system, model.flow.names, points, derivatives=False)
+    matrices, rows = _evaluate(model, unit)
     return {"mass": matrices.mass.value, "stiffness": matrices.stiffness.value, "rows": rows.value}
+
+
+def _evaluate(model: ModalModel, unit: Array) -> tuple[Matrices, Jet]:
+    """Matrices and rows at unit coordinates, but for damping by ratios, which is no polynomial."""
+    points, flow = model.boxes.to_physical(unit), model.flow
+    return evaluate(flow.system, flow.names, points, derivatives=False, by_ratios=False)
 
 
 def _start(
@@ -164,8 +169,7 @@ def _size_of_start(
 
 def _at_once(model: ModalModel, part: MotionPart, unit: Array) -> dict[str, Array]:
     """What the share of a load misses that acts on outputs at once."""
-    system, points = model.flow.system, model.boxes.to_physical(unit)
-    matrices, _ = evaluate(system, model.flow.names, points, derivatives=False)
+    system, (matrices, _) = model.flow.system, _evaluate(model, unit)
     assert matrices.feeds is not None
     missed = part.share(unit).reshape(len(unit), model.count, -1)
     missed[:, 0] -= matrices.feeds.value[..., part.number - len(histories(system))] / 2
@@ -182,9 +186,7 @@ def _defects(
     """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
     if isinstance(part.load, Direct):
         return _at_once(model, part, unit)
-    system, points = model.flow.system, model.boxes.to_physical(unit)
-    bare = system if ratio is None else polynomial_dependence.without_ratio(system)
-    matrices, rows = evaluate(bare, model.flow.names, points, derivatives=False)
+    system, (matrices, rows) = model.flow.system, _evaluate(model, unit)
     M, D, K, C = matrices.mass.value, matrices.damping.value, matrices.stiffness.value, rows.value
     rate = model.eigenvalue(unit)[..., None]
     column = 0 if part.load is None else 1 + part.number
@@ -197,7 +199,7 @@ def _defects(
         "outputs": part.share(unit).reshape(len(unit), model.count, -1) - z @ C.swapaxes(-1, -2),
     }
     if ratio is not None:
-        more, ratio_defect = ratio.defects(unit, points, speed, M, K)
+        more, ratio_defect = ratio.defects(unit, model.boxes.to_physical(unit), speed, M, K)
         defects |= {**ratio_defect, "dynamic": defects["dynamic"] + more}
         for column, floor in polynomial_dependence.accelerations(system).items():
             defects["outputs"][..., column] += more[..., floor] / M[:, None, floor, floor]

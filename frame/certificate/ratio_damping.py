@@ -103,7 +103,7 @@ class RatioDamping:
     @classmethod
     def from_model(cls, model: ModalModel) -> Self | None:
         """Damping of a model by its ratio; None without one."""
-        ratio = polynomial_dependence.common_ratio(model.flow.system)
+        ratio = next(iter(model.flow.system.ratios), None)
         if ratio is None:
             return None
         value = model.flow.system.parameters[ratio] if isinstance(ratio, str) else ratio

@@ -91,7 +91,7 @@ def modes_at(
     Raises:
         UnprovedError: A mode does not oscillate.
     """
-    matrices, rows = evaluate(system, names, points, derivatives=False)
+    matrices, rows = evaluate(system, names, points, derivatives=False, by_ratios=False)
     M, K = matrices.mass.value, matrices.stiffness.value
     below = np.linalg.inv(np.linalg.cholesky(M))
     squared, U = np.linalg.eigh(below @ K @ below.swapaxes(-1, -2))

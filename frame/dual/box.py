@@ -18,7 +18,7 @@ from alphacut.frame.dual.attained import (
     outputs_at,
 )
 from alphacut.frame.dual.level import Level
-from alphacut.frame.dual.structure import Classical, classical, without_ratios
+from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
 from alphacut.frame.structures.loads import History
@@ -135,11 +135,7 @@ class Box:
         return max(MOST_ENTRIES // len(self.structure.pattern) ** 2, 1)
 
     def _modal(self, unit: Array) -> Modal:
-        return modes_at(self._undamped, self.structure, self.names, self.inputs(unit), unit)
-
-    @cached_property
-    def _undamped(self) -> LinearSystem:
-        return without_ratios(self.system)
+        return modes_at(self.system, self.structure, self.names, self.inputs(unit), unit)
 
     def _motions(self, modal: Modal, point: Rows, node: Rows, output: Rows) -> tuple[Array, Array]:
         sigma = modal.sigma[point]

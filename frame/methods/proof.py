@@ -28,7 +28,7 @@ from alphacut.frame.envelope import Envelope
 from alphacut.frame.modal.fitting import fit_modes
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.parts import prove
-from alphacut.frame.structures.polynomial_dependence import degrees, without_ratio
+from alphacut.frame.structures.polynomial_dependence import degrees
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import real
@@ -118,10 +118,10 @@ class Proof:
             raise UnprovedError(
                 f"proofs are affordable up to {MOST_PARAMETERS} fuzzy inputs, and there are {d}"
             )
-        if len(getattr(flow.system, "ratios", ())) > 1:
+        if len(flow.system.ratios) > 1:
             raise UnprovedError("damping by a ratio of each mode is no polynomial", "take dual")
         ends = zip(boxes.lower[0].tolist(), boxes.upper[0].tolist(), strict=True)
-        degrees(without_ratio(flow.system), dict(zip(boxes.names, ends, strict=True)))
+        degrees(flow.system, dict(zip(boxes.names, ends, strict=True)))
         return float(BOXES_OF_INPUT**d)
 
     def bounds(self, flow: LinearFlow, boxes: Boxes, goal: Goal) -> list[PartBounds]:

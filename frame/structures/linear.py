@@ -1,94 +1,18 @@
-"""Linear structures M(p) q̈ + D(p) q̇ + K(p) q = −M(p) ι a(t) + Σ b_i(p) f_i(t) (section 6.1)."""
+"""Linear structures at parameter sets: matrices, rows of the outputs, loads, frequencies."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse, variables
+from alphacut.frame.structures.assembly import Assembly, Matrices, Number
 from alphacut.frame.structures.loads import Accelerogram, Force, History, different
+from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Parameter
 from alphacut.fuzzy.refused import require
-
-
-@dataclass(frozen=True, eq=False)
-class Matrices:
-    """The structure at S parameter sets, each entry a jet.
-
-    Args:
-        mass: M, shape (S, n, n), in kg.
-        damping: D, shape (S, n, n), in N s/m.
-        stiffness: K, shape (S, n, n), in N/m.
-        q0: Initial displacement, shape (S, n, 1), in m.
-        v0: Initial velocity, shape (S, n, 1), in m/s.
-        rigid: ι, how the unknowns move rigidly with the ground, shape (n, 1).
-        forces: b of each history of forces, shape (S, n, H), in N; None for none.
-        static: Force under which the structure rests at the start besides q0, shape (S, n, 1).
-        impulse: Impulse at t = 0, shape (S, n, 1), in N s; v0 comes before it.
-        accelerated: Accelerations that outputs read besides their rows, which a force on the same
-            unknown adds to at once, shape (m, n).
-    """
-
-    mass: Jet
-    damping: Jet
-    stiffness: Jet
-    q0: Jet
-    v0: Jet
-    rigid: Array
-    forces: Jet | None = None
-    static: Jet | None = None
-    impulse: Jet | None = None
-    accelerated: Array | None = None
-
-    @property
-    def start(self) -> Jet:
-        """Initial state [q; v], shape (S, 2n, 1)."""
-        q0, v0 = self.q0, self.v0
-        if self.static is not None:
-            q0 = q0 + inverse(self.stiffness) @ self.static
-        if self.impulse is not None:
-            v0 = v0 + inverse(self.mass) @ self.impulse
-        return concatenate([q0, v0], -2)
-
-    def pushes(self, *, ground: bool) -> Jet:
-        """Accelerations by a unit of each load, V = (S, n, L): of the ground first, if it moves."""
-        shape = (*self.mass.value.shape[:-1], int(ground))
-        parts = [self.mass.like(-np.broadcast_to(self.rigid[:, : int(ground)], shape))]
-        if self.forces is not None:
-            parts.append(inverse(self.mass) @ self.forces)
-        return concatenate(parts, -1)
-
-    @property
-    def feeds(self) -> Jet | None:
-        """What a unit of each force adds to the outputs at once, V = (S, m, H); None if nothing."""
-        if self.forces is None or self.accelerated is None or not self.accelerated.any():
-            return None
-        fed: Jet = self.accelerated @ self.pushes(ground=False)
-        return fed
-
-
-def with_forces(matrices: Matrices, columns: Jet, forces: Sequence[Force]) -> Matrices:
-    """Matrices of a structure with `forces`, `static` and `impulse` of some forces.
-
-    Args:
-        matrices: Without forces.
-        columns: Each force at the amplitude 1 of its history, V = (S, n, number of forces).
-        forces: The forces.
-    """
-    courses = different(tuple(forces))
-    keys = [None if force.history is None else force.history.identity for force in forces]
-    member = np.array([[key == course.identity for course in courses] for key in keys], float)
-    first = [float(course.is_static) * float(course.values(np.zeros(1))[0]) for course in courses]
-    still, struck = member @ np.array(first), np.array([key is None for key in keys], float)
-    return replace(
-        matrices,
-        forces=columns @ member if courses else None,
-        static=columns @ still[:, None] if still.any() else None,
-        impulse=columns @ struck[:, None] if struck.any() else None,
-    )
 
 
 def require_ground(ground: object) -> None:
@@ -123,11 +47,12 @@ class LinearSystem(Protocol):
     def parameter(self, name: str) -> Parameter:
         """A parameter with the unit and the range that are known of it."""
 
-    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
-        """M, D, K and the initial state at S parameter sets."""
+    @property
+    def ratios(self) -> Collection[str | float]:
+        """Damping ratios, numbers or names of parameters: none, one, or one a mode."""
 
-    def observation(self, p: Mapping[str, Jet]) -> Jet:
-        """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
+    def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
+        """The structure with its parameters as jets or as Taylor models."""
 
 
 def histories(system: LinearSystem) -> dict[str, History]:
@@ -149,6 +74,7 @@ def evaluate(
     *,
     derivatives: bool,
     bent: bool = True,
+    by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
     """Matrices and observation rows at parameter sets; others keep modal values.
 
@@ -158,11 +84,58 @@ def evaluate(
         points: Their values, shape (S, d).
         derivatives: Whether to differentiate by `names`.
         bent: Whether to differentiate twice.
+        by_ratios: Whether the damping holds that by ratios, which takes all modes to compute.
+
+    Returns:
+        The matrices, and C with output = C [q; v], V = (S, m, 2n).
     """
     fixed = {name: x for name, x in system.parameters.items() if name not in names}
     values = np.hstack([points, np.tile(list(fixed.values()), (len(points), 1))])
     p = variables(values, [*names, *fixed], names if derivatives else (), 1 + bent)
-    return system.matrices(p), system.observation(p)
+    return _condensed(system.assembly(p), by_ratios=by_ratios)
+
+
+def _condensed(made: Assembly[Jet], *, by_ratios: bool) -> tuple[Matrices, Jet]:
+    """Matrices and rows on the unknowns a that have mass; others are q_b = −K_bb⁻¹ K_ba q_a."""
+    n, a = len(made.pattern), made.massive
+    mass, stiffness, damping = made.mass, made.stiffness, _viscous_damping(made)
+    rows: Jet | Array = made.rows
+    if len(a) < n:
+        b, inner = np.setdiff1d(np.arange(n), a), (slice(None), a[:, None], a)
+        light = stiffness[:, b[:, None], b]
+        follow = -(inverse(light) @ stiffness[:, b[:, None], a])
+        mass, damping = mass[inner], damping[inner]
+        stiffness = stiffness[inner] + stiffness[:, a[:, None], b] @ follow
+        of_state = (made.rows[:, a + k] + made.rows[:, b + k] @ follow for k in (0, n))
+        rows = concatenate(list(of_state), -1)
+    if made.ratios and by_ratios:
+        damping = damping + modal_damping(mass, stiffness, made.ratios)
+    forces, static, impulse = (x and x[:, a] for x in (made.forces, made.static, made.impulse))
+    matrices = Matrices(
+        mass=mass,
+        damping=damping,
+        stiffness=stiffness,
+        q0=made.q0[:, a, None],
+        v0=made.v0[:, a, None],
+        rigid=made.pattern[a, None],
+        accelerated=made.accelerated[:, a],
+        forces=forces,
+        static=static,
+        impulse=impulse,
+    )
+    if made.accelerated.any():  # q̈ + ι a = −M⁻¹ (K q + D v) + M⁻¹ b f
+        reading = matrices.accelerated @ matrices.inverse_mass
+        rows = rows - reading @ concatenate([stiffness, damping], -1)
+    return matrices, made.row_factors[..., None] * rows
+
+
+def _viscous_damping(made: Assembly[Jet]) -> Jet:
+    """Damping by dashpots and Rayleigh's factors, V = (S, n, n), in N s/m."""
+    damping = made.dashpots
+    for factor, matrix in zip(made.rayleigh, (made.mass, made.springs), strict=True):
+        if factor.value.any() or factor.first.any():
+            damping = damping + factor[:, None, None] * matrix
+    return damping
 
 
 def round_off(largest: float, slowest: float, time: Array) -> Array:

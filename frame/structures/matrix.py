@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, concatenate, inverse, variables
-from alphacut.frame.structures.linear import Matrices, require_ground, with_forces
+from alphacut.frame.calculus.jet import Jet, variables
+from alphacut.frame.structures.assembly import Assembly, Number, stack
+from alphacut.frame.structures.linear import require_ground
 from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
-from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.refused import chosen, real, require, require_numbers
@@ -217,68 +217,59 @@ class MatrixStructure:
                     fits, name, value=f"of shape {np.shape(value)}", allowed=f"{lengths} numbers"
                 )
 
-    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
-        """M, D, K and the initial state at S parameter sets."""
-        like = next(iter(p.values()))
-        n, samples = self.size, like.value.size
-        start = [np.zeros(n) if x is None else np.asarray(x, float) for x in (self.q0, self.v0)]
-        q0, v0 = (like.like(np.tile(x[None, :, None], (samples, 1, 1))) for x in start)
-        rigid = np.ones(n) if self.pattern is None else np.asarray(self.pattern, float)
-        mass, damping, stiffness = (self._total(getattr(self, kind), p) for kind in KINDS)
-        if len(self.massless):
-            a, b = self.massive, self.massless
-            mass, damping = (x[:, a[:, None], a] for x in (mass, damping))
-            follow = _follow(stiffness, a, b)
-            stiffness = stiffness[:, a[:, None], a] + stiffness[:, a[:, None], b] @ follow
-            q0, v0, rigid = q0[:, a], v0[:, a], rigid[a]
-        if self.ratios:
-            damping = damping + modal_damping(mass, stiffness, [lifted(x, p) for x in self.ratios])
-        at_rest = Matrices(mass, damping, stiffness, q0, v0, rigid[:, None])
-        if not self.loads:
-            return at_rest
-        amplitudes = [lifted(force.amplitude, p)[:, None] for force in self.loads]
-        placed = np.transpose([np.asarray(force.at)[self.massive] for force in self.loads])
-        columns = concatenate(amplitudes, -1)[:, None, :] * placed
-        return with_forces(at_rest, columns, self.loads)
+    def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
+        """The structure with its parameters as jets or as Taylor models."""
+        n = self.size
+        nothing: Number = lifted(0.0, p)
+        shape = (*nothing.value.shape, n)
+        q0, v0 = (np.zeros(n) if x is None else x for x in (self.q0, self.v0))
+        mass, damping, stiffness = (
+            values_of([factor for factor, _ in getattr(self, kind)], p).contract(arrays)
+            for kind, arrays in self._arrays.items()
+        )
+        forces = values_of([force.amplitude for force in self.loads], p)
+        placed = np.array([force.at for force in self.loads], float).reshape(-1, n)
+        return Assembly(
+            mass=mass,
+            springs=stiffness,
+            weights=None,
+            dashpots=damping,
+            rayleigh=(nothing, nothing),
+            ratios=[lifted(ratio, p) for ratio in self.ratios],
+            q0=nothing.like(np.broadcast_to(q0, shape)),
+            v0=nothing.like(np.broadcast_to(v0, shape)),
+            row_factors=values_of([self.row_factors.get(x, 1.0) for x in self.observed], p),
+            rows=np.array([np.pad(x, (0, 2 * n - len(x))) for x in self.observed.values()], float),
+            accelerated=np.zeros((len(self.observed), n)),
+            pattern=np.ones(n) if self.pattern is None else np.asarray(self.pattern, float),
+            massive=self.massive,
+            loads=self.loads,
+            columns=forces[..., None, :] * placed.T if self.loads else None,
+        )
 
-    def observation(self, p: Mapping[str, Jet]) -> Jet:
-        """Rows C(p) with output = C(p) [q; v], shape (S, m, 2n)."""
-        like = next(iter(p.values()))
-        rows = np.zeros((len(self.observed), 2 * self.size))
-        for k, row in enumerate(self.observed.values()):
-            rows[k, : len(row)] = row
-        observed = like.like(np.tile(rows, (like.value.size, 1, 1)))
-        if len(self.massless):
-            a, b, n = self.massive, self.massless, self.size
-            follow = _follow(self._total(self.stiffness, p), a, b)
-            parts = (observed[:, :, a + k] + observed[:, :, b + k] @ follow for k in (0, n))
-            observed = concatenate(list(parts), -1)
-        if not self.row_factors:
-            return observed
-        factors = concatenate([lifted(self._row_factor(x), p)[:, None] for x in self.observed], -1)
-        return factors[:, :, None] * observed
-
-    def _total(self, terms: Terms, p: Mapping[str, Jet]) -> Jet:
-        """Sum of arrays times factors, V = (S, n, n)."""
-        like = next(iter(p.values()))
-        out = like.like(np.zeros((like.value.size, self.size, self.size)))
-        for factor, array in terms:
-            out = out + lifted(factor, p)[:, None, None] * array
-        return out
-
-    def _row_factor(self, output: str) -> Factor | str | float:
-        return self.row_factors.get(output, 1.0)
+    @cached_property
+    def _arrays(self) -> dict[str, Array]:
+        """Arrays of the terms by kind, shape (terms, n, n) each."""
+        shape = (-1, self.size, self.size)
+        terms = {kind: [array for _, array in getattr(self, kind)] for kind in KINDS}
+        return {kind: np.array(arrays, float).reshape(shape) for kind, arrays in terms.items()}
 
 
-def _follow(stiffness: Jet, a: Rows, b: Rows) -> Jet:
-    """−K_bb⁻¹ K_ba, V = (S, b, a)."""
-    return -(inverse(stiffness[:, b[:, None], b]) @ stiffness[:, b[:, None], a])
+def values_of(factors: Sequence[Factor | str | float], p: Mapping[str, Number]) -> Number:
+    """Values of e factors at parameters V = (…), V = (…, e)."""
+    if not factors:
+        nothing: Number = lifted(0.0, p)
+        return nothing.like(np.zeros((*nothing.value.shape, 0)))
+    return stack([lifted(factor, p) for factor in factors])
 
 
-def lifted(factor: Factor | str | float, p: Mapping[str, Jet]) -> Jet:
-    """A factor's value at S parameter sets as a jet, shape (S,)."""
-    value, like = value_of(factor, p), next(iter(p.values()))
-    return value if isinstance(value, Jet) else like.like(np.full(like.value.size, float(value)))
+def lifted(factor: Factor | str | float, p: Mapping[str, Number]) -> Number:
+    """A factor's value at parameters as a number of their type, V = (…)."""
+    value = value_of(factor, p)
+    like: Number = next(iter(p.values()))
+    if isinstance(value, type(like)):
+        return value
+    return like.like(np.full(like.value.shape, float(value)))
 
 
 def value_of(factor: Factor | str | float, p: Mapping[str, Any]) -> Any:

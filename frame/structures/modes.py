@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate, inverse
-from alphacut.frame.structures.linear import Matrices
+from alphacut.frame.structures.assembly import Matrices
 from alphacut.fuzzy.refused import FailedError, require
 
 
 def state_matrix(m: Matrices) -> Jet:
     """A with [q; v]˙ = A [q; v], shape (S, 2n, 2n) (eq. 17, eq. 23)."""
-    light = inverse(m.mass)
+    light = m.inverse_mass
     lower = concatenate([-(light @ m.stiffness), -(light @ m.damping)], -1)
     n = m.mass.value.shape[-1]
     upper = lower.like(np.broadcast_to(np.hstack([np.zeros((n, n)), np.eye(n)]), lower.value.shape))

@@ -6,7 +6,6 @@ They follow from how a structure is written, not from samples of it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import ceil, log, sqrt
 
 import numpy as np
@@ -83,19 +82,6 @@ def accelerations(system: LinearSystem) -> dict[int, int]:
     """Outputs that are accelerations of a storey frame's floors, with the floors, from 0."""
     named = enumerate(system.outputs) if isinstance(system, StoreyFrame) else ()
     return {row: int(name[1:]) - 1 for row, name in named if name[0] == "a"}
-
-
-def common_ratio(system: LinearSystem) -> str | float | None:
-    """Damping ratio of all modes, a number or the name of a parameter; None where there is none."""
-    return next(iter(getattr(system, "ratios", ())), None)
-
-
-def without_ratio(system: LinearSystem) -> LinearSystem:
-    """The structure without its damping ratio, whose damping is a polynomial."""
-    if isinstance(system, StoreyFrame):
-        return replace(system, damping_ratio=None)
-    assert isinstance(system, MatrixStructure)
-    return replace(system, ratios=())
 
 
 def _require_dissipation(factor: float, array: Array) -> None:

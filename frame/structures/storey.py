@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from alphacut.frame.calculus.jet import Jet, concatenate
-from alphacut.frame.structures.linear import Matrices, require_ground, with_forces
+from alphacut.frame.calculus.jet import Jet
+from alphacut.frame.structures.assembly import Assembly, Number, stack
+from alphacut.frame.structures.linear import require_ground
 from alphacut.frame.structures.loads import Accelerogram, Force, require_forces
-from alphacut.frame.structures.modes import modal_damping
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import chosen, real, require, require_numbers
@@ -240,61 +240,53 @@ class StoreyFrame:
         )
         return (name,)
 
-    def springs(self, p: Mapping[str, Jet]) -> Jet:
-        """k_z of every storey, V = (S, n), in N/m: as given, or 12 c E I / l³ of its columns."""
+    def springs(self, p: Mapping[str, Number]) -> Number:
+        """k_z of every storey, V = (…, n), in N/m: as given, or 12 c E I / l³ of its columns."""
         if self.stiffness:
             return self._of_floors("k{}", p)
-        inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][:, None]
-        rigidity = 12 * p["E"][:, None] * inertia  # 24 E I / l³ of two columns in section 6.1
+        inertia = self._of_floors("I{}", p) if len(self.moments) > 1 else p["I"][..., None]
+        rigidity = 12.0 * p["E"][..., None] * inertia  # 24 E I / l³ of two columns in section 6.1
         return rigidity * self._of_floors("c{}", p) * self._of_floors("l{}", p) ** -3
 
-    def softening(self, p: Mapping[str, Jet]) -> Jet:
-        """P_z / l_z of storeys, V = (S, n), in N/m, P_z the weight of all floors above."""
-        weights = self._of_floors("m{}", p) * self.gravity
-        above = weights.map(lambda x: np.cumsum(x[..., ::-1], -1)[..., ::-1])
+    def softening(self, p: Mapping[str, Number]) -> Number:
+        """P_z / l_z of storeys, V = (…, n), in N/m, P_z the weight of all floors above."""
+        above = self._of_floors("m{}", p).contract(self.gravity * np.tri(self.floors))
         return above * self._of_floors("l{}", p) ** -1
 
-    def matrices(self, p: Mapping[str, Jet]) -> Matrices:
-        """M, D, K and the initial state, at S parameter sets (eq. 23)."""
-        mass, links = self._of_floors("m{}", p).map(diagonal), self.springs(p)
-        elastic = links.map(chain_matrix)
-        placed = chain_matrix if self.damper_placement == "storey" else diagonal
-        damping = self._of_floors("d{}", p).map(placed)
-        for name, part in (("rayleigh_mass", mass), ("rayleigh_stiffness", elastic)):
-            if p[name].value.any() or p[name].first.any():
-                damping = damping + p[name][:, None, None] * part
-        stiffness = elastic
-        if self.gravity:
-            stiffness = elastic - self.softening(p).map(chain_matrix)
-        if self.ratios:
-            ratios = [p[name] for name in self.ratios]
-            damping = damping + modal_damping(mass, stiffness, ratios)
-        q0, v0 = (self._of_floors(f"{x}{{}}_0", p)[..., None] for x in "qv")
-        at_rest = Matrices(mass, damping, stiffness, q0, v0, np.ones((self.floors, 1)))
-        if not self.loads:
-            return at_rest
-        amplitudes = concatenate([p[name][:, None] for name in self.force_names], -1)
-        floors = [int(force.at) - 1 for force in self.loads]
-        forces = amplitudes[:, None, :] * np.eye(self.floors)[:, floors]
-        kinds = [self.quantity(name) for name in self.outputs]
-        read = np.array([np.eye(self.floors)[z] * (kind == "a") for kind, z in kinds])
-        return replace(with_forces(at_rest, forces, self.loads), accelerated=read)
+    def assembly(self, p: Mapping[str, Number]) -> Assembly[Number]:
+        """The structure with its parameters as jets or as Taylor models (eq. 23)."""
+        n, links, names = self.floors, self.springs(p), self.force_names
+        floors, storeys = diagonal(np.eye(n)), chain_matrix(np.eye(n))
+        dashpots, one = self._of_floors("d{}", p), p["rayleigh_mass"] * 0.0 + 1.0
+        shears = [z if kind == "shear" else None for kind, z in map(self.quantity, self.outputs)]
+        forces = np.array([np.eye(n)[int(force.at) - 1] for force in self.loads])
+        return Assembly(
+            mass=self._of_floors("m{}", p).contract(floors),
+            springs=links.contract(storeys),
+            weights=self.softening(p).contract(storeys) if self.gravity else None,
+            dashpots=dashpots.contract(storeys if self.damper_placement == "storey" else floors),
+            rayleigh=(p["rayleigh_mass"], p["rayleigh_stiffness"]),
+            ratios=[p[name] for name in self.ratios],
+            q0=self._of_floors("q{}_0", p),
+            v0=self._of_floors("v{}_0", p),
+            row_factors=stack([one if z is None else links[..., z] for z in shears]),
+            rows=self._rows[:, : 2 * n],
+            accelerated=self._rows[:, 2 * n :],
+            pattern=np.ones(n),
+            massive=np.arange(n),
+            loads=self.loads,
+            columns=stack([p[x] for x in names])[..., None, :] * forces.T if names else None,
+        )
 
-    def observation(self, p: Mapping[str, Jet]) -> Jet:
-        """Rows C(p) with output = C(p) [q; v], shape (S, outputs, 2n)."""
-        kinds, links, n = [self.quantity(x) for x in self.outputs], self.springs(p), self.floors
-        ones_like, rows = links.like(np.ones_like(links.value)), []
-        forces = ones_like
-        if "a" in dict(kinds):  # absolute accelerations: forces over masses
-            at, inertia = self.matrices(p), -1.0 * self._of_floors("m{}", p) ** -1
-            forces = inertia[..., None] * concatenate([at.stiffness, at.damping], -1)
-        for kind, z in kinds:
-            row = np.eye(2 * n)[z + n * (kind == "v")]
+    @property
+    def _rows(self) -> Array:
+        """What outputs take of displacements, velocities and accelerations, shape (m, 3n)."""
+        rows = np.zeros((len(self.outputs), 3 * self.floors))
+        for row, (kind, z) in zip(rows, map(self.quantity, self.outputs), strict=True):
+            row[z + self.floors * {"v": 1, "a": 2}.get(kind, 0)] = 1.0
             if kind in ("drift", "shear") and z:
                 row[z - 1] = -1.0
-            size = links if kind == "shear" else ones_like
-            rows.append(forces[:, z : z + 1] if kind == "a" else size[:, z, None, None] * row)
-        return concatenate(rows, -2)
+        return rows
 
     def quantity(self, name: str) -> tuple[str, int]:
         """Kind and floor, from 0, of an output.
@@ -338,10 +330,9 @@ class StoreyFrame:
             key = f"stiffness of storey {z} under P-Delta"
             require(k > soft, key, value=f"{k:.5g} N/m", allowed=allowed, cure=cure)
 
-    def _of_floors(self, pattern: str, p: Mapping[str, Jet]) -> Jet:
-        """Parameters of all floors, V = (S, n)."""
-        columns = [p[pattern.format(z + 1)][:, None] for z in range(self.floors)]
-        return concatenate(columns, -1)
+    def _of_floors(self, pattern: str, p: Mapping[str, Number]) -> Number:
+        """Parameters of all floors, V = (…, n)."""
+        return stack([p[pattern.format(z + 1)] for z in range(self.floors)])
 
 
 def chain_matrix(links: Array) -> Array:

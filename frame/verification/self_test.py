@@ -81,9 +81,6 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
     matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
     ground, n = system.ground, matrices.mass.value.shape[-1]
     record, step = (np.zeros(0), 0.0) if ground is None else (ground.samples, ground.step)
-    read = (
-        np.zeros((rows.value.shape[1], n)) if matrices.accelerated is None else matrices.accelerated
-    )
     courses = tuple(_course(history) for history in courses_of_forces(system))
     motions = []
     for s in range(len(points)):
@@ -107,7 +104,7 @@ def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> li
                 record=record,
                 record_step=step,
                 forces=forces,
-                feeds=read @ np.linalg.solve(M, forces),
+                feeds=matrices.accelerated @ np.linalg.solve(M, forces),
                 courses=courses,
             )
         )

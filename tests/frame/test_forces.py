@@ -261,9 +261,10 @@ def test_a_chain_from_matrices_moves_as_the_frame_does():
     settings = {"method": DualProof(), "duration": 1.5, "step": 0.02, "alpha": [0, 1]}
     one = envelope(plain, {"F3": Interval(4.7e3, 5.3e3)}, **settings)
     other = envelope(same, {"F": Interval(4.7e3, 5.3e3)}, **settings)
-    np.testing.assert_allclose(
-        one.upper, other.upper, rtol=1e-6, atol=1e-6 * np.abs(one.upper).max()
-    )
+    peak = np.abs(one.upper).max()
+    np.testing.assert_allclose(one.inner.upper, other.inner.upper, atol=1e-9 * peak)
+    # where the proof stops, short of convergence, depends on rounding
+    np.testing.assert_allclose(one.upper, other.upper, atol=1e-4 * peak)
 
 
 def test_stored_motions_come_back():
