@@ -114,11 +114,11 @@ class LevelNumbering:
         self.planar, self.between = 2 * self.periodicity.count, 2 * self.periodicity.vertices
         self.stride = self.planar + self.between
         self.size = grid.layers * self.stride + self.planar
-        parts = np.array_split(np.arange(grid.layers + 1), comm.size)
-        first = sum(len(part) for part in parts[: comm.rank])
-        self.levels = range(first, first + len(parts[comm.rank]))
-        self.middles = range(first, min(self.levels.stop, grid.layers))
-        ends = (min(k * self.stride, self.size) for k in (first, self.levels.stop))
+        # the last ranks have a level more, and with it nothing half-way above their last one: so
+        # levels go with the prisms that are divided evenly, and few entries are of other ranks
+        first, last = ((grid.layers + 1) * k // comm.size for k in (comm.rank, comm.rank + 1))
+        self.levels, self.middles = range(first, last), range(first, min(last, grid.layers))
+        ends = (min(k * self.stride, self.size) for k in (first, last))
         self.rows = range(*ends)
         self.layers = range(max(0, first - 1), self.middles.stop) if self.levels else range(0)
 

@@ -127,7 +127,7 @@ class ThetaPreconditioner:
         self.own = matrix.createVecLeft()
         self.scatter, self.whole = PETSc.Scatter.toAll(self.own)
         n, v, layers = numbering.planar, numbering.between, numbering.grid.layers
-        parts = matrix.createSubMatrices(self._spans())
+        parts = self._blocks(matrix)
         self.levels = [
             PlaneSolver(part.PtAP(_hat(n, v, below=k > 0, above=k < layers)), self.mass.hats[k])
             for k, part in zip(numbering.levels, parts, strict=False)
@@ -137,8 +137,8 @@ class ThetaPreconditioner:
             for k, part in zip(numbering.middles, parts[len(self.levels) :], strict=True)
         ]
 
-    def _spans(self) -> list[PETSc.IS]:
-        """Unknowns of this rank's levels with those half-way beside them, and of those alone."""
+    def _blocks(self, matrix: PETSc.Mat) -> list[PETSc.Mat]:
+        """Blocks of this rank's levels with what is half-way beside them, and of that alone."""
         numbering = self.numbering
         n, v, stride = numbering.planar, numbering.between, numbering.stride
         spans = [
@@ -146,7 +146,12 @@ class ThetaPreconditioner:
             for k in numbering.levels
         ]
         spans += [(k * stride + n, (k + 1) * stride) for k in numbering.middles]
-        return [PETSc.IS().createStride(b - a, a, 1, comm=PETSc.COMM_SELF) for a, b in spans]
+        first, last = min(a for a, _ in spans or [(0, 0)]), max(b for _, b in spans or [(0, 0)])
+        if matrix.comm.size > 1:  # all rows at once: ranks send each other one message, not dozens
+            (matrix,) = matrix.createSubMatrices([_stride(first, last)])
+        else:
+            first = 0
+        return list(matrix.createSubMatrices([_stride(a - first, b - first) for a, b in spans]))
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc."""
@@ -186,7 +191,7 @@ class ThetaPreconditioner:
         count = f"{len(self.levels)} levels and {len(self.middles)} half-way on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
         of_rank = viewer.getSubViewer(PETSc.COMM_SELF)
-        if self.numbering.levels.start == 0:  # the first rank's, which are like all others
+        if 0 in self.numbering.levels:  # like all others
             self.levels[0].view(of_rank)
         viewer.restoreSubViewer(of_rank)
 
@@ -199,6 +204,11 @@ class ThetaPreconditioner:
         """Solutions of this rank's blocks, one for each row."""
         solutions = [solver(rows[k]) for k, solver in enumerate(solvers)]
         return np.array(solutions).reshape(rows.shape)
+
+
+def _stride(first: int, last: int) -> PETSc.IS:
+    """Indices of this rank from `first` to below `last`."""
+    return PETSc.IS().createStride(last - first, first, 1, comm=PETSc.COMM_SELF)
 
 
 def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:
