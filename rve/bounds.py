@@ -14,25 +14,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import AnyPhase
 
 
-def voigt(fraction: Array, matrix: Array, inclusion: Array) -> Array:
-    """Stiffness at uniform strain, shape (…, k, k), for fractions of the inclusion of shape (…).
-
-    Args:
-        fraction: Of area or volume.
-        matrix: Stiffness of the matrix, shape (k, k).
-        inclusion: That of the inclusion, in the same unit.
-    """
-    share = np.asarray(fraction)[..., None, None]
-    return np.asarray((1 - share) * matrix + share * inclusion)
-
-
-def reuss(fraction: Array, matrix: Array, inclusion: Array) -> Array:
-    """Stiffness at uniform stress, as `voigt`."""
-    soft = (np.asarray(np.linalg.inv(stiffness), float) for stiffness in (matrix, inclusion))
-    return np.asarray(np.linalg.inv(voigt(fraction, *soft)), float)
-
-
-def voigt_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
+def voigt(fractions: Array, stiffness: Sequence[Array]) -> Array:
     """Stiffness at uniform strain of any number of phases, shape (…, k, k).
 
     Args:
@@ -42,13 +24,13 @@ def voigt_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
     return np.asarray(np.tensordot(fractions, np.stack(stiffness), axes=([0], [0])))
 
 
-def reuss_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Stiffness at uniform stress, as `voigt_of_phases`."""
+def reuss(fractions: Array, stiffness: Sequence[Array]) -> Array:
+    """Stiffness at uniform stress, as `voigt`."""
     compliance = [np.asarray(np.linalg.inv(phase), float) for phase in stiffness]
-    return np.asarray(np.linalg.inv(voigt_of_phases(fractions, compliance)), float)
+    return np.asarray(np.linalg.inv(voigt(fractions, compliance)), float)
 
 
-def hashin_shtrikman_of_phases(fractions: Array, stiffness: Sequence[Array]) -> Array:
+def hashin_shtrikman(fractions: Array, stiffness: Sequence[Array]) -> Array:
     """Bounds of K and G of phases that are isotropic across their fibres, in plane strain, in Pa.
 
     Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); of any number of
@@ -77,19 +59,6 @@ def hashin_shtrikman_of_phases(fractions: Array, stiffness: Sequence[Array]) -> 
 def bulk_modulus(stiffness: Array) -> Array:
     """In-plane bulk modulus of stiffnesses of shape (…, 3, 3), in Pa."""
     return np.asarray((stiffness[..., 0, 0] + stiffness[..., 1, 1] + 2 * stiffness[..., 0, 1]) / 4)
-
-
-def harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> Array:
-    """Harmonic mean of matrix's and particle's moduli, each with `around` added, less that."""
-    first, second = moduli
-    return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
-
-
-def hashin_shtrikman(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
-    """Bounds of K and G of two phases, as `hashin_shtrikman_of_phases`, for fractions (…)."""
-    share = np.asarray(fraction, float)
-    phases = (matrix.stiffness, inclusion.stiffness)
-    return hashin_shtrikman_of_phases(np.array([1 - share, share]), phases)
 
 
 def mori_tanaka(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
-from alphacut.rve.bounds import hashin_shtrikman_of_phases, reuss_of_phases, voigt_of_phases
+from alphacut.rve.bounds import hashin_shtrikman, reuss, voigt
 from alphacut.rve.cell import AnyPhase, Phase
 from alphacut.rve.result import HomogenisedStiffness
 
@@ -82,22 +82,18 @@ def stress_checks(
         stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in
             Pa.
         loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3), ε11 = ε22 in their span.
-        fractions: Area fractions of the phases at the nodes, shape (phases, n), or of the second of
-            two, shape (n,).
+        fractions: Area fractions of the phases at the nodes, shape (phases, n).
         weights: Weights of the nodes, shape (n,).
         phases: Materials, in the order of their fractions.
     """
-    if fractions.ndim == 1:
-        fractions = np.stack([1 - fractions, fractions])
     stiffness = [phase.stiffness for phase in phases]
     energy = loads @ mean(weights, stress)
     low, high = (
-        loads @ mean(weights, bound(fractions, stiffness)) @ loads.T
-        for bound in (reuss_of_phases, voigt_of_phases)
+        loads @ mean(weights, bound(fractions, stiffness)) @ loads.T for bound in (reuss, voigt)
     )
     checks = order_checks(energy, low, high)
     if all(isinstance(phase, Phase) for phase in phases):
-        least, greatest = hashin_shtrikman_of_phases(fractions, stiffness)[0] @ weights
+        least, greatest = hashin_shtrikman(fractions, stiffness)[0] @ weights
         even = np.linalg.lstsq(loads.T, np.array([1.0, 1.0, 0.0]), rcond=None)[0]
         bulk = even @ energy @ even / 4
         checks["hashin_shtrikman"] = float(max(0.0, least - bulk, bulk - greatest) / bulk)

@@ -207,7 +207,7 @@ def isotropic_bounds(fractions: Array, stiffness: Sequence[Array]) -> list[float
         fractions: Area fractions of the phases, shape (phases,).
         stiffness: Plane stiffness of each phase in Pa, shape (3, 3) each.
     """
-    moduli = bounds.hashin_shtrikman_of_phases(fractions, stiffness).T
+    moduli = bounds.hashin_shtrikman(fractions, stiffness).T
     return [_transverse_young(*bulk_and_shear) / GPA for bulk_and_shear in moduli]
 
 

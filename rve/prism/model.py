@@ -160,7 +160,9 @@ class PrismModel:
                 strains, residual = basis.project(inclusion.modulus), basis.error
                 iterations = basis.iterations
             else:
-                strains, solved = self._solve_cell(problem, cell, seconds)
+                strains, solved = self._solve_system(
+                    problem, cell.stiffness, self.loads(cell), seconds
+                )
                 iterations, residual = solved.iterations, solved.residual
             result = replace(
                 self._result(strains, cell, residual),
@@ -273,12 +275,6 @@ class PrismModel:
         cell = Cell(matrix, inclusions[0], problem.map, self.outline)
         basis = modulus_basis(problem, matrix, ratios.pop(), self.moduli, self.loads(cell))
         return basis if basis.error <= TOLERANCE else None
-
-    def _solve_cell(
-        self, problem: PrismProblem, cell: Cell, seconds: Seconds
-    ) -> tuple[SliceStrains, Solutions]:
-        """Slice means of the strains of a cell, and the fluctuations that they belong to."""
-        return self._solve_system(problem, cell.stiffness, self.loads(cell), seconds)
 
     def _solve_system(
         self,

@@ -46,9 +46,7 @@ def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhase
     Raises:
         RefusedError: One does not fit.
     """
-    named = require_phases(grid.names, phases)
-    order = tuple(grid.names.index(name) for name in named)
-    return NamedPhases(require_law(grid, law), tuple(named[name] for name in grid.names), order)
+    return _in_order(require_law(grid, law), grid.names, phases)
 
 
 def require_level_set(z: LevelFunction, law: object, phases: object) -> NamedPhases:
@@ -57,13 +55,16 @@ def require_level_set(z: LevelFunction, law: object, phases: object) -> NamedPha
     Raises:
         RefusedError: One does not fit.
     """
-    names = NAMES[:2]
     if not hasattr(law, "pdf"):
         raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
+    return _in_order(LevelSet(cast("ThetaLaw", law), z), NAMES[:2], phases)
+
+
+def _in_order(law: FixedCell, names: Sequence[str], phases: object) -> NamedPhases:
+    """Materials in the order of the mesh, whose phases have these names."""
     named = require_phases(names, phases)
     order = tuple(names.index(name) for name in named)
-    of_mesh = tuple(named[name] for name in names)
-    return NamedPhases(LevelSet(cast("ThetaLaw", law), z), of_mesh, order)
+    return NamedPhases(law, tuple(named[name] for name in names), order)
 
 
 def require_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhase]:
@@ -94,16 +95,13 @@ def require_law(grid: PrismGrid, law: object) -> FixedCell:
     """
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
-    ends, law_ends = np.array([theta.min(), theta.max()]), (getattr(law, x, np.nan) for x in _ENDS)
-    support = np.array(list(law_ends))
+    ends = np.array([theta.min(), theta.max()])
+    support = np.array([getattr(law, end, np.nan) for end in ("lower", "upper")])
     if not abs(support - ends).max() <= SAME_LEVEL * np.ptp(ends) or not hasattr(law, "pdf"):
         value = f"on {support[0]:g} … {support[1]:g}"
         allowed = f"laws on {ends[0]:g} … {ends[1]:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)
     return FixedCell(cast("ThetaLaw", law))
-
-
-_ENDS = "lower", "upper"
 
 
 def own_mesh_problem(path: Path | str, parallel: bool) -> PrismProblem:

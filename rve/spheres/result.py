@@ -67,7 +67,8 @@ def certified_spheres(result: HomogenisedSpheres) -> HomogenisedSpheres:
     fraction = volume_fraction(cell.radius(result.curve.theta))
     pair = space_stiffness(matrix), space_stiffness(inclusion)
     weights, bulk = result.curve.weights, result.moduli[0]
-    low, high = (mean(weights, bound(fraction, *pair)) for bound in (reuss, voigt))
+    fractions = np.stack([1 - fraction, fraction])
+    low, high = (mean(weights, bound(fractions, pair)) for bound in (reuss, voigt))
     least, greatest = hashin_shtrikman(fraction, matrix, inclusion)[0] @ weights
     checks = {
         **order_checks(np.asarray(result.stiffness), low, high),

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.rve.bounds import harmonic_about
 from alphacut.rve.cell import Phase
 from alphacut.rve.spheres.cubic import cubic_voigt
 
@@ -27,7 +26,7 @@ def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     bulks, shears = np.transpose([matrix.bulk_and_shear, inclusion.bulk_and_shear]).tolist()
     ends = [
         [
-            harmonic_about(share, pair, x)
+            _harmonic_about(share, pair, x)
             for pair, x in zip((bulks, shears), _around(end(bulks), end(shears)), strict=True)
         ]
         for end in (min, max)
@@ -42,7 +41,15 @@ def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """
     share, around = np.asarray(fraction, float), _around(*matrix.bulk_and_shear)
     pairs = zip(matrix.bulk_and_shear, inclusion.bulk_and_shear, strict=True)
-    return np.array([harmonic_about(share, pair, x) for pair, x in zip(pairs, around, strict=True)])
+    return np.array(
+        [_harmonic_about(share, pair, x) for pair, x in zip(pairs, around, strict=True)]
+    )
+
+
+def _harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> Array:
+    """Harmonic mean of matrix's and particle's moduli, each with `around` added, less that."""
+    first, second = moduli
+    return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
 
 
 def _around(bulk: float, shear: float) -> tuple[float, float]:

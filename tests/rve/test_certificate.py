@@ -10,13 +10,19 @@ from alphacut.stochastic import HermiteMap
 
 SOFT, HARD = Phase(20e9), Phase(80e9, 0.2)
 PAIR = SOFT.stiffness, HARD.stiffness
+SHARES = np.array([0.6, 0.4])
 PAPER = HermiteMap(0.1337, 0.1, 0.8663, 0.1692)
+
+
+def shares(fraction):
+    """Area fractions of both phases from that of the second."""
+    return np.stack([1 - fraction, fraction])
 
 
 def layered(fraction):
     """Stiffness of a laminate in direction 1 by the exact mixture rules of its continuous fields."""
     a, b = SOFT.stiffness, HARD.stiffness
-    share = np.array([1 - fraction, fraction])
+    share = shares(fraction)
     c = np.stack([a, b])
     c11 = 1 / (share / c[:, 0, 0]).sum()
     ratio = share @ (c[:, 0, 1] / c[:, 0, 0])
@@ -28,7 +34,11 @@ def layered(fraction):
 
 @pytest.mark.parametrize("fraction", [0.0, 0.2, 0.7, 1.0])
 def test_bounds_enclose_a_laminate_and_close_at_the_ends(fraction):
-    low, high, between = reuss(fraction, *PAIR), voigt(fraction, *PAIR), layered(fraction)
+    low, high, between = (
+        reuss(shares(fraction), PAIR),
+        voigt(shares(fraction), PAIR),
+        layered(fraction),
+    )
     assert np.linalg.eigvalsh(between - low)[0] >= -1e-4 * SOFT.modulus * 1e-9
     assert np.linalg.eigvalsh(high - between)[0] >= -1e-4 * SOFT.modulus * 1e-9
     if fraction in (0.0, 1.0):
@@ -37,20 +47,19 @@ def test_bounds_enclose_a_laminate_and_close_at_the_ends(fraction):
 
 def test_hashin_shtrikman_lies_inside_reuss_and_voigt_and_in_order():
     fraction = np.linspace(0, 1, 11)
-    least, greatest = hashin_shtrikman(fraction, SOFT, HARD)[0]
+    least, greatest = hashin_shtrikman(shares(fraction), PAIR)[0]
     assert (least <= greatest * (1 + 1e-12)).all()
-    assert (bulk_modulus(voigt(fraction, *PAIR)) >= greatest * (1 - 1e-12)).all()
-    assert (bulk_modulus(reuss(fraction, *PAIR)) <= least * (1 + 1e-12)).all()
+    assert (bulk_modulus(voigt(shares(fraction), PAIR)) >= greatest * (1 - 1e-12)).all()
+    assert (bulk_modulus(reuss(shares(fraction), PAIR)) <= least * (1 + 1e-12)).all()
 
 
 def checks_of(stress, loads):
-    one = np.array([0.4]), np.array([1.0])
-    return stress_checks(stress[None], loads, *one, (SOFT, HARD))
+    return stress_checks(stress[None], loads, SHARES[:, None], np.ones(1), (SOFT, HARD))
 
 
 def test_a_right_stiffness_passes():
-    lower, _ = hashin_shtrikman(0.4, SOFT, HARD)[0]
-    right = reuss(0.4, *PAIR) * float(lower / bulk_modulus(reuss(0.4, *PAIR))) * 1.01
+    lower, _ = hashin_shtrikman(SHARES, PAIR)[0]
+    right = reuss(SHARES, PAIR) * float(lower / bulk_modulus(reuss(SHARES, PAIR))) * 1.01
     assert require(checks_of(right, np.eye(3)))["reuss"] == 0
 
 
@@ -58,9 +67,9 @@ def test_a_right_stiffness_passes():
     ("wrong", "message"),
     [
         (lambda c: c + np.triu(np.ones((3, 3)), 1) * 1e6, "not symmetric"),
-        (lambda c: reuss(0.4, *PAIR) * 0.99, "below the Reuss bound"),
-        (lambda c: voigt(0.4, *PAIR) * 1.01, "above the Voigt bound"),
-        (lambda c: voigt(0.4, *PAIR) * 0.9999, "outside the Hashin–Shtrikman bounds"),
+        (lambda c: reuss(SHARES, PAIR) * 0.99, "below the Reuss bound"),
+        (lambda c: voigt(SHARES, PAIR) * 1.01, "above the Voigt bound"),
+        (lambda c: voigt(SHARES, PAIR) * 0.9999, "outside the Hashin–Shtrikman bounds"),
         (lambda c: c * np.nan, "is allowed; do not use this result"),
     ],
 )
@@ -80,7 +89,7 @@ def test_a_flipped_shear_stress_is_below_the_reuss_bound():
 
 
 def test_two_loads_see_the_bulk_modulus_of_the_whole_stiffness():
-    c = voigt(0.4, *PAIR) * 0.9999
+    c = voigt(SHARES, PAIR) * 0.9999
     whole, seen = checks_of(c, np.eye(3)), checks_of(c @ LOADS.T, LOADS)
     assert whole["hashin_shtrikman"] == pytest.approx(seen["hashin_shtrikman"], rel=1e-9)
     assert whole["hashin_shtrikman"] > 0

@@ -183,9 +183,10 @@ def test_a_stiffness_lies_within_the_bounds_of_its_phases(turned_ellipse):
     result = turned_ellipse[0]
     fraction = np.pi / 4 * SMALL(result.curve.theta) ** 2
     for bound, sign in ((reuss, 1), (voigt, -1)):
-        mean = np.tensordot(
-            result.curve.weights, bound(fraction, MATRIX.stiffness, ORTHOTROPIC.stiffness), axes=1
+        bounds = bound(
+            np.stack([1 - fraction, fraction]), (MATRIX.stiffness, ORTHOTROPIC.stiffness)
         )
+        mean = np.tensordot(result.curve.weights, bounds, axes=1)
         assert np.linalg.eigvalsh(sign * (result.stiffness - mean))[0] > -1e-3 * mean.max()
     assert result.checks["reuss"] == result.checks["voigt"] == 0
 
