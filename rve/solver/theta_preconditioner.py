@@ -146,12 +146,11 @@ class ThetaPreconditioner:
             for k in numbering.levels
         ]
         spans += [(k * stride + n, (k + 1) * stride) for k in numbering.middles]
-        first, last = min(a for a, _ in spans or [(0, 0)]), max(b for _, b in spans or [(0, 0)])
-        if matrix.comm.size > 1:  # all rows at once: ranks send each other one message, not dozens
-            (matrix,) = matrix.createSubMatrices([_stride(first, last)])
-        else:
-            first = 0
-        return list(matrix.createSubMatrices([_stride(a - first, b - first) for a, b in spans]))
+        # the first level alone has a part on another rank, and what PETSc fetches is slow
+        first, start = [_stride(*span) for span in spans[:1]], numbering.rows.start
+        others = [_stride(a - start, b - start) for a, b in spans[1:]]
+        own = matrix.getDiagonalBlock()
+        return [*matrix.createSubMatrices(first), *own.createSubMatrices(others)]
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
         """Result = P⁻¹ residual, called by PETSc."""
