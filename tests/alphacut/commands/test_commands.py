@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from alphacut.entry import COMMANDS, main, parsers
+from alphacut.entry import main
 from tests.alphacut.small import CELL, written
 
 RUN = [sys.executable, "-m", "alphacut"]
@@ -20,13 +20,6 @@ def spoken(capfd, *words):
     status = main([str(word) for word in words])
     out, err = capfd.readouterr()
     return status, out, err
-
-
-def test_commands_and_their_options_are_few():
-    assert len(COMMANDS) == 9
-    for parser in parsers("alphacut", COMMANDS)[1].values():
-        options = [a for a in parser._actions if a.option_strings and a.dest != "help"]
-        assert len(options) <= 12
 
 
 def test_a_run_prints_a_table_and_leaves_its_files(tmp_path, capfd):
