@@ -71,8 +71,7 @@ def draw_probability(document: Document) -> Figure:
     _mark(axes, event["limit"], limits, event["unit"])
     title = f"limit of |{name}|" if event["unit"] else "all limits, over those of the case"
     style.prefix_axis(axes, title, event["unit"], across=True)
-    axes.set_ylabel("probability of exceeding it")
-    axes.set_ylim(0, 1.02)
+    axes.set(ylabel="probability of exceeding it", ylim=(0, 1.02))
     alpha_legend(axes, alpha)
     return figure
 
@@ -112,8 +111,7 @@ def draw_fragility(document: Document) -> Figure:
     words = limit_words(limit["output"], limit["limit"], limit["output_unit"])
     axes.set_title(words, loc="left", fontsize=10)
     style.prefix_axis(axes, document["measure"], document["unit"], across=True)
-    axes.set_ylabel("share of records that exceed it")
-    axes.set_ylim(0, 1.02)
+    axes.set(ylabel="share of records that exceed it", ylim=(0, 1.02))
     alpha_legend(axes, alpha)
     return figure
 

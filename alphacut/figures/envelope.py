@@ -66,8 +66,7 @@ def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, uni
 
 def time_axes(axes: Axes, time: Array, output: Output) -> None:
     """Axes of an output over time."""
-    axes.set_xlim(time[0], time[-1])
-    axes.set_xlabel("time t (s)")
+    axes.set(xlim=(time[0], time[-1]), xlabel="time t (s)")
     name = output.words.removesuffix(f" ({output})")
     style.prefix_axis(axes, name, output.unit)
 
@@ -136,8 +135,8 @@ def spectra(suite: Document) -> Figure:
     axes.plot(periods, curves.T, color=style.GREY, lw=0.6)
     axes.plot(periods, curves.mean(0), color=style.BLUE, lw=1.6, label="mean")
     axes.axvline(suite["period_s"], color=style.ORANGE, lw=1.2, ls="--", label="T1")
-    axes.set_xscale("log")
-    axes.set_xlabel("period [s]")
-    axes.set_ylabel(f"Sa [m/s²], damping {suite['damping_ratio']:.3g}")
+    axes.set(
+        xscale="log", xlabel="period [s]", ylabel=f"Sa [m/s²], damping {suite['damping_ratio']:.3g}"
+    )
     axes.legend(fontsize=8)
     return figure

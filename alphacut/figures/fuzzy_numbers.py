@@ -45,8 +45,9 @@ def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     for axes, (name, number) in zip(panels, numbers.items(), strict=True):
         number.plot(axes, color=BLUE, lw=1.6)
         margin = 0.15 * (number.support.width or given.support.width)
-        axes.set_xlim(number.support.lower - margin, number.support.upper + margin)
-        axes.set_ylim(0, 1.08)
+        axes.set(
+            xlim=(number.support.lower - margin, number.support.upper + margin), ylim=(0, 1.08)
+        )
         style.title(axes, name)
         source = "E" if number.modal == result.modal else "E$_i$"
         style.prefix_axis(axes, source, "Pa", across=True)

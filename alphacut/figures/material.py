@@ -59,9 +59,7 @@ def p_box(section: RadiusMapSection) -> Figure:
     axes.plot(at, family.max(0), color=style.INK, lw=1)
     modal = distribution(modal_map(section), at)
     axes.plot(at, modal, color=style.PURPLE, lw=1.8, label="modal map")
-    axes.set_xlabel("reduced radius r$_n$ = r/a")
-    axes.set_ylabel("cumulative distribution")
-    axes.set_ylim(0, 1.02)
+    axes.set(xlabel="reduced radius r$_n$ = r/a", ylabel="cumulative distribution", ylim=(0, 1.02))
     axes.legend(loc="lower right")
     return figure
 
@@ -89,11 +87,7 @@ def cone(section: RadiusMapSection) -> Figure:
         axes.plot(x, y, level, color=style.INK, lw=0.8)
     for x, y in itertools.product((-1, 1), (-1, 1)):
         axes.plot([x, x], [y, y], [theta[0], theta[-1]], color=style.GREY, lw=0.8)
-    axes.set_xlabel("x$_1$/a")
-    axes.set_ylabel("x$_2$/a")
-    axes.set_zlabel("θ")
-    axes.set_xticks([-1, 0, 1])
-    axes.set_yticks([-1, 0, 1])
+    axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a", zlabel="θ", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
     axes.set_box_aspect((1, 1, 1.3), zoom=0.88)
     axes.view_init(elev=18, azim=-55)
     return figure
@@ -129,8 +123,7 @@ def stress_curves(dataset: xarray.Dataset) -> Figure:
     theta, stress_GPa = dataset["theta"].values, dataset["curve11"].values / GPA
     for sample in np.argsort(membership, kind="stable"):  # high memberships on top
         axes.plot(theta, stress_GPa[sample], color=shades[membership[sample]], lw=0.8)
-    axes.set_xlabel("θ")
-    axes.set_ylabel("homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
+    axes.set(xlabel="θ", ylabel="homogenised σ$_{11}$(ε$^{(1)}$) (GPa)")
     style.title(axes, f"{len(stress_GPa)} samples")
     style.alpha_legend(axes, alpha)
     return figure
@@ -195,8 +188,7 @@ def image(dataset: xarray.Dataset) -> Figure:
 
     figure, (picture, cuts) = plt.subplots(1, 2, figsize=(style.WIDTH, 3.4), width_ratios=(1, 1.4))
     picture.imshow(dataset["phase"].values, origin="lower", cmap="Greys_r")
-    picture.set_xticks([])
-    picture.set_yticks([])
+    picture.set(xticks=[], yticks=[])
     style.title(picture, "phases as segmented")
     lower, upper = dataset["E"].transpose("bound", "alpha").values / GPA
     style.shaded_cuts(cuts, dataset["alpha"].values, lower, upper)

@@ -15,7 +15,6 @@ from alphacut.stages.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
     from alphacut.rve.mesh.prism_grid import PrismGrid
@@ -52,31 +51,16 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
 
 def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
     """Physical domain: the triangles of the middle level, coloured by phase."""
-    corners = grid.plane.triangles[:, :3]
+    from matplotlib.collections import PolyCollection
+
+    corners = level[grid.plane.triangles[:, :3], :2]
     for mask, colour in ((~grid.plane.inside, MATRIX), (grid.plane.inside, PARTICLE)):
-        x, y = level[:, 0], level[:, 1]
-        face = np.full(len(corners[mask]), 1.0)
-        axes.tripcolor(
-            x,
-            y,
-            triangles=corners[mask],
-            facecolors=face,
-            cmap=single_colour(colour),
-            ec=INK,
-            lw=0.25,
-        )
+        axes.add_collection(PolyCollection(list(corners[mask]), facecolor=colour, ec=INK, lw=0.25))
+    axes.set(xlim=(-1, 1), ylim=(-1, 1))
     axes.set_aspect("equal")
-    axes.set_xlabel("x$_1$/a")
-    axes.set_ylabel("x$_2$/a")
+    axes.set(xlabel="x$_1$/a", ylabel="x$_2$/a")
     axes.grid(visible=False)
     style.title(axes, f"physical domain, θ = {level[0, 2]:g}")
-
-
-def single_colour(colour: str) -> Colormap:
-    """A colour map of one colour."""
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap([colour])
 
 
 def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
@@ -86,9 +70,7 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
     axes.plot(law.pdf(theta), theta, color=BLUE, lw=1.6)
     axes.fill_betweenx(theta, 0, law.pdf(theta), color=BLUE, alpha=0.15, lw=0)
     axes.hlines(levels, 0, law.pdf(levels), color=ORANGE, lw=0.9)
-    axes.set_xlabel("density $f_Θ$")
-    axes.set_ylabel("θ")
-    axes.set_xlim(0)
+    axes.set(xlabel="density $f_Θ$", ylabel="θ", xlim=0)
     style.title(axes, f"stochastic domain, {len(levels) - 1} layers")
 
 
@@ -105,14 +87,16 @@ def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
     for side in (plane[:, 1] <= -1 + 1e-9, plane[:, 0] >= 1 - 1e-9):
         axes.add_collection3d(Poly3DCollection(layer_faces(levels, edges, side), **thin))
     axes.add_collection3d(Poly3DCollection(levels[0][corners], facecolor=MATRIX, ec=INK, lw=0.15))
-    axes.set_xlim(-1, 1)
-    axes.set_ylim(-1, 1)
-    axes.set_zlim(levels[0, 0, 2], levels[-1, 0, 2])
-    axes.set_xlabel("x$_1$/a")
-    axes.set_ylabel("x$_2$/a")
-    axes.set_zlabel("θ")
-    axes.set_xticks([-1, 0, 1])
-    axes.set_yticks([-1, 0, 1])
+    axes.set(
+        xlim=(-1, 1),
+        ylim=(-1, 1),
+        zlim=(levels[0, 0, 2], levels[-1, 0, 2]),
+        xlabel="x$_1$/a",
+        ylabel="x$_2$/a",
+        zlabel="θ",
+        xticks=[-1, 0, 1],
+        yticks=[-1, 0, 1],
+    )
     axes.set_box_aspect((1, 1, 1.2), zoom=0.85)
     axes.view_init(elev=25, azim=-55)
     axes.set_title(f"product domain, {len(grid.cells):,} prisms", loc="left", fontsize=10)
@@ -151,8 +135,7 @@ def stages(results: Results) -> Figure:
         arrow = {"arrowstyle": "-|>", "color": ORANGE}
         axes.annotate("", (end, 0.75), (start, 0.75), arrowprops=arrow)
         axes.text((start + end) / 2, 0.85, words, ha="center", size=9, color=ORANGE)
-    axes.set_xlim(-0.1, PITCH * len(boxes) - PITCH + BOX_WIDTH + 0.1)
-    axes.set_ylim(-0.1, 1.6)
+    axes.set(xlim=(-0.1, PITCH * len(boxes) - PITCH + BOX_WIDTH + 0.1), ylim=(-0.1, 1.6))
     axes.axis("off")
     return figure
 

@@ -88,9 +88,7 @@ def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> Non
 
 def membership_axes(axes: Axes, label: str) -> None:
     """Axes of a membership function: grade upwards from 0 to 1."""
-    axes.set_xlabel(label)
-    axes.set_ylabel("membership μ")
-    axes.set_ylim(0, 1.05)
+    axes.set(xlabel=label, ylabel="membership μ", ylim=(0, 1.05))
 
 
 def outline(lower: Array, upper: Array) -> Array:

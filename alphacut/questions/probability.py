@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.case.limits import ProbabilitySection
-from alphacut.frame.questions.peaks import ANY
 from alphacut.frame.questions.probability import CONFIDENCE, Probability, probabilities
-from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
@@ -31,10 +29,10 @@ def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Arr
     return draw
 
 
-def _document(name: str, answer: Probability, limits: dict[str, float]) -> Document:
+def _document(answer: Probability, limit: float, unit: str) -> Document:
     return {
-        "limit": limits.get(name, 1.0),
-        "unit": "" if name == ANY else Output(name).unit,
+        "limit": limit,
+        "unit": unit,
         "lower": answer.lower,
         "upper": answer.upper,
         "error": answer.error,
@@ -81,7 +79,7 @@ class ProbabilityQuestion(Question):
         fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
         crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
         answers = probabilities(
-            motion.structure.observing("probability.limits", tuple(limits)),
+            structure.observing("probability.limits", tuple(limits)),
             fuzzy or dict([next(iter(crisp.items()))]),
             {name: shaped_like(number) for name, number in random.items()},
             limits,
@@ -98,7 +96,12 @@ class ProbabilityQuestion(Question):
             "samples": self.section.samples,
             "step": motion.step,
             "alpha": motion.alpha,
-            "events": {name: _document(name, answer, limits) for name, answer in answers.items()},
+            "events": {
+                name: _document(
+                    answer, limits.get(name, 1.0), self.section.shown(name, structure)["unit"]
+                )
+                for name, answer in answers.items()
+            },
         }
 
     @staticmethod
