@@ -1,10 +1,10 @@
-"""A case, from TOML text and changes of it; every problem is reported at once, with its line."""
+"""A case, from TOML text and changes of it; every problem is reported at once, by its key."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,8 +26,6 @@ KINDS = {
     "model_attributes_type": "a section",
 }
 """What a key takes, by Pydantic's name of the error."""
-HEADER = re.compile(r"\s*(\[\[?)\s*([^\[\]]*?)\s*\]\]?")
-ASSIGNMENT = re.compile(r"""\s*([A-Za-z0-9_.\-"' ]+?)\s*=""")
 
 
 @dataclass(frozen=True)
@@ -69,9 +67,9 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     try:
         content = Content.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
-        lines = lines_of_keys(text)
-        problems = [_located(p, path, lines, changed) for p in _problems(error)]
-        raise BadInput(sorted(set(problems), key=lambda problem: problem.line)) from None
+        files = {True: "command line", False: str(path)}
+        problems = [replace(x, file=files[_is_below(x.key, changed)]) for x in _problems(error)]
+        raise BadInput([*dict.fromkeys(problems)]) from None
     return Case(path, text, content, tuple(changes))
 
 
@@ -151,42 +149,9 @@ def _written(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else printable(value).replace("'", '"')
 
 
-def _located(
-    problem: InputProblem, path: Path, lines: Mapping[str, int], changed: Sequence[str]
-) -> InputProblem:
-    """The problem with its file and line; one in an array, or of a missing key, points above it."""
-    key = problem.key
-    while key and key not in lines and key not in changed:
-        key = key[: key.rfind("[")] if key.endswith("]") else key.rpartition(".")[0]
-    if key in changed:
-        return replace(problem, file="command line")
-    return replace(problem, file=str(path), line=lines.get(key, 0))
-
-
-def lines_of_keys(text: str) -> dict[str, int]:
-    """Full key name (``study[1].name`` in repeated tables) to its line, from 1."""
-    lines: dict[str, int] = {}
-    counts: dict[str, int] = {}
-    prefix, inside = "", ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if inside:
-            inside = "" if inside in line else inside
-        elif header := HEADER.match(line):
-            name = header[2].strip().strip("\"'")
-            if header[1] == "[[":
-                counts[name] = counts.get(name, -1) + 1
-                name = f"{name}[{counts[name]}]"
-            prefix = name + "."
-            lines.setdefault(name, number)
-        elif match := ASSIGNMENT.match(line):
-            lines.setdefault(prefix + re.sub(r"[\"' ]", "", match[1]), number)
-            inside = _opened(line[match.end() :])
-    return lines
-
-
-def _opened(text: str) -> str:
-    """Closing mark of a value that goes on over the next lines, or an empty text."""
-    return next((quotes for quotes in ('"""', "'''") if text.count(quotes) % 2), "")
+def _is_below(key: str, changed: Sequence[str]) -> bool:
+    """True for a changed key, one of its entries, or a key of its table."""
+    return any(re.match(rf"{re.escape(name)}(?![\w-])", key) for name in changed)
 
 
 def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
