@@ -32,7 +32,7 @@ from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
-from alphacut.case.types import Section, Some, after, unlike
+from alphacut.case.types import Section, Some, after, require_alone, unlike
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.outline import CLOSEST
@@ -173,44 +173,25 @@ class Content(Section):
     @model_validator(mode="after")
     def _mesh(self) -> Self:
         """Refuses a mesh from a file without phases, and keys that say what the file holds."""
-        file, meshed = self.mesh.file is not None, self.meshed is not None
-        allowed = "[cell.phases], a phase for each physical group of mesh.file"
-        require(not file or meshed, "cell.phases", value=None, allowed=allowed)
-        require(
-            file or not meshed,
-            "mesh.file",
-            value=None,
-            allowed="a mesh of Gmsh beside [cell.phases]",
-        )
-        if not file:
-            lone = self.radius is None or self.radius_map is not None
-            about = RadiusMapSection.model_fields["a1"].description
-            require(lone, "radius.a1", value=None, allowed=f"{about}; theta alone beside mesh.file")
-            return self
-        for key in ("size", "layers"):
-            require(
-                not self.mesh.names(key),
-                f"mesh.{key}",
-                value="beside mesh.file",
-                allowed="one of them",
+        if self.mesh.file is None:
+            allowed = "a mesh of Gmsh beside [cell.phases]"
+            require(self.meshed is None, "mesh.file", value=None, allowed=allowed)
+            has_radius = self.radius is None or self.radius_map is not None
+            allowed = (
+                f"{RadiusMapSection.model_fields['a1'].description}; theta alone beside mesh.file"
             )
-        has_geometry = self.radius_map is not None or "microstructure" in self.stages
-        require(
-            not has_geometry,
-            "radius",
-            value="a map of radii",
-            allowed="theta alone beside mesh.file",
-        )
-        stated = self.modulus.tolerance is not None
-        cure = "compare a coarser mesh"
+            require(has_radius, "radius.a1", value=None, allowed=allowed)
+            return self
+        allowed = "[cell.phases], a phase for each physical group of mesh.file"
+        require(self.meshed is not None, "cell.phases", value=None, allowed=allowed)
+        for key in ("size", "layers"):
+            require_alone(f"mesh.{key}", self.mesh.names(key), "mesh.file")
+        has_map, allowed = self.radius_map is not None, "theta alone beside mesh.file"
+        has_map = has_map or "microstructure" in self.stages
+        require(not has_map, "radius", value="a map of radii", allowed=allowed)
+        tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
         allowed = "none beside mesh.file, whose error nobody knows"
-        require(
-            not stated,
-            "modulus.tolerance",
-            value=self.modulus.tolerance,
-            allowed=allowed,
-            cure=cure,
-        )
+        require(tolerance is None, "modulus.tolerance", value=tolerance, allowed=allowed, cure=cure)
         return self
 
     @model_validator(mode="after")
@@ -220,20 +201,18 @@ class Content(Section):
         has_map = self.radius_map is not None or self.stated_fraction is not None
         if thickness is None or not has_map or "microstructure" in self.stages:
             return self
-        radius = self.round_cell[0].largest_radius
-        most = thickness.support.upper
+        radius, most = self.round_cell[0].largest_radius, thickness.support.upper
+        fits, key = radius + most < CLOSEST, "cell.interphase_thickness"
         allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
-        require(
-            radius + most < CLOSEST, "cell.interphase_thickness", value=f"{most:g}", allowed=allowed
-        )
+        require(fits, key, value=f"{most:g}", allowed=allowed)
         return self
 
     @model_validator(mode="after")
     def _stages(self) -> Self:
         """Refuses stages without their sections."""
         fraction = self.round is not None and self.round.fraction is not None
-        has_map = self.picture is not None or "microstructure" in self.stages or fraction
-        has_map = has_map or self.meshed is not None
+        is_mapped = "microstructure" in self.stages or fraction
+        has_map = is_mapped or self.picture is not None or self.meshed is not None
         needs = {
             "microstructure": ("microstructure",),
             "modulus": ("cell",) if has_map else ("radius", "cell"),
@@ -249,8 +228,7 @@ class Content(Section):
             "stage microstructure": "microstructure" in self.stages,
         }
         first, *later = [name for name, is_there in sources.items() if is_there] or [""]
-        value = f"beside {', '.join(later)}"
-        require(not later, first, value=value, allowed="one of them")
+        require_alone(first, bool(later), ", ".join(later))
         method = self.modulus.method
         solved = self.round or self.meshed
         methods = (method,) if solved is None else solved.methods
@@ -277,31 +255,18 @@ class Content(Section):
         pushed = suite is not None or ground is not None or bool(self.force)
         moves = pushed or getattr(section, "starts", True)
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
-        require(
-            moves,
-            "frame.displacements",
-            value=None,
-            allowed=allowed,
-            cure="nothing moves the frame",
-        )
+        cure = "nothing moves the frame"
+        require(moves, "frame.displacements", value=None, allowed=allowed, cure=cure)
         if suite is None:
-            require(
-                self.fragility is None,
-                "fragility",
-                value="without records",
-                allowed="beside [records]",
-            )
+            fits, allowed = self.fragility is None, "beside [records]"
+            require(fits, "fragility", value="without records", allowed=allowed)
             return self
-        require(ground is None, "records", value="beside an accelerogram", allowed="one of them")
+        require_alone("records", ground is not None, "an accelerogram")
         if self.matrices is not None:
             self.matrices.require_pattern()
-        for key in ("probability", "tolerances", "identify"):
-            answered = getattr(self, key) is None
-            allowed = "[decision] and [fragility] beside [records]"
-            require(answered, key, value="beside [records]", allowed=allowed)
-        require(
-            not self.study, "study", value="beside [records]", allowed="one motion for each record"
-        )
+        for key in ("probability", "tolerances", "identify", "study"):
+            allowed = "[decision] and [fragility], of one motion for each record"
+            require(not getattr(self, key), key, value="beside [records]", allowed=allowed)
         return self
 
     @model_validator(mode="after")
@@ -324,7 +289,7 @@ class Content(Section):
             structure.inputs(stated, f"{key}.fuzzy")
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
-        has_modulus = self.frame is None or self.frame.is_whole or "modulus" in self.stages
+        has_modulus = self.has_own_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", value=None, allowed="a modulus, or stage modulus")
         is_framed = self.identify is None or self.frame is not None
         require(is_framed, "identify", value="without a frame", allowed="beside [frame]")

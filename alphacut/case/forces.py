@@ -152,35 +152,28 @@ def with_forces(
         for section in sections
         for unknown, number in section.amplitudes.items()
     ]
+    floors = range(1, model.floors + 1) if isinstance(model, StoreyFrame) else ()
+    for unknown, _, _ in forces:
+        chosen("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
     if isinstance(model, StoreyFrame):
-        loaded: StoreyFrame | MatrixStructure = _with_floor_forces(model, forces)
-        names = loaded.force_names  # type: ignore[union-attr]
+        loads = [Force(int(floor), number.modal, history) for floor, number, history in forces]
+        model = replace(model, loads=loads)
+        names = model.force_names
     else:
         names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
-        loaded = _with_forces_on_unknowns(model, forces, names, unknowns)
+        model = _with_forces_on_unknowns(model, forces, names, unknowns)
     numbers = {name: number for name, (_, number, _) in zip(names, forces, strict=True)}
-    return replace(structure, model=loaded, numbers={**structure.numbers, **numbers})
+    return replace(structure, model=model, numbers={**structure.numbers, **numbers})
 
 
 NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
 """Floor or degree of freedom, amplitude in SI, and time history (None: impulse) of each force."""
 
 
-def _with_floor_forces(model: StoreyFrame, forces: NodalForces) -> StoreyFrame:
-    """The frame with forces on its floors, at their modal amplitudes."""
-    floors = {str(floor): floor for floor in range(1, model.floors + 1)}
-    for floor, _, _ in forces:
-        chosen("force.amplitude", floor, floors)
-    loads = [Force(floors[floor], number.modal, history) for floor, number, history in forces]
-    return replace(model, loads=loads)
-
-
 def _with_forces_on_unknowns(
     model: MatrixStructure, forces: NodalForces, names: Sequence[str], unknowns: Sequence[str]
 ) -> MatrixStructure:
     """The structure with forces on its degrees of freedom; `names` are those of the amplitudes."""
-    for unknown, _, _ in forces:
-        chosen("force.amplitude", unknown, tuple(unknowns))
     loads: list[Force] = []
     modal: dict[str, float] = {}
     for name, (unknown, number, history) in zip(names, forces, strict=True):

@@ -93,12 +93,13 @@ Limits = Annotated[tuple[AnyLimit, ...], Some]
 class QuestionSection(Section):
     """A question about limits of outputs, as a section of the case.
 
-    Its attributes are the name of the section, and whether the answer is read from the peaks of
-    the limited outputs.
+    Its attributes are the name of the section, whether the answer is read from the peaks of the
+    limited outputs, and whether each output has one limit, of its magnitude.
     """
 
     key: ClassVar[str]
     reads_peaks: ClassVar[bool] = False
+    of_magnitudes: ClassVar[bool] = False
     limits: Limits = Field(
         description="limits of outputs, 'drift1 <= 0.5 %', 'max q3 <= 80 mm', 'min q3 >= -60 mm'"
     )
@@ -129,24 +130,14 @@ class QuestionSection(Section):
         unit = "" if limit is None else structure.unit(limit.output)
         return {"output": name if limit is None else limit.peak, "unit": unit}
 
-    def require_magnitudes(self) -> None:
-        """Refuses limits of one side, and several of an output.
-
-        Raises:
-            RefusedError: There are some.
-        """
-        alone = all(name == limit.output for name, limit in self.named.items())
-        texts = ", ".join(limit.text for limit in self.limits)
-        allowed = "one limit of the magnitude for each output"
-        require(alone, f"{self.key}.limits", value=texts, allowed=allowed)
-
     def check(self, structure: Structure) -> None:
-        """Refuses what the structure does not have.
-
-        Raises:
-            RefusedError: It has no such output or input.
-        """
+        """Refuses what the structure does not have, and limits that the question is not for."""
         self.in_si(structure)
+        if self.of_magnitudes:
+            alone = all(name == limit.output for name, limit in self.named.items())
+            texts = ", ".join(limit.text for limit in self.limits)
+            allowed = "one limit of the magnitude for each output"
+            require(alone, f"{self.key}.limits", value=texts, allowed=allowed)
 
 
 class DecisionSection(QuestionSection):
@@ -160,6 +151,7 @@ class ProbabilitySection(QuestionSection):
     """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
 
     key = "probability"
+    of_magnitudes = True
 
     random: tuple[str, ...] = Field(
         default=(), description="inputs that are random, with the shape of their membership"
@@ -169,13 +161,8 @@ class ProbabilitySection(QuestionSection):
     )
 
     def check(self, structure: Structure) -> None:
-        """Refuses limits and random inputs that the structure does not have.
-
-        Raises:
-            RefusedError: It has no such output or input.
-        """
+        """Refuses limits and random inputs that the structure does not have."""
         super().check(structure)
-        self.require_magnitudes()
         structure.inputs([name for name in self.random if name != "E"], "probability.random")
 
 
@@ -183,20 +170,12 @@ class TolerancesSection(QuestionSection):
     """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
 
     key = "tolerances"
+    of_magnitudes = True
     reads_peaks = True
 
     most: Annotated[float, Quantity(above=0, most=100)] = Field(
         default=2.0, description="largest scale that is tried; 1 is that of the case"
     )
-
-    def check(self, structure: Structure) -> None:
-        """Refuses limits that the structure does not have, or of one side.
-
-        Raises:
-            RefusedError: There is one.
-        """
-        super().check(structure)
-        self.require_magnitudes()
 
 
 class FragilitySection(QuestionSection):
@@ -213,19 +192,13 @@ class FragilitySection(QuestionSection):
     )
 
     def check(self, structure: Structure) -> None:
-        """Refuses structures that do not scale with their record.
-
-        Raises:
-            RefusedError: The structure is not linear, or moves without its record.
-        """
+        """Refuses structures that do not scale with their record."""
         super().check(structure)
-        moves = structure.linear is None or any(
-            np.any(x)
-            for x in (getattr(structure.linear, "q0", 0), getattr(structure.linear, "v0", 0))
-        )
-        moves = moves or bool(structure.linear and structure.linear.loads)
+        linear = structure.linear
+        scales = linear is not None and not linear.loads
+        scales = scales and not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
         allowed = "linear structures that start at rest, without forces: they scale with records"
-        require(not moves, "fragility", value="of another motion", allowed=allowed)
+        require(scales, "fragility", value="of another motion", allowed=allowed)
         for limit in self.limits:
             positive = limit.value > 0 and not limit.peak.startswith("mean ")
             allowed = "limits of each record that the structure at rest keeps"

@@ -143,7 +143,7 @@ class RoundCell(Section):
     interphase_poisson: Ratio | None = Field(
         default=None, description="Poisson's ratio of the ring"
     )
-    fraction: Annotated[FuzzyNumber, Quantity(above=0, below=1, fuzzy=True)] | None = Field(
+    fraction: Radius | None = Field(
         default=None,
         description="share of area, below π/4, or of volume of spheres, below π/6, that particles"
         " of one size take; in place of [radius]",
@@ -216,13 +216,8 @@ class RoundCell(Section):
         value = "there" if ratio else "missing"
         allowed = "a number beside Young's modulus, none beside a stiffness"
         require(isotropic == ratio, "cell.inclusion_poisson", value=value, allowed=allowed)
-        solid = isotropic or self.particles != "spheres"
-        require(
-            solid,
-            "cell.inclusion_modulus",
-            value="a plane stiffness",
-            allowed="Young's modulus of spheres",
-        )
+        solid, allowed = isotropic or self.particles != "spheres", "Young's modulus of spheres"
+        require(solid, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
         if self.fraction is not None:
             touching = float(self.shape.shares(1 / reach(self.outline or circle)))
             most = self.fraction.support.upper
@@ -247,30 +242,30 @@ class RoundCell(Section):
     @model_validator(mode="after")
     def _losses(self) -> Self:
         """Refuses losses of one phase alone, and of bulk moduli that are too large."""
-        for name, partner in (("matrix", "inclusion"), ("inclusion", "matrix")):
-            loss, bulk = (getattr(self, f"{name}_loss{x}") for x in ("", "_bulk"))
-            beside = getattr(self, f"{partner}_loss") is not None
-            given = loss is not None or (bulk is None and not beside)
-            require(
-                given, f"cell.{name}_loss", value=None, allowed="a loss of either phase, 0 for none"
+        phases = ("matrix", "inclusion")
+        keys = [f"{phase}_loss{end}" for phase in phases for end in ("", "_bulk")]
+        if all(getattr(self, key) is None for key in keys):
+            return self
+        for phase in phases:
+            loss, bulk, ratio = (
+                getattr(self, f"{phase}_{x}") for x in ("loss", "loss_bulk", "poisson")
             )
+            allowed = "a loss of either phase, 0 for none"
+            require(loss is not None, f"cell.{phase}_loss", value=None, allowed=allowed)
             if bulk is not None:
-                ratio = getattr(self, f"{name}_poisson")
-                require(
-                    ratio is not None,
-                    f"cell.{name}_loss_bulk",
-                    value="there",
-                    allowed="none beside a stiffness",
-                )
-                most = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
-                allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
-                require(
-                    bulk.support.upper <= most,
-                    f"cell.{name}_loss_bulk",
-                    value=f"{bulk.support.upper:g}",
-                    allowed=allowed,
-                )
+                _require_bulk_loss(f"cell.{phase}_loss_bulk", loss, bulk, ratio)
         return self
+
+
+def _require_bulk_loss(
+    key: str, loss: FuzzyNumber, bulk: FuzzyNumber, ratio: FuzzyNumber | None
+) -> None:
+    """Refuses a loss factor of a bulk modulus at which the shear modulus would gain energy."""
+    if ratio is None:
+        raise RefusedError(key, "there", "none beside a stiffness")
+    most, greatest = 3 * loss.support.lower / (1 - 2 * ratio.support.lower), bulk.support.upper
+    allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
+    require(greatest <= most, key, value=f"{greatest:g}", allowed=allowed)
 
 
 class ImageCell(Section):

@@ -101,11 +101,7 @@ class EnvelopeSection(Section):
     step: Time = Field(description="time step")
 
     def require_steps(self, key: str, duration: float) -> None:
-        """Refuses a duration that is no whole number of steps, or of too many.
-
-        Raises:
-            RefusedError: It is.
-        """
+        """Refuses a duration that is no whole number of steps, or of too many."""
         steps = duration / self.step
         is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps
         if not is_multiple or steps > MOST_STEPS:

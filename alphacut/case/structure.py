@@ -161,11 +161,7 @@ class Structure:
         }
 
     def require_outputs(self, key: str, names: Iterable[str]) -> None:
-        """Refuses outputs that are not observed.
-
-        Raises:
-            RefusedError: One is not.
-        """
+        """Refuses outputs that are not observed."""
         for name in names:
             chosen(key, name, self.outputs)
 

@@ -192,6 +192,11 @@ def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
     return values
 
 
+def require_alone(key: str, is_there: bool, other: str) -> None:
+    """Refuses a key or section that stands beside another one for the same thing."""
+    require(not is_there, key, value=f"beside {other}", allowed="one of them")
+
+
 after = AfterValidator
 """A check of a value that has its type."""
 CaseFile = Annotated[Path, text(case_file)]

@@ -120,7 +120,7 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
         ("mean σ12, GPa", f"{stress['s12']:#.9g}", off[3]),
     ]
     for key, number in document["fibres"].items():
-        rows.append((fibre_label(key), f"{number['value']:.6g}", f"{number['error']:.1e}"))
+        rows.append((fibre_label(key), *_value_and_error(number)))
     rows += [*plane_rows(document)]
     if ends := document["references"].get("hashin_shtrikman_E_GPa"):
         rows.append((f"{ISOTROPIC}, GPa", f"{ends[0]:.4f} … {ends[1]:.4f}", ""))
@@ -143,8 +143,13 @@ def plane_rows(document: Document) -> Iterator[tuple[str, str, str]]:
         yield f"C{VOIGT[i]}{VOIGT[j]}, GPa", f"{stiffness[i, j]:.6g}", off
     for definition, constants in document["plane"].items():
         for key, number in constants.items():
-            off = "not declared" if number["error"] is None else f"{number['error']:.1e}"
-            yield f"{fibre_label(key)} ({definition})", f"{number['value']:.6g}", off
+            yield f"{fibre_label(key)} ({definition})", *_value_and_error(number)
+
+
+def _value_and_error(number: Document) -> tuple[str, str]:
+    """A constant and its declared error, for people."""
+    error = number["error"]
+    return f"{number['value']:.6g}", "not declared" if error is None else f"{error:.1e}"
 
 
 VOIGT = "126"  # 11, 22 and 12

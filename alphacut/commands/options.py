@@ -72,11 +72,7 @@ def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
 
 
 def require_petsc(petsc: Mapping[str, str], used: bool) -> None:
-    """Refuses PETSc options, named without their prefix, where no prisms are solved.
-
-    Raises:
-        RefusedError: There are such options.
-    """
+    """Refuses PETSc options, named without their prefix, where no prisms are solved."""
     name = next(iter(petsc), "")
     option = name if name == PETSC_LOG else PETSC_PREFIX + name
     require(

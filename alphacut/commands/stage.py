@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
@@ -11,15 +12,16 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset
-from alphacut.io.quantity import between
-from alphacut.report.results import ISOTROPIC, fibre_label, width_text
+from alphacut.report.results import ISOTROPIC, cut, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
+from alphacut.rve.engineering_constants import FREE, PLANE_STRAIN
 from alphacut.rve.phase_energies import CONSTANTS
 from alphacut.stages.identify import learned
 from alphacut.stages.pipeline import Pipeline
-from alphacut.stages.plane import ONLY, cut_tables
 from alphacut.stages.results import Results
 from alphacut.stochastic.microstructure_summary import fragment
+
+ONLY = "Plane strain alone: the other definition is for one particle of two isotropic phases"
 
 
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
@@ -46,52 +48,59 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
 def image(document: Document) -> str:
     """The phases, and what widens the bounds."""
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
-    ends = document["references"]["hashin_shtrikman_E_GPa"]
     return (
-        plane_text(document["plane"], Nature.GUARANTEED)
-        + (loss_text(document["loss"]) if "loss" in document else "")
-        + f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n"
+        plane_text(document["plane"], document["cuts"]["alpha"], Nature.GUARANTEED)
+        + loss_text(document.get("loss"))
+        + bounds_text(document)
         + "".join(shares)
-        + width_text(document)
-        + "\n"
+        + f"{width_text(document)}\n"
     )
 
 
 def summary(document: Document) -> str:
-    """Constants of fibres on two levels, references, and what the α-cuts cost."""
-    nature, levels = Nature(document["nature"]), (0, -1)
-    fibres = [
-        (
-            fibre_label(key),
-            *(between(values["lower"][k], values["upper"][k], nature, 5) for k in levels),
-        )
-        for key, values in document["fibres"].items()
-    ]
-    head = ("of fibres", *(f"α = {document['alpha'][k]:g}" for k in levels))
-    ends = document["references"].get("hashin_shtrikman_E_GPa")
-    plane = document["plane"]
+    """Constants on two levels, references, and what the α-cuts cost."""
+    alpha, plane = document["alpha"], document["plane"]
     return (
-        (text_table(head, fibres) if fibres else "")
-        + (plane_text(plane) if plane else "")
-        + (loss_text(document["loss"]) if "loss" in document else "")
-        + (f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else "")
+        cuts_text("of fibres", document["fibres"], alpha, Nature(document["nature"]))
+        + (plane_text(plane, alpha, Nature.ATTAINED) if plane else "")
+        + loss_text(document.get("loss"))
+        + bounds_text(document)
         + f"{document['samples']} samples, {document['solves']} linear systems,"
         f" {document['seconds']:.1f} s, {document['method']}\n"
     )
 
 
-def plane_text(cuts: Document, nature: Nature = Nature.ATTAINED) -> str:
-    """Constants along x and y."""
-    text = "".join(text_table(*table) for table in cut_tables(cuts, nature))
-    return text if "nu_xy_free" in cuts else f"{text}{ONLY}\n"
+def bounds_text(document: Document) -> str:
+    """Line on the Hashin–Shtrikman bounds; empty where there are none."""
+    ends = document["references"].get("hashin_shtrikman_E_GPa")
+    return f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else ""
 
 
-def loss_text(losses: Document) -> str:
-    """Loss factors on two levels, with their errors."""
+def cuts_text(title: str, cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
+    """Table of the lowest and highest cut of each constant; empty where there are none."""
+    rows = [
+        (fibre_label(x), cut(ends, 0, nature), cut(ends, -1, nature)) for x, ends in cuts.items()
+    ]
+    return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
+
+
+def plane_text(cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
+    """Constants along x and y, a table for each definition."""
+    free = {x.replace("_free", ""): ends for x, ends in cuts.items() if "_free" in x}
+    plane_strain = {x: ends for x, ends in cuts.items() if "_free" not in x}
+    text = cuts_text(PLANE_STRAIN, plane_strain, alpha, nature) + cuts_text(
+        FREE, free, alpha, nature
+    )
+    return text if free else f"{text}{ONLY}\n"
+
+
+def loss_text(losses: Document | None) -> str:
+    """Loss factors on two levels, with their errors; empty where there are none."""
+    if losses is None:
+        return ""
     rows = []
     for name in CONSTANTS:
-        low, high = losses[name]["lower"], losses[name]["upper"]
-        ends = (between(low[k], high[k], Nature.ATTAINED, 4) for k in (0, -1))
+        ends = (cut(losses[name], level, Nature.ATTAINED) for level in (0, -1))
         error = f"{losses['error'][name]:.1e}" if losses["error"] else "not declared"
         rows.append((f"loss factor of {name}", *ends, error))
     return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)

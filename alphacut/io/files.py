@@ -123,11 +123,7 @@ def say(message: str) -> None:
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuses what a command could not write.
-
-    Raises:
-        RefusedError: An option names no such place.
-    """
+    """Refuses what a command could not write."""
     for action in parser._actions:
         value = getattr(options, action.dest, None)
         if action.dest in OUTPUTS and isinstance(value, str) and value != "-":
@@ -136,11 +132,7 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
 
 
 def require_writable(option: str, value: str, *, folder: bool) -> None:
-    """Refuses a place where nothing can be written.
-
-    Raises:
-        RefusedError: It is one, or of the other kind.
-    """
+    """Refuses a place where nothing can be written."""
     path, kind, reason = Path(value), "a folder" if folder else "a file", ""
     holds = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
     there = path if folder else path.parent

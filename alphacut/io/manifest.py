@@ -139,9 +139,6 @@ class ResultsFolder:
         """Refuses a place that something else takes: a file that is not listed, a pipe, a folder.
 
         A link is replaced by the file where its name is listed; its target stays as it is.
-
-        Raises:
-            RefusedError: Something does.
         """
         file, allowed = self.path / name, "a place for a file of this run"
         cure = "move it away, or name another folder"
@@ -257,9 +254,6 @@ def require_known(facts: Mapping[str, object], path: Path) -> None:
     Args:
         facts: Content of a JSON file of the program.
         path: The file.
-
-    Raises:
-        RefusedError: The format is another one.
     """
     version = facts.get("format_version")
     cure = "name another folder" if version is None else f"make it anew by {RUN}"

@@ -13,11 +13,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.stochastic.particles.csv_columns import fields, number
 
-HEAD = re.compile(
-    r"mode\s*,\s*frequency(\s*\[Hz\])?"
-    r"(?P<frequency>\s*,\s*frequency_std(\s*\[Hz\])?)?(?P<shape>\s*,\s*shape_std)?"
-    r"(?P<floors>(\s*,\s*q[1-9]\d*)*)\s*"
-)
+HEAD = re.compile(r"\s*(mode|frequency(_std)?\s*(\[Hz\])?|shape_std|q[1-9]\d*)\s*")
 ALLOWED = (
     "mode,frequency [Hz],q1,q2 … with the floors that were measured; frequency_std [Hz] and"
     " shape_std may stand before q1"
@@ -45,15 +41,6 @@ class ModeRows:
     shape_deviation: float | None = None
 
 
-@dataclass(frozen=True)
-class _Columns:
-    """Places of the columns that a file may have."""
-
-    frequency_std: int | None
-    shape_std: int | None
-    floors: dict[int, int]
-
-
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     """The measurements of each mode, by rising number, from ``mode,frequency [Hz],q1,q2``.
 
@@ -66,48 +53,48 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
     """
     (_, head), *rows = fields(path)
     columns = _columns(path, head)
+    positive = [columns[x] for x in ("frequency", "frequency_std", "shape_std") if x in columns]
     modes: dict[int, list[list[float]]] = defaultdict(list)
     for row, cells in rows:
         values = [
             number(path, row, cells, column) if cells[column : column + 1] != [""] else np.nan
             for column in range(len(head))
         ]
-        mode, frequency = values[:2]
-        allowed = "a mode from 1, a frequency above 0, and deviations above 0"
-        deviations = [values[k] for k in (columns.frequency_std, columns.shape_std) if k]
-        right = mode >= 1 and mode % 1 == 0 and all(x > 0 for x in (frequency, *deviations))
+        mode, allowed = values[columns["mode"]], "a mode from 1, frequency and deviations above 0"
+        right = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
         require(right, f"{path.name}, row {row}", value=",".join(cells)[:80], allowed=allowed)
         modes[int(mode)].append(values)
     return tuple(_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes))
 
 
-def _columns(path: Path, head: list[str]) -> _Columns:
-    match = HEAD.fullmatch(",".join(head))
-    names = [cell.strip() for cell in head]
-    floors = {int(name[1:]): column for column, name in enumerate(names) if name.startswith("q")}
-    is_complete = match is not None and len(floors) == sum(name.startswith("q") for name in names)
+def _columns(path: Path, head: list[str]) -> dict[str, int]:
+    """Column of each name in a header, each once."""
+    matches = [HEAD.fullmatch(cell) for cell in head]
+    names = [match[1].partition("[")[0].strip() if match else "" for match in matches]
+    columns = {name: column for column, name in enumerate(names)}
+    is_known = "" not in columns and {"mode", "frequency"} <= columns.keys()
+    is_complete = is_known and len(columns) == len(head)
     require(is_complete, f"{path.name}, header", value=",".join(head)[:80], allowed=ALLOWED)
-    assert match is not None
-    frequency_std = 2 if match["frequency"] else None
-    shape_std = (3 if match["frequency"] else 2) if match["shape"] else None
-    return _Columns(frequency_std, shape_std, floors)
+    return columns
 
 
-def _mode(path: Path, mode: int, values: Array, columns: _Columns) -> ModeRows:
+def _mode(path: Path, mode: int, values: Array, columns: dict[str, int]) -> ModeRows:
     """The measurements of one mode from its rows, shape (rows, columns)."""
-    amplitudes = {floor: values[:, column] for floor, column in columns.floors.items()}
+    floors = {int(name[1:]): k for name, k in columns.items() if name.startswith("q")}
+    amplitudes = {floor: values[:, column] for floor, column in floors.items()}
     missing = {floor: np.isnan(row) for floor, row in amplitudes.items()}
     if any(gaps.any() and not gaps.all() for gaps in missing.values()):
         allowed = "an amplitude of a floor in every row of a mode, or in none"
         raise RefusedError(f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
     shape = {floor: row for floor, row in amplitudes.items() if not missing[floor].all()}
-    frequencies, largest = values[:, 1], max((abs(x).mean() for x in shape.values()), default=0.0)
+    frequencies = values[:, columns["frequency"]]
+    largest = max((abs(x).mean() for x in shape.values()), default=0.0)
     return ModeRows(
         mode,
         frequencies,
         shape if len(shape) > 1 else {},
-        _share(values, columns.frequency_std, float(frequencies.mean())),
-        _share(values, columns.shape_std, float(largest)) if len(shape) > 1 else None,
+        _share(values, columns.get("frequency_std"), float(frequencies.mean())),
+        _share(values, columns.get("shape_std"), float(largest)) if len(shape) > 1 else None,
     )
 
 

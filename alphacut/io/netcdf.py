@@ -71,11 +71,7 @@ def read_summary(folder: ResultsFolder) -> Document:
 
 
 def require_same_run(summary: Document, folder: ResultsFolder) -> None:
-    """Refuses the files of another run in a folder.
-
-    Raises:
-        RefusedError: A file there is not of the run that wrote the summary.
-    """
+    """Refuses the files of another run in a folder."""
     listed = {name: part.fingerprint for name, part in folder.parts.items()}
     changed = [name for name, key in summary["fingerprints"].items() if listed.get(name) != key]
     require(

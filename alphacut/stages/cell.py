@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -65,7 +64,7 @@ def meaning(cell: AnyCell, modulus: ModulusSection) -> str:
     return "spheres" if cell.particles == "spheres" else AVERAGES[modulus.average]
 
 
-def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: object) -> Solve:
+def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any) -> Solve:
     """The model that the sections of a case name.
 
     Args:
@@ -78,23 +77,18 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: obj
         RefusedError: It needs what is not installed, or an option is out of range.
     """
     averages = meaning(cell, modulus) == "isotropic"
+    options = {"stiffness": averages, **elements}
     try:
-        model = _model(cell, mesh, modulus, {"stiffness": averages, **elements})
+        if isinstance(cell, RoundCell):
+            model: Solve = partial(solve_cells, _model_of_particle(cell, mesh, modulus, options))
+        else:
+            from alphacut.rve.prism.model import PrismModel
+
+            assert mesh.file is not None
+            model = partial(solve_samples, PrismModel(mesh=mesh.file, **options))
     except ImportError as error:
         raise RefusedError("modulus.method", modulus.method, "series", missing(error)) from None
     return partial(averaged, model) if averages else model
-
-
-def _model(
-    cell: AnyCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
-) -> Solve:
-    """`model_of` without the average of the plane stiffness."""
-    if isinstance(cell, MeshedCell):
-        from alphacut.rve.prism.model import PrismModel
-
-        assert mesh.file is not None
-        return partial(solve_samples, PrismModel(mesh=Path(mesh.file), **elements))
-    return partial(solve_cells, _model_of_particle(cell, mesh, modulus, elements))
 
 
 def _model_of_particle(
@@ -147,14 +141,17 @@ def particle_at(values: Mapping[str, float], radius: AnyRadius, cell: RoundCell)
 
 def modal_cell(radius: AnyRadius, cell: RoundCell) -> Cell:
     """The cell at the modal values."""
-    values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    return particle_at(values, radius, cell)
+    return particle_at(modal_values(radius, cell), radius, cell)
+
+
+def modal_values(radius: AnyRadius | ThetaSection, cell: AnyCell) -> dict[str, float]:
+    """Modal values of the inputs by name, in SI."""
+    return {name: number.modal for name, number in inputs_of(radius, cell).items()}
 
 
 def solve(radius: AnyRadius | ThetaSection, cell: AnyCell, model: Solve) -> HomogenisedStiffness:
     """The cell's result at the modal values of its inputs."""
-    values = {name: number.modal for name, number in inputs_of(radius, cell).items()}
-    return model([cell_at(values, radius, cell)])[0]
+    return model([cell_at(modal_values(radius, cell), radius, cell)])[0]
 
 
 def references(
@@ -255,11 +252,14 @@ def fibres(result: HomogenisedStiffness) -> Document:
     cell = result.cell
     if isinstance(result, HomogenisedSpheres) or cell is None or not cell.square or cell.interphase:
         return {}
-    constants, fibres = fibre_constants(result), {}
-    for name, value in constants.values.items():
-        key, unit = (name, 1.0) if name == "nu_LT" else (f"{name}_GPa", GPA)
-        fibres[key] = {"value": value / unit, "error": constants.errors[name] / unit}
-    return fibres
+    constants = fibre_constants(result)
+    return dict(_constant(x, value, constants.errors[x]) for x, value in constants.values.items())
+
+
+def _constant(name: str, value: float, error: float) -> tuple[str, Document]:
+    """Key and entry of a constant: a modulus in GPa, a ratio as it is; error None if unknown."""
+    key, unit = (name, 1.0) if name.startswith("nu") else (f"{name}_GPa", GPA)
+    return key, {"value": value / unit, "error": None if np.isnan(error) else error / unit}
 
 
 def stiffness_errors(result: HomogenisedStiffness) -> Array | None:
@@ -270,13 +270,10 @@ def stiffness_errors(result: HomogenisedStiffness) -> Array | None:
 
 def plane_constants(result: HomogenisedStiffness) -> Document:
     """Constants along x and y by definition and name, with their declared errors, in GPa."""
-    document: Document = {}
-    for definition, constants in engineering_constants(result).items():
-        for name, value, error in zip(NAMES, constants.values, constants.errors, strict=True):
-            key, unit = (name, 1.0) if name == "nu_xy" else (f"{name}_GPa", GPA)
-            shown = None if np.isnan(error) else error / unit
-            document.setdefault(definition, {})[key] = {"value": value / unit, "error": shown}
-    return document
+    return {
+        definition: dict(map(_constant, NAMES, constants.values, constants.errors))
+        for definition, constants in engineering_constants(result).items()
+    }
 
 
 def declared_errors(result: HomogenisedStiffness) -> Document | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from alphacut.case.structure import Structure
 from alphacut.frame.questions.peaks import Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
@@ -26,6 +24,8 @@ from alphacut.stages.store import Stage, StageResult, Work
 USUAL = Tolerance(1e-3, "")
 """Tolerance where none is named: a share of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
+PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+"""Bounds of peaks as `Peaks` names them."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,11 @@ class EnvelopeTask:
             RefusedError: No output has that unit.
         """
         units = {Output(x).unit for x in structure.outputs}
-        wanted = self.section.tolerance or USUAL
-        value, allowed = (
-            f"{wanted.value:g} {wanted.unit}",
-            f"a share, or {', '.join(sorted(units))}",
-        )
-        require(wanted.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
-        return wanted
+        tolerance = self.section.tolerance or USUAL
+        value = f"{tolerance.value:g} {tolerance.unit}"
+        allowed = f"a share, or {', '.join(sorted(units))}"
+        require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
+        return tolerance
 
     def is_motion_of(self, section: EnvelopeSection) -> bool:
         """True if it has the inputs and the duration of [envelope]."""
@@ -82,33 +80,23 @@ class EnvelopeTask:
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
-        result = self.envelope_of(structure, work.tick, work.parts)
+        relative = not self.tolerance(structure).unit
+        result = frame.envelope(**self.arguments(structure), relative=relative, **_run(work))
         signed = [name for name in self.limited if name != output_of(name)]
         of_envelope = peaks(result, [*map(str, result.outputs), *signed])
         if not has_close(of_envelope, self.limited):
             of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
         return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
 
-    def envelope_of(
-        self, structure: Structure, tick: Progress | None = None, parts: Path | None = None
-    ) -> frame.Envelope:
-        """The envelope by the method of the case; a proof keeps its parts in a folder, if any."""
-        return frame.envelope(
-            **self.arguments(structure),
-            relative=not self.tolerance(structure).unit,
-            store=parts,
-            interruptible=False,
-            progress=tick or False,
-        )
+    def compute_peaks(self, structure: Structure, work: Work, nodes: int = 1) -> StageResult:
+        """Peaks of the limited outputs alone, in the document, by the nodes in each step."""
+        return StageResult({"peak": by_output(self.close_peaks(structure, work, nodes))})
 
     def arguments(self, structure: Structure) -> dict[str, Any]:
         """Arguments of `frame.envelope` and of `frame.require_envelope` that the case names."""
         return {
+            **self._motion(structure),
             "model": structure.model,
-            "inputs": structure.inputs(self.fuzzy),
-            "duration": self.duration,
-            "step": self.section.step,
-            "alpha": self.section.alpha,
             "method": self.section.method,
             "integrator": self.section.integrator,
             **self.options(structure),
@@ -122,22 +110,26 @@ class EnvelopeTask:
             work: Where parts of a proof and progress go.
             nodes: Nodes in each step.
         """
+        model = structure.observing("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
-        return peaks(
-            frame.envelope(
-                structure.observing("limits", outputs_of(self.limited)),
-                structure.inputs(self.fuzzy),
-                duration=self.duration,
-                step=self.section.step / nodes,
-                alpha=self.section.alpha,
-                method=frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes),
-                relative=True,
-                store=work.parts,
-                interruptible=False,
-                progress=work.tick or False,
-            ),
-            self.limited,
-        )
+        method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
+        motion = self._motion(structure) | {"step": self.section.step / nodes}
+        result = frame.envelope(model, method=method, relative=True, **motion, **_run(work))
+        return peaks(result, self.limited)
+
+    def _motion(self, structure: Structure) -> dict[str, Any]:
+        """Fuzzy inputs, duration, step and levels, as arguments of `frame.envelope`."""
+        return {
+            "inputs": structure.inputs(self.fuzzy),
+            "duration": self.duration,
+            "step": self.section.step,
+            "alpha": self.section.alpha,
+        }
+
+
+def _run(work: Work) -> dict[str, Any]:
+    """Arguments of `frame.envelope` on progress, and on the folder from which a proof goes on."""
+    return {"store": work.parts, "interruptible": False, "progress": work.tick or False}
 
 
 def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
@@ -155,46 +147,24 @@ def has_close(peaks: Peaks, outputs: Sequence[str]) -> bool:
     return proved and bool((upper - reached <= PEAK_ERROR * np.abs(upper)).all())
 
 
-def compute_close_peaks(task: EnvelopeTask, structure: Structure, work: Work) -> StageResult:
-    """Peaks of the limited outputs in a motion that no study is of."""
-    return StageResult({"peak": by_output(task.close_peaks(structure, work))})
-
-
 def by_output(peaks: Peaks) -> Document:
-    """Peaks of each output by its name, each with its ends on all levels, in SI."""
+    """Peaks of each output by its name, each with its bounds on all levels, in SI."""
     return {
-        name: {
-            "lower": peaks.lower[:, column],
-            "upper": peaks.upper[:, column],
-            "error": peaks.error[:, column],
-            "reached": peaks.reached[:, column],
-            "least_proved": peaks.least_proved[:, column],
-            "least_reached": peaks.least_reached[:, column],
-            "nature": str(peaks.natures[column]),
-        }
+        name: {bound: getattr(peaks, bound)[:, column] for bound in PEAK_BOUNDS}
+        | {"nature": str(peaks.natures[column])}
         for column, name in enumerate(peaks.outputs)
     }
 
 
 def peaks_of(document: Document, alpha: Sequence[float]) -> Peaks:
     """Peaks from the document of `by_output`, where an infinite bound is None."""
-
-    def ends(name: str) -> Array:
-        unknown = -np.inf if name in ("lower", "reached", "least_proved") else np.inf
-        rows = [peak[name] for peak in document.values()]
-        return np.array([[unknown if x is None else x for x in row] for row in rows]).T
-
-    return Peaks(
-        alpha=np.array(alpha),
-        outputs=tuple(document),
-        lower=ends("lower"),
-        upper=ends("upper"),
-        error=ends("error"),
-        reached=ends("reached"),
-        least_proved=ends("least_proved"),
-        least_reached=ends("least_reached"),
-        natures=tuple(Nature(peak["nature"]) for peak in document.values()),
-    )
+    bounds: dict[str, Array] = {}
+    for bound in PEAK_BOUNDS:
+        infinite = -np.inf if bound in ("lower", "reached", "least_proved") else np.inf
+        levels = [[infinite if x is None else x for x in peak[bound]] for peak in document.values()]
+        bounds[bound] = np.array(levels).T
+    natures = tuple(Nature(peak["nature"]) for peak in document.values())
+    return Peaks(alpha=np.array(alpha), outputs=tuple(document), natures=natures, **bounds)
 
 
 def tasks(

@@ -31,7 +31,7 @@ from alphacut.rve.image.read import read_grey, require_phases
 from alphacut.rve.loss_factors import bulk_and_shear_losses
 from alphacut.rve.phase_energies import CONSTANTS, PhaseEnergies, first_order
 from alphacut.stages.cell import AVERAGES, GPA, isotropic_bounds
-from alphacut.stages.losses import LossCuts
+from alphacut.stages.losses import LossCuts, loss_document
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.segmentation import segmented
 
@@ -103,11 +103,8 @@ def compute_cuts(
         ends, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
         cuts_of = {name: ends[..., k] for k, name in enumerate(CONSTANTS)}
         variables |= {f"loss_{name}": (("alpha", "bound"), x) for name, x in cuts_of.items()}
-        facts["loss"] = {
-            **{name: {"lower": x[:, 0], "upper": x[:, 1]} for name, x in cuts_of.items()},
-            "error": dict(zip(CONSTANTS, map(float, errors), strict=True)),
-            "nature": str(Nature.ESTIMATED),
-        }
+        of_constants = dict(zip(CONSTANTS, map(float, errors), strict=True))
+        facts["loss"] = loss_document(cuts_of, of_constants, Nature.ESTIMATED)
     return StageResult(facts, xarray.Dataset(variables, axes, {"nature": NATURE}))
 
 

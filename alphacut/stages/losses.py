@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Self
@@ -11,6 +11,8 @@ import numpy as np
 
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.result import Nature
+from alphacut.io.files import Document
 from alphacut.rve.loss_factors import MAX_FIRST_ORDER, bulk_and_shear_losses, loss_factors
 from alphacut.rve.phase_energies import CONSTANTS
 from alphacut.rve.result import HomogenisedStiffness
@@ -76,3 +78,11 @@ def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Ar
     for corner in product(*map(range, ends.shape)):
         ends[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
     return ends, np.array(errors)
+
+
+def loss_document(
+    cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
+) -> Document:
+    """α-cuts of loss factors by the names of `CONSTANTS`, (levels, 2) each; errors and nature."""
+    ends = {name: {"lower": cut[:, 0], "upper": cut[:, 1]} for name, cut in cuts.items()}
+    return {**ends, "error": errors, "nature": str(nature)}

@@ -45,7 +45,7 @@ from alphacut.stages.cell import (
     references,
     solve,
 )
-from alphacut.stages.losses import LossCuts, loss_bounds
+from alphacut.stages.losses import LossCuts, loss_bounds, loss_document
 from alphacut.stages.plane import PLANE, plane_outputs
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.theta.quadrature import between_nodes
@@ -317,9 +317,9 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
         shown, key = (ends / GPA, f"{name}_GPa") if unit == "Pa" else (ends, name)
         cuts[key] = {"lower": shown[:, 0], "upper": shown[:, 1]}
-    if campaign.losses is not None:
-        for name, ends in loss_ends(result).items():
-            variables[f"loss_{name}"] = (CUT, ends, {"long_name": f"loss factor of {name}"})
+    losses = {} if campaign.losses is None else loss_ends(result)
+    for name, ends in losses.items():
+        variables[f"loss_{name}"] = (CUT, ends, {"long_name": f"loss factor of {name}"})
     about_points = {"long_name": "inputs, in SI"}
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
     words = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
@@ -348,11 +348,9 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         "checks": _largest(result, "check"),
         "references": references(campaign.radius, campaign.cell, campaign.stated_fraction),
     }
-    data = xarray.Dataset(variables, coordinates)
-    if campaign.losses is not None:
-        facts = {"error": campaign.loss_errors(result), "nature": str(Nature.ATTAINED)}
-        document["loss"] = loss_document(data) | facts
-    return StageResult(document, data)
+    if losses:
+        document["loss"] = loss_document(losses, campaign.loss_errors(result), Nature.ATTAINED)
+    return StageResult(document, xarray.Dataset(variables, coordinates))
 
 
 def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
@@ -381,12 +379,6 @@ def loss_ends(result: Bounds) -> dict[str, Array]:
     }
 
 
-def loss_document(data: xarray.Dataset) -> Document:
-    """α-cuts of the loss factors."""
-    cuts = {name: data[f"loss_{name}"].values for name in CONSTANTS}
-    return {name: {"lower": x[:, 0], "upper": x[:, 1]} for name, x in cuts.items()}
-
-
 def _largest(result: Bounds, kind: str) -> dict[str, float]:
     """Largest of each error or property of the certificate over all samples."""
     assert result.samples is not None
@@ -412,23 +404,25 @@ def loss_of(data: xarray.Dataset) -> FuzzyNumber | None:
     """The fuzzy loss factor of E; None where the phases have none."""
     if "loss_E" not in data:
         return None
-    alpha, ends = data["alpha"].values, data["loss_E"].transpose("alpha", "bound").values
-    if tuple(alpha) == (1.0,):
-        return Crisp(float(ends.mean()))
-    return outer_steps(alpha, ends[:, 0], ends[:, 1])
+    return _stepped(data, "loss_E")
 
 
 def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
-    """The fuzzy modulus in Pa; between two levels the wider cut holds.
+    """The fuzzy modulus in Pa.
 
     Raises:
         RefusedError: There is none, or it is not positive, or lacks the levels 0 and 1.
     """
     require("E" in data, key, value="without E", allowed="a modulus.nc of this program")
-    alpha, ends = data["alpha"].values, data["E"].transpose("alpha", "bound").values
-    require(ends.min() > 0, key, value=f"{ends.min() / GPA:.3g} GPa", allowed="a modulus above 0")
-    levels = tuple(float(level) for level in alpha)
-    require_levels(levels, key)
-    if levels == (1.0,):
+    least = float(data["E"].min())
+    require(least > 0, key, value=f"{least / GPA:.3g} GPa", allowed="a modulus above 0")
+    require_levels(tuple(map(float, data["alpha"].values)), key)
+    return _stepped(data, "E")
+
+
+def _stepped(data: xarray.Dataset, name: str) -> FuzzyNumber:
+    """Fuzzy number of stored α-cuts; between two levels the wider cut holds."""
+    alpha, ends = data["alpha"].values, data[name].transpose("alpha", "bound").values
+    if tuple(alpha) == (1.0,):
         return Crisp(float(ends.mean()))
     return outer_steps(alpha, ends[:, 0], ends[:, 1])

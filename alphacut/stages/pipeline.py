@@ -195,7 +195,7 @@ class Pipeline:
         if not task.limited:
             return None
         inputs = [structure.model, structure.numbers, task]
-        compute = partial(envelope.compute_close_peaks, task, structure)
+        compute = partial(task.compute_peaks, structure)
         result = self.store.take(Stage("peaks", inputs, ("fuzzy", "frame"), compute))
         return peaks_of(result.document["peak"], alpha)
 

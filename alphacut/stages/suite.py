@@ -22,8 +22,8 @@ from alphacut.io.files import Document
 from alphacut.questions.question import SuiteMotion
 from alphacut.records.recording import arias_shares
 from alphacut.records.spectrum import spectral_acceleration
-from alphacut.stages.envelope import EnvelopeTask, by_output, peaks_of
-from alphacut.stages.store import Stage, StageResult, Work
+from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, by_output, peaks_of
+from alphacut.stages.store import Stage, StageResult
 
 FREE_PERIODS = 5
 """Natural periods of free motion after a record: by then 5 % damping leaves a fifth."""
@@ -158,17 +158,17 @@ def _stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Sta
     moved = under(structure, record)
     of_record = replace(task, name=record.name, duration=record.duration)
     inputs = [moved.model, moved.numbers, of_record]
-    return Stage(stage_name(record), inputs, ("fuzzy", "frame"), partial(compute, of_record, moved))
+    return Stage(
+        stage_name(record),
+        inputs,
+        ("fuzzy", "frame"),
+        partial(of_record.compute_peaks, moved, nodes=NODES),
+    )
 
 
 def stage_name(record: SuiteRecord) -> str:
     """Name of the files of a record's result."""
     return f"record_{record.name}"
-
-
-def compute(task: EnvelopeTask, structure: Structure, work: Work) -> StageResult:
-    """Peaks of the outputs under one record."""
-    return StageResult({"peak": by_output(task.close_peaks(structure, work, NODES))})
 
 
 def peaks_by_record(
@@ -196,8 +196,7 @@ def any_record(peaks: Mapping[str, Peaks]) -> Peaks:
     """
     first = next(iter(peaks.values()))
     ends = {
-        name: np.max([getattr(x, name) for x in peaks.values()], axis=0)
-        for name in ("lower", "upper", "error", "reached", "least_proved", "least_reached")
+        name: np.max([getattr(x, name) for x in peaks.values()], axis=0) for name in PEAK_BOUNDS
     }
     columns = zip(*(x.natures for x in peaks.values()), strict=True)
     return replace(first, natures=tuple(map(Nature.weakest, columns)), **ends)
