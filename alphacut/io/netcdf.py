@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import Document
-from alphacut.io.manifest import RUN, ResultsFolder, is_plain
+from alphacut.io.manifest import COMPLETE, RUN_AGAIN, ResultsFolder, is_plain
 
 if TYPE_CHECKING:
     import xarray
@@ -84,5 +84,4 @@ def require_same_run(summary: Document, folder: ResultsFolder) -> None:
 
 def damaged(folder: ResultsFolder, what: str) -> RefusedError:
     """The error of results that cannot be used."""
-    cure = f"make it anew by {RUN}"
-    return RefusedError(str(folder.path), what, "whole results of a run", cure)
+    return RefusedError(str(folder.path), what, COMPLETE, RUN_AGAIN)

@@ -262,6 +262,11 @@ def _constant(name: str, value: float, error: float) -> tuple[str, Document]:
     return key, {"value": value / unit, "error": None if np.isnan(error) else error / unit}
 
 
+def as_cut(bounds: Array) -> Document:
+    """Lower and upper bounds of a quantity on each level, from shape (levels, 2)."""
+    return {"lower": bounds[:, 0], "upper": bounds[:, 1]}
+
+
 def stiffness_errors(result: HomogenisedStiffness) -> Array | None:
     """Declared errors of the entries of a plane stiffness, in GPa; None where there are none."""
     errors = result.stiffness_errors if result.errors else None

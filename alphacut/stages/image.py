@@ -30,7 +30,7 @@ from alphacut.rve.image.phase_images import ModuliImages, moduli_images, thresho
 from alphacut.rve.image.read import read_grey, require_phases
 from alphacut.rve.loss_factors import bulk_and_shear_losses
 from alphacut.rve.phase_energies import CONSTANTS, PhaseEnergies, first_order
-from alphacut.stages.cell import AVERAGES, GPA, isotropic_bounds
+from alphacut.stages.cell import AVERAGES, GPA, as_cut, isotropic_bounds
 from alphacut.stages.losses import LossCuts, loss_document
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.segmentation import segmented
@@ -138,7 +138,10 @@ def _widths(
 
 def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) -> Document:
     """The bounds; moduli in GPa."""
-    top, ends = cuts[-1], [[cut.modulus[end] / GPA for cut in cuts] for end in (0, 1)]
+    top, sizes = cuts[-1], [1.0 if name == "nu_xy" else GPA for name in NAMES]
+    keys = [name if name == "nu_xy" else f"{name}_GPa" for name in NAMES]
+    constants = np.array([cut.constants for cut in cuts])
+    young = np.array([cut.modulus for cut in cuts])
     return {
         "lower_GPa": top.bounds.lower / GPA,
         "upper_GPa": top.bounds.upper / GPA,
@@ -147,16 +150,13 @@ def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) 
         "G_T_GPa": _pair(top.bounds.shear(average)),
         "average": AVERAGES[average],
         "plane": {
-            name + ("" if name == "nu_xy" else "_GPa"): {
-                end: [cut.constants[k, side] / (1.0 if name == "nu_xy" else GPA) for cut in cuts]
-                for side, end in enumerate(("lower", "upper"))
-            }
-            for k, name in enumerate(NAMES)
+            key: as_cut(constants[:, k] / size)
+            for k, (key, size) in enumerate(zip(keys, sizes, strict=True))
         },
         "nature": NATURE,
         "cuts": {
             "alpha": alpha,
-            "E_GPa": {"lower": ends[0], "upper": ends[1]},
+            "E_GPa": as_cut(young / GPA),
             "nature": [NATURE] * len(cuts),
         },
     }

@@ -16,6 +16,7 @@ from alphacut.io.files import Document
 from alphacut.rve.loss_factors import MAX_FIRST_ORDER, bulk_and_shear_losses, loss_factors
 from alphacut.rve.phase_energies import CONSTANTS
 from alphacut.rve.result import HomogenisedStiffness
+from alphacut.stages.cell import as_cut
 
 Losses = tuple[FuzzyNumber, FuzzyNumber | None]
 """Loss factor of a phase's Young's modulus, and of its bulk modulus where that is another."""
@@ -84,5 +85,5 @@ def loss_document(
     cuts: Mapping[str, Array], errors: Mapping[str, float], nature: Nature
 ) -> Document:
     """α-cuts of loss factors by the names of `CONSTANTS`, (levels, 2) each; errors and nature."""
-    ends = {name: {"lower": cut[:, 0], "upper": cut[:, 1]} for name, cut in cuts.items()}
-    return {**ends, "error": errors, "nature": str(nature)}
+    documents = {name: as_cut(cut) for name, cut in cuts.items()}
+    return {**documents, "error": errors, "nature": str(nature)}

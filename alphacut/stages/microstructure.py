@@ -10,6 +10,7 @@ import numpy as np
 from alphacut.case.material import RadiusMapSection
 from alphacut.case.particles import MicrostructureSection
 from alphacut.fuzzy.campaign.workers import pool
+from alphacut.io.columns import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
 from alphacut.stages.store import Stage, StageResult, Work
@@ -60,5 +61,5 @@ def write(map_of: Microstructure, numbers: Document, folder: Path, *, figures: b
 def _circles(map_of: Microstructure) -> str:
     """The circles seen in an image as a CSV file, lengths in m."""
     discs = map_of.sections[0].particles
-    rows = np.column_stack([discs.centres, discs.radii])
-    return "x [m],y [m],r [m]\n" + "".join(f"{x:.7g},{y:.7g},{r:.7g}\n" for x, y, r in rows)
+    x, y = np.transpose(discs.centres)
+    return columns_text({"x [m]": x, "y [m]": y, "r [m]": discs.radii})

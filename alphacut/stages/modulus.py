@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,7 @@ from alphacut.stages.cell import (
     SPHERES,
     AnyCell,
     Solve,
+    as_cut,
     cell_at,
     inputs_of,
     meaning,
@@ -73,6 +75,8 @@ FIBRES = {
     "G_L": ("Pa", "shear modulus along the fibres"),
 }
 """Constants of cylinders besides; see rve.fibre_constants."""
+QUANTITIES = BOUNDS | FIBRES | PLANE
+"""Unit and meaning of each output that has α-cuts."""
 CUT = ("alpha", "bound")
 OUTPUTS = ("E", "nu")
 PLANS: dict[str, Plan] = {
@@ -169,17 +173,20 @@ class CellCampaign:
 
     @property
     def identity(self) -> Document:
-        """Origin of a sample besides its fuzzy inputs: sections, program."""
-        modulus = self.modulus.model_dump(exclude={"plan", "alpha"})
+        """What the outputs of a sample depend on besides its fuzzy inputs, for the store."""
         crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
-        mesh = {"file": self.mesh.file and file_digest(self.mesh.file)}
-        mesh |= self.mesh.model_dump(exclude={"file"})
-        options = [mesh, self.cell.particles, dict(self.petsc)]
-        source = [source_digest(("stochastic", "rve")), versions()]
-        stiffness = repr(self.cell.model_dump(include={"inclusion_modulus", "phases"}))
-        sections = [modulus, options, crisp, repr(self.radius.theta), stiffness]
-        sections += [repr((self.cell.losses, self.modulus.alpha))] if self.cell.losses else []
-        return {"sections": sections, "source": source}
+        sections = {
+            "modulus": self.modulus.model_dump(exclude={"plan", "alpha"}),
+            "mesh": self.mesh.model_dump(exclude={"file"}),
+            "mesh_file": self.mesh.file and file_digest(self.mesh.file),
+            "petsc": dict(self.petsc),
+            "particles": self.cell.particles,
+            "inputs": crisp,
+            "theta": self.radius.theta,
+            "stiffness": repr(self.cell.model_dump(include={"inclusion_modulus", "phases"})),
+            "losses": repr((self.cell.losses, self.modulus.alpha)) if self.cell.losses else "",
+        }
+        return {**sections, "source": source_digest(("stochastic", "rve")), "versions": versions()}
 
     @property
     def propagation(self) -> Callable[..., Bounds]:
@@ -298,48 +305,51 @@ def stage(campaign: CellCampaign) -> Stage:
 
 
 def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
-    """α-cuts of every quantity (alpha, bound), where reached, all samples, and a document."""
+    """The α-cuts with all samples as a dataset, and the numbers of `document`."""
+    losses = {} if campaign.losses is None else loss_cuts(result)
+    return StageResult(document(result, campaign, losses), dataset(result, campaign, losses))
+
+
+def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> xarray.Dataset:
+    """α-cuts over (alpha, bound), the inputs that reach them (NAME_at), and samples, in SI."""
     import xarray
 
     samples = result.samples
     assert samples is not None
     variables: dict[str, Any] = {}
-    cuts: dict[str, Document] = {}
-    for name, (unit, about) in (BOUNDS | FIBRES | PLANE).items():
-        if name not in result.outputs:
-            continue
-        words, column = {"units": unit, "long_name": about}, result.column(name)
-        ends = np.stack(result.bounds(name), axis=1)
-        places = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
-        reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
-        variables[name] = (CUT, ends, words)
-        variables[f"{name}_at"] = ((*CUT, "parameter"), places, reached)
-        variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
-        shown, key = (ends / GPA, f"{name}_GPa") if unit == "Pa" else (ends, name)
-        cuts[key] = {"lower": shown[:, 0], "upper": shown[:, 1]}
-    losses = {} if campaign.losses is None else loss_ends(result)
-    for name, ends in losses.items():
-        variables[f"loss_{name}"] = (CUT, ends, {"long_name": f"loss factor of {name}"})
+    for name, (unit, about) in QUANTITIES.items():
+        if name in result.outputs:
+            words, column = {"units": unit, "long_name": about}, result.column(name)
+            points = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
+            reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
+            variables[name] = (CUT, np.stack(result.bounds(name), axis=1), words)
+            variables[f"{name}_at"] = ((*CUT, "parameter"), points, reached)
+            variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
+    for name, cut in losses.items():
+        variables[f"loss_{name}"] = (CUT, cut, {"long_name": f"loss factor of {name}"})
     about_points = {"long_name": "inputs, in SI"}
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
     words = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
     variables["curve11"] = (("sample", "theta"), samples.values.output("curve11"), words)
-    coordinates = {
-        "theta": theta_of(campaign.radius),
-        "alpha": result.alpha,
-        "bound": ["lower", "upper"],
-        "parameter": list(result.inputs),
-    }
-    document = {
+    coordinates = {"theta": theta_of(campaign.radius), "alpha": result.alpha}
+    axes = {"bound": ["lower", "upper"], "parameter": list(result.inputs)}
+    return xarray.Dataset(variables, coordinates | axes)
+
+
+def document(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> Document:
+    """α-cuts, moduli in GPa; their nature, errors, references and cost."""
+    assert result.samples is not None
+    cuts = cut_documents(result, BOUNDS)
+    numbers: Document = {
         "alpha": result.alpha,
         "E_GPa": cuts["E_GPa"],
         "nu_cuts": cuts["nu"],
-        "fibres": {key: cut for key, cut in cuts.items() if key.removesuffix("_GPa") in FIBRES},
-        "plane": {key: cut for key, cut in cuts.items() if key.removesuffix("_GPa") in PLANE},
+        "fibres": cut_documents(result, FIBRES),
+        "plane": cut_documents(result, PLANE),
         "method": campaign.modulus.method,
         "plan": result.method,
         "samples": result.evaluations,
-        "solves": int(samples.values.output("systems").sum()),
+        "solves": int(result.samples.values.output("systems").sum()),
         "seconds": result.seconds,
         "nature": str(result.nature_of("E")),
         "particles": campaign.cell.particles,
@@ -349,8 +359,18 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
         "references": references(campaign.radius, campaign.cell, campaign.stated_fraction),
     }
     if losses:
-        document["loss"] = loss_document(losses, campaign.loss_errors(result), Nature.ATTAINED)
-    return StageResult(document, xarray.Dataset(variables, coordinates))
+        numbers["loss"] = loss_document(losses, campaign.loss_errors(result), Nature.ATTAINED)
+    return numbers
+
+
+def cut_documents(result: Bounds, quantities: Mapping[str, tuple[str, str]]) -> Document:
+    """α-cuts of those quantities that a result has, moduli in GPa by NAME_GPa."""
+    cuts: Document = {}
+    for name, (unit, _) in quantities.items():
+        if name in result.outputs:
+            size, key = (GPA, f"{name}_GPa") if unit == "Pa" else (1.0, name)
+            cuts[key] = as_cut(np.stack(result.bounds(name), axis=1) / size)
+    return cuts
 
 
 def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
@@ -359,28 +379,20 @@ def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Arra
     return {"loss_lower": ends[:, 0], "loss_upper": ends[:, 1], "loss_error": np.nan_to_num(errors)}
 
 
-def loss_ends(result: Bounds) -> dict[str, Array]:
+def loss_cuts(result: Bounds) -> dict[str, Array]:
     """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
 
-    The outputs of a sample are the ends for the cuts of the losses on every level; on its level the
-    one of the same number counts.
+    A sample has their bounds for the phases' cuts on every level; level k takes those of level k.
     """
-    return {
-        name: np.array(
-            [
-                [
-                    result.lower[level, result.column(f"loss_lower[{level}][{k}]")],
-                    result.upper[level, result.column(f"loss_upper[{level}][{k}]")],
-                ]
-                for level in range(len(result.alpha))
-            ]
-        )
-        for k, name in enumerate(CONSTANTS)
-    }
+    cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
+    for (k, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
+        columns = [result.column(f"loss_{end}[{level}][{k}]") for end in ("lower", "upper")]
+        cuts[name][level] = result.lower[level, columns[0]], result.upper[level, columns[1]]
+    return cuts
 
 
 def _largest(result: Bounds, kind: str) -> dict[str, float]:
-    """Largest of each error or property of the certificate over all samples."""
+    """Largest value over all samples of each output KIND:NAME, by NAME."""
     assert result.samples is not None
     values = result.samples.values
     return {
@@ -391,11 +403,7 @@ def _largest(result: Bounds, kind: str) -> dict[str, float]:
 
 
 def require_levels(alpha: tuple[float, ...], key: str) -> None:
-    """Requires levels of a modulus that a structure takes.
-
-    Raises:
-        RefusedError: They do not go from 0 to 1, and are not 1 alone.
-    """
+    """Refuses levels of a structure's modulus that neither go from 0 to 1 nor are 1 alone."""
     complete = alpha == (1.0,) or (alpha[0], alpha[-1]) == (0, 1)
     require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")
 
