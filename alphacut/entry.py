@@ -16,7 +16,7 @@ from alphacut.commands.options import (
     PETSC_LOG,
     Command,
     Parser,
-    read,
+    read_case,
     require_petsc,
     split_petsc,
 )
@@ -177,7 +177,7 @@ def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> in
         if PETSC_LOG not in petsc:
             return command.run(options, out)
         if "case" in options:
-            read(options)
+            read_case(options)
         del petsc[PETSC_LOG]
         from alphacut.rve.fenicsx import log_on_standard_error
 

@@ -32,7 +32,7 @@ from alphacut.case.motion import EnvelopeSection, Identify, Study
 from alphacut.case.particles import MicrostructureSection
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Frame, MaterialDamping, Pendulum, Structure
-from alphacut.case.types import Section, Some, after, require_alone, unlike
+from alphacut.case.types import NotEmpty, Section, after, distinct, require_alone
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.rve.outline import CLOSEST
@@ -45,7 +45,7 @@ class Content(Section):
 
     title: str = Field(description="one line, for figures and the report")
     about: str = Field(default="", description="a paragraph: what the case shows")
-    stages: Annotated[tuple[Stage, ...], Some, after(unlike)] = Field(
+    stages: Annotated[tuple[Stage, ...], NotEmpty, after(distinct)] = Field(
         description="stages that `alphacut run` computes"
     )
     microstructure: MicrostructureSection | None = None
@@ -101,7 +101,7 @@ class Content(Section):
 
     @property
     def stated_fraction(self) -> float | None:
-        """Share of the cell that the particles take as the case says, at its modal value."""
+        """Fraction of the cell that the particles take as the case says, at its modal value."""
         if self.microstructure is not None and self.microstructure.packing is not None:
             return self.microstructure.packing.fraction
         if self.round is None or self.round.fraction is None:

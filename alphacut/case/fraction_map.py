@@ -15,7 +15,7 @@ class FractionMap:
     """Random radius without chance: particles of one share of the cell at all θ.
 
     Args:
-        fraction: Share of area or volume, crisp or fuzzy.
+        fraction: Fraction of area or volume, crisp or fuzzy.
         shape: Discs or spheres.
         theta: Support of θ.
     """

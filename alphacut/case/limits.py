@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from alphacut.case.structure import Structure
-from alphacut.case.types import Quantity, Section, Some
+from alphacut.case.types import NotEmpty, Quantity, Section
 from alphacut.frame.questions.peaks import output_of
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.refused import RefusedError, require
@@ -87,7 +87,7 @@ def _number(text: str, unit: str) -> float:
 
 
 AnyLimit = Annotated[Limit, PlainValidator(parse_limit, json_schema_input_type=str)]
-Limits = Annotated[tuple[AnyLimit, ...], Some]
+Limits = Annotated[tuple[AnyLimit, ...], NotEmpty]
 
 
 class QuestionSection(Section):
@@ -179,7 +179,7 @@ class TolerancesSection(QuestionSection):
 
 
 class FragilitySection(QuestionSection):
-    """Share of the suite's records under which limits are exceeded, over a measure of records."""
+    """Fraction of the records under which limits are exceeded, over a measure of records."""
 
     key = "fragility"
     reads_peaks = True

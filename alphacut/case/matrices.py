@@ -18,7 +18,7 @@ from alphacut.case.structure import (
     ratios_of,
     read_accelerogram,
 )
-from alphacut.case.types import Section, Some, after, case_file, text, unlike
+from alphacut.case.types import NotEmpty, Section, after, case_file, distinct, text
 from alphacut.frame import Accelerogram, MatrixStructure
 from alphacut.frame.structures.energy_shares import modal_energy_shares
 from alphacut.frame.structures.monomial import Monomial
@@ -78,12 +78,14 @@ class MatricesSection(Section):
     A modulus that a stage computes takes the place of parameter E.
     """
 
-    unknowns: Annotated[tuple[str, ...], Some, after(unlike)] = Field(
+    unknowns: Annotated[tuple[str, ...], NotEmpty, after(distinct)] = Field(
         description="names of the unknowns in the order of the matrices, as NODE.DIRECTION"
     )
     parameters: Parameters = Field(description="quantities, crisp or fuzzy, by name")
-    mass: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of M")
-    stiffness: Annotated[tuple[Term, ...], Some] = Field(description="pairs [factor, file] of K")
+    mass: Annotated[tuple[Term, ...], NotEmpty] = Field(description="pairs [factor, file] of M")
+    stiffness: Annotated[tuple[Term, ...], NotEmpty] = Field(
+        description="pairs [factor, file] of K"
+    )
     damping: tuple[Term, ...] = Field(default=(), description="pairs [factor, file] of D")
     damping_ratio: DampingRatio | None = Field(default=None, description=RATIO_WORDS)
     direction: str | dict[str, float] = Field(

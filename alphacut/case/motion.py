@@ -11,11 +11,11 @@ from pydantic import Field, ValidationInfo
 from alphacut.case.types import (
     ALPHA,
     CaseFile,
+    Fraction,
     Levels,
     Names,
     Quantity,
     Section,
-    Share,
     Time,
     after,
     text,
@@ -122,9 +122,9 @@ class Identify(Section):
     held_out: tuple[Annotated[int, Quantity(least=1, is_integer=True)], ...] = Field(
         default=(), description="modes that are predicted and not learned from"
     )
-    frequency_deviation: Share | None = Field(
+    frequency_deviation: Fraction | None = Field(
         default=None, description="standard deviation of a frequency as a share of it"
     )
-    shape_deviation: Share | None = Field(
+    shape_deviation: Fraction | None = Field(
         default=None, description="standard deviation of an amplitude, over the mode's largest"
     )

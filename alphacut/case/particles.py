@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from alphacut.case.types import CaseFile, Length, Quantity, Section, Share, after, rising
+from alphacut.case.types import CaseFile, Fraction, Length, Quantity, Section, after, rising
 from alphacut.fuzzy.refused import require
 from alphacut.stochastic.microstructure import MicrostructureStudy
 from alphacut.stochastic.particles.circles_csv import CircleFile
@@ -94,7 +94,7 @@ class MicrostructureSection(Section):
     seed: Annotated[int, Quantity(least=0, most=1e18, is_integer=True)] = Field(
         description="seed of everything left to chance"
     )
-    limits: Annotated[tuple[Share, Share], after(rising)] | None = Field(
+    limits: Annotated[tuple[Fraction, Fraction], after(rising)] | None = Field(
         default=None, description="lower and upper limit of r/a"
     )
     packing: PackingSection | None = None

@@ -9,7 +9,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from alphacut.case.types import OneOrMany, Section, Some, text
+from alphacut.case.types import NotEmpty, OneOrMany, Section, text
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io import quantity
 from alphacut.records.read import read_recording
@@ -97,7 +97,7 @@ class RecordsSection(Section):
     five natural periods, and at most envelope.duration.
     """
 
-    files: Annotated[tuple[Files, ...], OneOrMany, Some] = Field(
+    files: Annotated[tuple[Files, ...], OneOrMany, NotEmpty] = Field(
         description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")

@@ -155,7 +155,7 @@ class _OneOrMany:
 
 
 OneOrMany = _OneOrMany()
-Some = BeforeValidator(_not_empty)
+NotEmpty = BeforeValidator(_not_empty)
 
 
 def rising(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -181,7 +181,7 @@ def case_file(value: object, info: ValidationInfo) -> Path:
     return folder / value
 
 
-def unlike(values: tuple[str, ...]) -> tuple[str, ...]:
+def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
     """Names, each once.
 
     Raises:
@@ -200,7 +200,7 @@ def require_alone(key: str, is_there: bool, other: str) -> None:
 after = AfterValidator
 """A check of a value that has its type."""
 CaseFile = Annotated[Path, text(case_file)]
-Names = Annotated[tuple[str, ...], OneOrMany, after(unlike)]
+Names = Annotated[tuple[str, ...], OneOrMany, after(distinct)]
 
 Modulus = Annotated[FuzzyNumber, Quantity("Pa", above=0, fuzzy=True)]
 
@@ -226,7 +226,7 @@ Ratio = Annotated[FuzzyNumber, Quantity(above=-1, below=0.5, fuzzy=True)]
 
 Time = Annotated[float, Quantity("s", above=0)]
 Length = Annotated[float, Quantity("m", above=0)]
-Share = Annotated[float, Quantity(above=0, below=1)]
+Fraction = Annotated[float, Quantity(above=0, below=1)]
 Level = Annotated[float, Quantity(least=0, most=1)]
 Levels = Annotated[tuple[Level, ...], after(rising)]
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)

@@ -10,7 +10,7 @@ from typing import TextIO
 import numpy as np
 
 from alphacut.case.content import Content
-from alphacut.commands.options import Command, add_common, answer, read
+from alphacut.commands.options import Command, add_common, read_case, write_answer
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.files import Document, ranks
 from alphacut.report.results import ISOTROPIC, fibre_label
@@ -48,7 +48,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves and reports."""
-    content = read(options).content
+    content = read_case(options).content
     radius, phases = content.round_cell if content.meshed is None else content.meshed_cell
     elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)
     if options.export:
         document["export"] = export(content, Path(options.export))
-    answer(options, document, out, summary(result, document))
+    write_answer(options, document, out, summary(result, document))
     return 0
 
 

@@ -12,7 +12,7 @@ from alphacut.case.keys import quantity_of
 from alphacut.case.records import RecordsSection
 from alphacut.case.structure import Structure
 from alphacut.case.types import Section
-from alphacut.commands.options import Command, add_common, answer, read
+from alphacut.commands.options import Command, add_common, read_case, write_answer
 from alphacut.frame import MatrixStructure, StoreyFrame
 from alphacut.frame.structures.linear import frequencies
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval, Trapezoidal, Triangular
@@ -20,7 +20,7 @@ from alphacut.io.quantity import engineering
 from alphacut.report.results import GRAVITY
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
-from alphacut.stages.readiness import overhangs, require_runnable
+from alphacut.stages.readiness import cut_record_warnings, require_runnable
 from alphacut.stages.suite import SuiteRecord, suite, warnings
 
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
@@ -29,7 +29,7 @@ Row = tuple[str, str, str]
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Checks and reports."""
-    content = read(options).content
+    content = read_case(options).content
     require_runnable(content)
     rows, linear = list(rows_of("", content)), structure(content)
     period = 2 * pi / float(frequencies(linear)[0]) if linear else None
@@ -46,11 +46,13 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         peak = engineering(record.extremes[0], "m/s^2")
         in_g = f"{record.extremes[0] / GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, peak {peak}, {in_g}\n"
-        text += "".join(f"{words}\n" for words in overhangs(content, Structure(linear, {})))
+        text += "".join(
+            f"{words}\n" for words in cut_record_warnings(content, Structure(linear, {}))
+        )
     if content.records is not None and content.envelope is not None and linear:
         moved = Structure(linear, {})
         text += records_text(content.records, suite(content.records, content.envelope, moved))
-    answer(options, document, out, f"{text}{options.case}: no problems\n")
+    write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 
 

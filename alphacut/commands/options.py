@@ -12,7 +12,7 @@ from typing import NoReturn, TextIO
 
 from alphacut.case.load import Case, load
 from alphacut.fuzzy.refused import RefusedError, require
-from alphacut.io.files import alone, as_json, rank, require_writable, say, write_text
+from alphacut.io.files import as_json, locked, rank, require_writable, say, write_text
 from alphacut.io.manifest import MANIFEST, ResultsFolder
 from alphacut.io.problem import BadInput, InputProblem, suggestion
 from alphacut.stages.store import StageStore
@@ -111,7 +111,7 @@ def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is ke
     parser.add_argument("--workers", metavar="N", type=int, default=1, help="processes (default 1)")
 
 
-def read(options: argparse.Namespace) -> Case:
+def read_case(options: argparse.Namespace) -> Case:
     """The case, changed as the options say.
 
     Raises:
@@ -126,7 +126,9 @@ def read(options: argparse.Namespace) -> Case:
 
 
 @contextmanager
-def opened(options: argparse.Namespace, folder: str = "") -> Iterator[tuple[Case, StageStore]]:
+def open_results(
+    options: argparse.Namespace, folder: str = ""
+) -> Iterator[tuple[Case, StageStore]]:
     """The case, and the store of its results, which no other run writes into meanwhile.
 
     Args:
@@ -140,14 +142,14 @@ def opened(options: argparse.Namespace, folder: str = "") -> Iterator[tuple[Case
     require(
         options.workers >= 1, "--workers", value=options.workers, allowed="a whole number 1 or more"
     )
-    case, path = read(options), options.out or folder
+    case, path = read_case(options), options.out or folder
     fresh = getattr(options, "fresh", False)
     store = StageStore(None, case.text, fresh, options.quiet, options.workers)
     if not path:
         yield case, store
         return
     require_writable("--out", path, folder=True)
-    with alone("--out", Path(path)) if rank() == 0 else nullcontext():
+    with locked("--out", Path(path)) if rank() == 0 else nullcontext():
         results = ResultsFolder.opened(Path(path))
         if results.is_lost:
             say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
@@ -156,7 +158,7 @@ def opened(options: argparse.Namespace, folder: str = "") -> Iterator[tuple[Case
         yield case, replace(store, folder=results)
 
 
-def answer(
+def write_answer(
     options: argparse.Namespace, document: Mapping[str, object], out: TextIO, text: str = ""
 ) -> None:
     """Writes the result: as JSON where it is requested, else `text` on standard output."""

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TextIO
 
 from alphacut.case.load import Case
-from alphacut.commands.options import Command, add_quiet, add_run, answer, opened
+from alphacut.commands.options import Command, add_quiet, add_run, open_results, write_answer
 from alphacut.figures.all import draw_figures
 from alphacut.fuzzy.campaign.workers import pool
 from alphacut.fuzzy.refused import require
-from alphacut.io.files import Document, alone, as_json, say, write_text
+from alphacut.io.files import Document, as_json, locked, say, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import read_summary
 from alphacut.io.provenance import FORMAT, command, door, versions
@@ -38,9 +38,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Computes, draws, reports."""
     folder = options.out or f"results/{Path(options.case).stem}"
-    with opened(options, folder) as (case, store):
-        document = computed(case, store, options.petsc, figures=not options.no_figures)
-    answer(options, document, out, run_text(document))
+    with open_results(options, folder) as (case, store):
+        document = compute_run(case, store, options.petsc, figures=not options.no_figures)
+    write_answer(options, document, out, run_text(document))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {document['seconds']:.0f} s")
         if store.taken:
@@ -49,7 +49,9 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     return 0
 
 
-def computed(case: Case, store: StageStore, petsc: Mapping[str, str], *, figures: bool) -> Document:
+def compute_run(
+    case: Case, store: StageStore, petsc: Mapping[str, str], *, figures: bool
+) -> Document:
     """The numbers and figures of a case; summary.json is written last."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
@@ -96,7 +98,7 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
     page = render_page(folder)
     path = Path(options.out) if options.out else folder.path / PAGE
     if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
-        with alone("FOLDER", folder.path):
+        with locked("FOLDER", folder.path):
             put_text(ResultsFolder.opened(folder.path), PAGE, page)
     else:
         write_text(path, page)
@@ -106,7 +108,7 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
     if options.tables:
         files += write_markup(tables(summary), Path(options.tables))
     document = {"file": str(path), "bytes": len(page.encode()), "tables": [*map(str, files)]}
-    answer(options, document, out, "".join(f"{file}\n" for file in (path, *files)))
+    write_answer(options, document, out, "".join(f"{file}\n" for file in (path, *files)))
     return 0
 
 
@@ -128,7 +130,7 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
         files += write_markup(named, Path(options.tables))
     rows = [dict(zip(table[0], row, strict=True)) for row in table[1]]
     text = text_table(*table) + "".join(f"{file}\n" for file in files)
-    answer(options, {"rows": rows, "tables": [*map(str, files)]}, out, text)
+    write_answer(options, {"rows": rows, "tables": [*map(str, files)]}, out, text)
     return 0
 
 

@@ -7,7 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from alphacut.commands.options import Command, add_common, add_run, answer, opened, read
+from alphacut.commands.options import (
+    Command,
+    add_common,
+    add_run,
+    open_results,
+    read_case,
+    write_answer,
+)
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
@@ -16,7 +23,7 @@ from alphacut.report.results import ISOTROPIC, cut, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
 from alphacut.rve.engineering_constants import FREE, PLANE_STRAIN
 from alphacut.rve.phase_energies import CONSTANTS
-from alphacut.stages.identify import learned
+from alphacut.stages.identify import identify_inputs
 from alphacut.stages.pipeline import Pipeline
 from alphacut.stages.results import Results
 from alphacut.stochastic.microstructure_summary import fragment
@@ -26,22 +33,22 @@ ONLY = "Plane strain alone: the other definition is for one particle of two isot
 
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the map, writes it and prints the section [radius]."""
-    with opened(options) as (case, store):
+    with open_results(options) as (case, store):
         numbers = Pipeline(Results(case.content), store).particles().document
     text = fragment(numbers)
-    answer(options, numbers | {"fragment": text}, out, text)
+    write_answer(options, numbers | {"fragment": text}, out, text)
     return 0
 
 
 def modulus(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the modulus of a round cell or of an image."""
-    with opened(options) as (case, store):
+    with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc).material()
     document, words = results.document(), {"modulus": summary, "image": image}
     for name in document.keys() & words.keys():
         text = text_table(*tables(document)[name]) + words[name](document[name])
-        answer(options, document[name], out, text)
+        write_answer(options, document[name], out, text)
     return 0
 
 
@@ -115,21 +122,23 @@ def add_envelope(parser: argparse.ArgumentParser) -> None:
 def envelope(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the envelope of [envelope]."""
     data = read_dataset(Path(options.modulus), "--modulus") if options.modulus else None
-    with opened(options) as (case, store):
+    with open_results(options) as (case, store):
         pipeline = Pipeline(Results(case.content), store)
         pipeline.motion(pipeline.structure(data, "--modulus"), studies=False)
     document = pipeline.results.document()
-    answer(options, document["envelopes"]["all"], out, run_text(document))
+    write_answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0
 
 
 def identify(options: argparse.Namespace, out: TextIO) -> int:
     """Identifies and reports; status 0 also where the measurement refutes the frame."""
-    content = read(options).content
+    content = read_case(options).content
     if content.identify is None or content.frame is None or content.envelope is None:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")
-    document, _ = learned(content.identify, content.frame.structure(), content.envelope.alpha)
-    answer(options, document, out, run_text({"update": document}))
+    document, _ = identify_inputs(
+        content.identify, content.frame.structure(), content.envelope.alpha
+    )
+    write_answer(options, document, out, run_text({"update": document}))
     return 0
 
 

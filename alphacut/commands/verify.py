@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from alphacut.commands.options import Command, add_quiet, answer
+from alphacut.commands.options import Command, add_quiet, write_answer
 from alphacut.frame.envelope import Ends, Envelope
 from alphacut.frame.verification.exact_motion import LinearMotion
 from alphacut.frame.verification.self_test import ContradictionError, Trial
@@ -19,7 +19,7 @@ from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.result import Nature
 from alphacut.fuzzy.sets.numbers import Interval
 from alphacut.io.columns import columns_text
-from alphacut.io.files import Document, alone
+from alphacut.io.files import Document, locked
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
 from alphacut.stages.store import put_text
@@ -41,24 +41,24 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     document: Document = {}
     names = [name for name in folder.parts if name.startswith("envelope_")]
     require(bool(names), "FOLDER", value=str(path), allowed="results of a run with an envelope")
-    with alone("FOLDER", path):
+    with locked("FOLDER", path):
         for name in names:
             data = dataset_of(folder.content(f"{name}.nc"))
             if "motion_inputs" not in data:
                 document[name] = {"nature": str(data.attrs["nature"]), "motions_tested": 0}
                 continue
-            document[name] = verified(data, name, folder)
+            document[name] = verify_envelope(data, name, folder)
     lines = (
         f"{name}: {verdict['motions_tested']} exact motions agree with it ({verdict['nature']})\n"
         if verdict["motions_tested"]
         else f"{name}: nothing in it is proved ({verdict['nature']})\n"
         for name, verdict in document.items()
     )
-    answer(options, document, out, "".join(lines))
+    write_answer(options, document, out, "".join(lines))
     return 0
 
 
-def verified(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document:
+def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document:
     """What a stored envelope was tested with; motions of the inputs it names go to a CSV file.
 
     Raises:

@@ -100,7 +100,7 @@ def identified(document: Document) -> Figure:
     """Each input's interval at every level over that of its prior, over the middle of that.
 
     Args:
-        document: As of `stages.identify.learned`.
+        document: As of `stages.identify.identify_inputs`.
     """
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
     figure, axes = style.figure(height=0.9 + 0.32 * len(names))

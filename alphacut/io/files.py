@@ -18,7 +18,7 @@ from pydantic_core import to_json
 
 from alphacut.fuzzy.refused import FailedError, RefusedError, printable, require
 
-FULL = 1 << 20
+MIN_FREE_BYTES = 1 << 20
 """Bytes that a disk has at least where it is not full."""
 RANKS = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "MPI_LOCALRANKID")
 SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS")
@@ -67,7 +67,7 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
         yield partial
         os.replace(partial, path)
     except (OSError, RuntimeError):
-        if shutil.disk_usage(path.parent).free < FULL:
+        if shutil.disk_usage(path.parent).free < MIN_FREE_BYTES:
             raise FailedError(f"the disk of {path.parent} is full", "free some space") from None
         raise
     finally:
@@ -153,7 +153,7 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
 
 
 @contextmanager
-def alone(option: str, folder: Path) -> Iterator[None]:
+def locked(option: str, folder: Path) -> Iterator[None]:
     """Keeps other runs out of a folder; where the file system cannot, nothing is kept out.
 
     Raises:

@@ -58,7 +58,7 @@ LIST = re.compile(r"\[(.*)\]\s*(.*)", re.DOTALL)
 SPREAD = re.compile(rf"({NUMBER})\s*(.*?)\s*(?:±|\+/-)\s*({NUMBER})\s*(.*)")
 SINGLE = re.compile(rf"({NUMBER})\s*(.*)")
 SHAPES: tuple[Callable[..., FuzzyNumber], ...] = (Crisp, Interval, Triangular, Trapezoidal)
-LONGEST = 1000
+MAX_CHARACTERS = 1000
 """Characters of a quantity; no longer text is read."""
 
 
@@ -108,7 +108,7 @@ def parse_number(text: str, si: str) -> Decimal:
     return decimal(match[1]) * factor(match[2].strip(), si)
 
 
-def spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
+def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
     """Both ends of the interval "20 t ± 5 %" or "20 t ± 1 t"."""
     middle = parse_number(f"{match[1]} {match[2]}", si)
     share = match[4].strip() == "%" and (si or match[2].strip() != "%")
@@ -133,21 +133,23 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
     if isinstance(value, list):
         value = "[" + ", ".join(map(str, value)) + "]"
     text, kind = str(value).strip(), isinstance(value, str | int | float)
-    if isinstance(value, bool) or not kind or len(text) > LONGEST:
-        raise ValueError("this is no quantity" if len(text) <= LONGEST else "this is too long")
+    if isinstance(value, bool) or not kind or len(text) > MAX_CHARACTERS:
+        raise ValueError(
+            "this is no quantity" if len(text) <= MAX_CHARACTERS else "this is too long"
+        )
     if match := LIST.fullmatch(text):
         items = [item.strip() for item in match[1].split(",")]
         values = tuple(
             parse_number(f"{item} {match[2]}" if match[2] else item, si) for item in items
         )
     elif match := SPREAD.fullmatch(text):
-        values = spread(match, si)
+        values = interval_of_spread(match, si)
     else:
         values = (parse_number(text, si),)
-    return tuple(_sized(x) for x in values)
+    return tuple(_checked_magnitude(x) for x in values)
 
 
-def _sized(value: Decimal) -> float:
+def _checked_magnitude(value: Decimal) -> float:
     size = abs(float(value))
     if not (size == 0 or LEAST <= size <= GREATEST) or not math.isfinite(size):
         raise ValueError(f"magnitudes go from {LEAST:g} to {GREATEST:g} in SI, or are 0")

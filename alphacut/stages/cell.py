@@ -31,11 +31,11 @@ from alphacut.stages.meshed import MeshedSample, sample_at, solve_samples
 from alphacut.stochastic import gauss_rule
 
 GPA = 1e9
-SHARE = 0.4
+TOLERANCE_PART = 0.4
 """Fraction of the tolerance for the series at each θ, and again for the quadrature in θ."""
-SPHERES = 1e-5
+SPHERE_TOLERANCE = 1e-5
 """Default tolerance of E of spheres, relative: 1e-9 takes seconds near a reduced radius of 0.97."""
-SLACK = 5e-3
+BOUNDS_SLACK = 5e-3
 """Allowed relative distance of E outside its bounds: packings meet a fraction to 0.5 %."""
 AnyCell = RoundCell | MeshedCell
 AnySample = Cell | MeshedSample
@@ -45,7 +45,7 @@ AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 """Averages of a plane stiffness by their names in a case, in words."""
 
 
-def averaged(model: Solve, cells: Sequence[AnySample]) -> list[HomogenisedStiffness]:
+def solve_and_average(model: Solve, cells: Sequence[AnySample]) -> list[HomogenisedStiffness]:
     """Results whose E and ν are those of the isotropic average of the plane stiffness."""
     return [result.averaged("isotropic") for result in model(cells)]
 
@@ -88,7 +88,7 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
             model = partial(solve_samples, PrismModel(mesh=mesh.file, **options))
     except ImportError as error:
         raise RefusedError("modulus.method", modulus.method, "series", missing(error)) from None
-    return partial(averaged, model) if averages else model
+    return partial(solve_and_average, model) if averages else model
 
 
 def _model_of_particle(
@@ -97,10 +97,12 @@ def _model_of_particle(
     """`solve` of a model of a cell with one particle."""
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
-        accuracy = max(SHARE * (tolerance or SPHERES), 1e-11)
+        accuracy = max(TOLERANCE_PART * (tolerance or SPHERE_TOLERANCE), 1e-11)
         return SphereSeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve
     if cell.has_series and method in ("auto", "series"):
-        accuracy = SeriesModel.accuracy if tolerance is None else max(SHARE * tolerance, 1e-12)
+        accuracy = (
+            SeriesModel.accuracy if tolerance is None else max(TOLERANCE_PART * tolerance, 1e-12)
+        )
         return SeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve
     outline = cell.outline or circle
     if method in ("auto", "slices"):
@@ -308,13 +310,15 @@ def require_bounds(
         particles: Of the cell.
 
     Raises:
-        RefusedError: E lies outside by more than `SLACK`.
+        RefusedError: E lies outside by more than `BOUNDS_SLACK`.
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
     low, high = (GPA * bound for bound in references["hashin_shtrikman_E_GPa"])
     fraction = references["fraction_of_case"]
-    if modulus_bounds[1] < low * (1 - SLACK) or modulus_bounds[0] > high * (1 + SLACK):
+    if modulus_bounds[1] < low * (1 - BOUNDS_SLACK) or modulus_bounds[0] > high * (
+        1 + BOUNDS_SLACK
+    ):
         value = (
             f"{modulus_bounds[0] / GPA:.5g} GPa, of a map that holds {references['fraction']:.4g}"
         )

@@ -21,7 +21,7 @@ from alphacut.io.files import Document, say
 from alphacut.questions.question import PEAK_ERROR
 from alphacut.stages.store import Stage, StageResult, Work
 
-USUAL = Tolerance(1e-3, "")
+DEFAULT_TOLERANCE = Tolerance(1e-3, "")
 """Tolerance where none is named: a share of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
@@ -55,7 +55,7 @@ class EnvelopeTask:
             RefusedError: No output has that unit.
         """
         units = {Output(x).unit for x in structure.outputs}
-        tolerance = self.section.tolerance or USUAL
+        tolerance = self.section.tolerance or DEFAULT_TOLERANCE
         value = f"{tolerance.value:g} {tolerance.unit}"
         allowed = f"a share, or {', '.join(sorted(units))}"
         require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
@@ -84,7 +84,7 @@ class EnvelopeTask:
         result = frame.envelope(**self.arguments(structure), relative=relative, **_run(work))
         signed = [name for name in self.limited if name != output_of(name)]
         of_envelope = peaks(result, [*map(str, result.outputs), *signed])
-        if not has_close(of_envelope, self.limited):
+        if not has_close_peaks(of_envelope, self.limited):
             of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
         return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
 
@@ -137,7 +137,7 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(map(output_of, peaks)))
 
 
-def has_close(peaks: Peaks, outputs: Sequence[str]) -> bool:
+def has_close_peaks(peaks: Peaks, outputs: Sequence[str]) -> bool:
     """True if each output has a guaranteed peak that is known to within `PEAK_ERROR`."""
     if not set(outputs) <= set(peaks.outputs):
         return False

@@ -23,7 +23,7 @@ from alphacut.io.measured import ModeRows, mode_rows
 from alphacut.records.uff import ENDINGS, uff_mode_rows
 
 
-def learned(
+def identify_inputs(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
 ) -> tuple[Document, Structure]:
     """Numbers of the inputs identified from measured modes, in SI, and the updated structure.

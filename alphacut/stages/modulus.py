@@ -36,7 +36,7 @@ from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.model import SeriesModel
 from alphacut.stages.cell import (
     GPA,
-    SPHERES,
+    SPHERE_TOLERANCE,
     AnyCell,
     Solve,
     as_cut,
@@ -55,11 +55,11 @@ from alphacut.stochastic.theta.quadrature import between_nodes
 if TYPE_CHECKING:
     import xarray
 
-COARSER = 100.0
+TEST_TOLERANCE_FACTOR = 100.0
 """Multiple of the tolerance at which guaranteed cuts are tested."""
-LARGEST_SIZE = 0.7
+MAX_TEST_SIZE = 0.7
 """Largest elements that they are tested with, over half the cell's side."""
-SHOWN = 61
+CURVE_POINTS = 61
 """Points over θ of a stored stress curve."""
 BOUNDS = {
     "E": ("Pa", "effective Young's modulus"),
@@ -130,8 +130,8 @@ class CellTask:
 
 
 def theta_of(radius: AnyRadius | ThetaSection) -> Array:
-    """The θ at which stress curves are stored, shape (SHOWN,)."""
-    return np.asarray(np.linspace(*radius.theta, SHOWN))
+    """The θ at which stress curves are stored, shape (CURVE_POINTS,)."""
+    return np.asarray(np.linspace(*radius.theta, CURVE_POINTS))
 
 
 @dataclass(frozen=True)
@@ -219,16 +219,16 @@ class CellCampaign:
         """Requires that a coarser model agrees with guaranteed cuts of E at points inside them.
 
         The points are the middles of the narrowest and of the widest cut of the inputs. The
-        tolerance is `COARSER` times as large, elements are twice as large.
+        tolerance is `TEST_TOLERANCE_FACTOR` times as large, elements are twice as large.
 
         Raises:
             FailedError: E of such a point lies outside a cut by more than both errors.
         """
         if result.nature_of("E") is not Nature.GUARANTEED:
             return
-        modulus, size = self.modulus, min(2 * self.mesh.size, LARGEST_SIZE)
-        usual = SPHERES if self.cell.particles == "spheres" else SeriesModel.accuracy
-        tolerance = COARSER * (modulus.tolerance or usual)
+        modulus, size = self.modulus, min(2 * self.mesh.size, MAX_TEST_SIZE)
+        usual = SPHERE_TOLERANCE if self.cell.particles == "spheres" else SeriesModel.accuracy
+        tolerance = TEST_TOLERANCE_FACTOR * (modulus.tolerance or usual)
         other_campaign = replace(
             self,
             mesh=self.mesh.model_copy(update={"size": size}),

@@ -29,7 +29,7 @@ from alphacut.stages import (
 )
 from alphacut.stages.envelope import EnvelopeTask, peaks_of
 from alphacut.stages.modulus import CellCampaign
-from alphacut.stages.readiness import campaign_of, overhangs
+from alphacut.stages.readiness import campaign_of, cut_record_warnings
 from alphacut.stages.results import Results
 from alphacut.stages.store import Stage, StageResult, StageStore, Work
 
@@ -132,7 +132,7 @@ class Pipeline:
         assert self.content.envelope is not None
         results = self.results
         results.structure = structure
-        for words in overhangs(self.content, structure):
+        for words in cut_record_warnings(self.content, structure):
             say(f"warning: {words}")
         section, content = self.content.envelope, self.content
         limited = content.limited_outputs
@@ -152,7 +152,7 @@ class Pipeline:
         (task,) = envelope.tasks(content.envelope, ())
         if content.identify is not None:
             measured, alpha = content.identify, task.section.alpha
-            results.learned, structure = identify.learned(measured, structure, alpha)
+            results.learned, structure = identify.identify_inputs(measured, structure, alpha)
         if content.records is not None:
             self._suite(content.records, structure, task)
             return
@@ -183,7 +183,7 @@ class Pipeline:
         results.suite = json.loads(as_json(suite.document(peaks, records, mode)))
         times = (task.section.alpha, task.duration, task.section.step)
         moved = suite.motion(peaks, records, mode)
-        worst = suite.with_means(suite.any_record(peaks), peaks)
+        worst = suite.with_means(suite.worst_peaks(peaks), peaks)
         self._answer(Motion(structure, task.fuzzy, *times, worst, moved))
 
     def _peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:

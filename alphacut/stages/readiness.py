@@ -65,7 +65,7 @@ def _require_motion(content: Content) -> None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:
         records = suite.suite(content.records, content.envelope, structure)
-        structure = suite.under(structure, records[0])
+        structure = suite.with_record(structure, records[0])
     for task in envelope.tasks(content.envelope, content.study):
         frame.require_envelope(**task.arguments(structure))
     (task,) = envelope.tasks(content.envelope, ())
@@ -96,7 +96,7 @@ def _loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
     return Triangular(0.9 * value, value, 1.1 * value) if is_fuzzy else LOSS_STAND_IN
 
 
-def overhangs(content: Content, structure: Structure) -> Iterator[str]:
+def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:
     """Sentences on a record that goes on after the end of a motion."""
     linear = structure.linear
     if linear is None or linear.ground is None or content.envelope is None:

@@ -73,7 +73,7 @@ class Results:
         results = {name: getattr(self, name) for name in NAMES}
         numbers = {name: result.document for name, result in results.items() if result is not None}
         if self.structure is not None and self.structure.frame is not None:
-            numbers["structure"] = sizes(self.structure, self.structure.frame)
+            numbers["structure"] = frame_properties(self.structure, self.structure.frame)
         tasks = {task.name: task for task in self.tasks}
         ratio = getattr(self.content.structure_section, "damping_ratio", None)
         if self.structure is not None and isinstance(ratio, MaterialDamping):
@@ -95,7 +95,7 @@ class Results:
         return {**numbers, **self.answers}
 
 
-def sizes(structure: Structure, frame: StoreyFrame) -> Document:
+def frame_properties(structure: Structure, frame: StoreyFrame) -> Document:
     """Frequencies, weight in N, and the height in m of the storey of each drift."""
     omega, drifts = frequencies(frame), set(structure.outputs)
     return {

@@ -85,7 +85,11 @@ def of_cell(campaign: CellCampaign) -> Shares:
 def of_peaks(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
     """Shares of a study's inputs in the width of each output's peak, shape (inputs, outputs)."""
     groups = {name: structure.members(name) for name in task.fuzzy}
-    step = task.section.step if model.ground is None else thinned(task.duration, task.section.step)
+    step = (
+        task.section.step
+        if model.ground is None
+        else coarser_step(task.duration, task.section.step)
+    )
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
         fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
@@ -104,7 +108,7 @@ def of_peaks(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask)
     return width_shares(bounds, structure.inputs(task.fuzzy), groups=groups)
 
 
-def thinned(duration: float, step: float) -> float:
+def coarser_step(duration: float, step: float) -> float:
     """Multiple of the step that leaves a hundred nodes or some more."""
     steps = round(duration / step)
     return step * max(k for k in range(1, max(1, steps // 100) + 1) if steps % k == 0)

@@ -142,7 +142,7 @@ def warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
             yield f"{share} lies after the end of its motion, {record.duration:g} s"
 
 
-def under(structure: Structure, record: SuiteRecord) -> Structure:
+def with_record(structure: Structure, record: SuiteRecord) -> Structure:
     """The structure moved by a record."""
     assert structure.linear is not None
     return replace(structure, model=replace(structure.linear, ground=record.ground))
@@ -155,7 +155,7 @@ def stages(structure: Structure, task: EnvelopeTask, records: Sequence[SuiteReco
 
 
 def _stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stage:
-    moved = under(structure, record)
+    moved = with_record(structure, record)
     of_record = replace(task, name=record.name, duration=record.duration)
     inputs = [moved.model, moved.numbers, of_record]
     return Stage(
@@ -189,7 +189,7 @@ def motion(
     return SuiteMotion(mode.period, mode.ratio, measures, peaks)
 
 
-def any_record(peaks: Mapping[str, Peaks]) -> Peaks:
+def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
     """Peaks under whichever record is the worst for each structure.
 
     The peak of a structure is the largest over the records, so that each end is.

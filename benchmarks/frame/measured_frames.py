@@ -22,7 +22,7 @@ from alphacut.frame import StoreyFrame
 from alphacut.frame.identify import MeasuredMode, RefutedError, identify, measured_mode
 from alphacut.frame.identify.chain import Chain, eigenvalue_ranges
 from alphacut.fuzzy import FuzzyNumber, Interval
-from alphacut.stages.identify import learned
+from alphacut.stages.identify import identify_inputs
 from benchmarks.rows import write
 
 ROOT = Path(__file__).parents[2]
@@ -99,7 +99,9 @@ def laboratory_rows() -> list[dict[str, object]]:
     content = load(ROOT / "cases" / "laboratory-frame.toml").content
     assert content.frame is not None
     assert content.identify is not None
-    found, _ = learned(content.identify, content.frame.structure(), (0.05, 0.25, 0.5, 0.75, 1.0))
+    found, _ = identify_inputs(
+        content.identify, content.frame.structure(), (0.05, 0.25, 0.5, 0.75, 1.0)
+    )
     return [
         {
             "frame": "laboratory, 4 storeys",

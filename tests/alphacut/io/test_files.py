@@ -46,10 +46,10 @@ def test_devices_may_be_named_for_output(tmp_path):
 
 def test_a_second_run_into_the_same_folder_is_refused_while_the_first_writes(tmp_path):
     from alphacut.fuzzy.refused import RefusedError
-    from alphacut.io.files import alone
+    from alphacut.io.files import locked
 
     place = tmp_path / "out"
-    with alone("--out", place), pytest.raises(RefusedError, match="another run is writing into"):
-        alone("--out", place).__enter__()
-    with alone("--out", place):
+    with locked("--out", place), pytest.raises(RefusedError, match="another run is writing into"):
+        locked("--out", place).__enter__()
+    with locked("--out", place):
         assert not list(place.iterdir())
