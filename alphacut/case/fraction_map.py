@@ -1,4 +1,4 @@
-"""The radius map of cells whose particles all take the same share: crisp over θ."""
+"""The radius map of cells whose particles all take the same fraction: crisp over θ."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from alphacut.stochastic.particles.particles import Shape
 
 @dataclass(frozen=True)
 class FractionMap:
-    """Random radius without chance: particles of one share of the cell at all θ.
+    """Radius map of particles that take the same fraction of the cell at all θ.
 
     Args:
         fraction: Fraction of area or volume, crisp or fuzzy.

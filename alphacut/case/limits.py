@@ -27,15 +27,15 @@ class Limit:
 
     Args:
         peak: The output, or "max", "min" or "mean" and the output.
-        value: In the SI unit of the output, or as a share of the storey's height; of a least value
-            its negative, which the negative of the output must not pass.
-        share: Whether it is such a share.
+        value: In the SI unit of the output, or as a fraction of the storey's height; of a least
+            value its negative, which the negative of the output must not pass.
+        is_relative: Whether it is such a fraction.
         text: The limit as the user wrote it.
     """
 
     peak: str
     value: float
-    share: bool
+    is_relative: bool
     text: str
 
     @property
@@ -44,12 +44,12 @@ class Limit:
         return output_of(self.peak)
 
     def si(self, structure: Structure, key: str) -> float:
-        """Limit in the SI unit of its output; a share of a fuzzy height is one of the least.
+        """Limit in the SI unit of its output; a fraction of a fuzzy height is one of the least.
 
         Raises:
             RefusedError: The structure has no height of the storey.
         """
-        if not self.share:
+        if not self.is_relative:
             return self.value
         height = structure.heights.get(self.output)
         if height is None:
@@ -69,14 +69,16 @@ def parse_limit(value: object) -> Limit:
     if match is None or (match[3] == ">=") != (match[1] == "min "):
         raise RefusedError("", value, allowed)
     side, name, _, text = match.groups()
-    share = name.startswith("drift") and text.endswith("%")
+    is_relative = name.startswith("drift") and text.endswith("%")
     try:
-        number = _number(text, "" if share else Output(name).unit)
+        number = _number(text, "" if is_relative else Output(name).unit)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
     is_signed = side in ("max ", "min ")
     require(number > 0 or is_signed, "", value=value, allowed=allowed)
-    return Limit(f"{side}{name}", 0.0 - number if side == "min " else number, share, str(value))
+    return Limit(
+        f"{side}{name}", 0.0 - number if side == "min " else number, is_relative, str(value)
+    )
 
 
 def _number(text: str, unit: str) -> float:

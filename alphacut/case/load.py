@@ -74,14 +74,13 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 
 
 def _parsed(path: Path, text: str) -> dict[str, object]:
+    """The table of a TOML text; the file and line of what is no TOML are told."""
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
-    except (RecursionError, ValueError) as error:  # an integer too long is no TOMLDecodeError
+    except (RecursionError, ValueError) as error:  # of an integer too long, without a line
         where = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        lines = [] if isinstance(error, RecursionError) else text.splitlines()
-        long = (k for k, text in enumerate(lines, 1) if re.search(r"[0-9_]{4000}", text))
-        line = int(where[1]) if where else next(long, len(lines))
-        shown = lines[line - 1].strip() if len(lines) >= line > 0 else ""
+        line, lines = int(where[1]) if where else 0, text.splitlines()
+        shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
         what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
         raise BadInput(InputProblem(shown or "the file", what, file=str(path), line=line)) from None
 

@@ -145,8 +145,8 @@ class RoundCell(Section):
     )
     fraction: Radius | None = Field(
         default=None,
-        description="share of area, below π/4, or of volume of spheres, below π/6, that particles"
-        " of one size take; in place of [radius]",
+        description="area fraction, below π/4, or volume fraction of spheres, below π/6, of"
+        " particles of one size; in place of [radius]",
     )
 
     @property

@@ -41,8 +41,8 @@ class Tolerance:
     """Error of an envelope that is allowed.
 
     Args:
-        value: In SI, or as a share of each output's peak.
-        unit: SI unit, or "" of a share.
+        value: In SI, or as a fraction of each output's peak.
+        unit: SI unit, or "" of a fraction.
     """
 
     value: float
@@ -57,7 +57,9 @@ def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
             continue
         if 0 < number < (1 if unit == "" else float("inf")):
             return Tolerance(number, unit)
-    raise RefusedError("", value, 'a length, a force or a share, as "0.2 mm", "0.05 N", "0.1 %"')
+    raise RefusedError(
+        "", value, 'a length, a force or a fraction of each peak, as "0.2 mm", "0.05 N", "0.1 %"'
+    )
 
 
 def _file_name(value: str) -> str:
@@ -91,11 +93,11 @@ class EnvelopeSection(Section):
     )
     tolerance: Annotated[Tolerance, text(_tolerance)] | None = Field(
         default=None,
-        description="error that is allowed: of displacements, of forces, or a share of each peak",
+        description="error that is allowed: of displacements, of forces, or over each peak",
     )
     gain: Annotated[float, Quantity(least=1e-6, most=1)] = Field(
         default=0.25,
-        description="gain worth a trajectory to a Graph Follower, as a share of the tolerance",
+        description="gain worth a trajectory to a Graph Follower, as a fraction of the tolerance",
     )
     duration: Time = Field(description="length of the simulation")
     step: Time = Field(description="time step")
@@ -123,7 +125,7 @@ class Identify(Section):
         default=(), description="modes that are predicted and not learned from"
     )
     frequency_deviation: Fraction | None = Field(
-        default=None, description="standard deviation of a frequency as a share of it"
+        default=None, description="standard deviation of a frequency over its mean"
     )
     shape_deviation: Fraction | None = Field(
         default=None, description="standard deviation of an amplitude, over the mode's largest"

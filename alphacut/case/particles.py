@@ -30,7 +30,7 @@ class PackingSection(Section):
         description="particles in each packing"
     )
     fraction: Annotated[float, Quantity(above=0, below=0.84)] = Field(
-        description="share of area, or of volume, that they cover"
+        description="area fraction, or volume fraction, of the particles"
     )
     smallest_radius: Length | None = Field(default=None, description="lower end of the radii")
     largest_radius: Length | None = Field(default=None, description="upper end of the radii")

@@ -67,13 +67,9 @@ class Quantity:
         """Allowed values in words."""
         kind, example = QUANTITIES[self.si]
         kind = "whole number" if self.is_integer else kind
-        ends = [
-            f"above {self.above:g}" * math.isfinite(self.above),
-            f"from {self.least:g}" * math.isfinite(self.least),
-            f"below {self.below:g}" * math.isfinite(self.below),
-            f"up to {self.most:g}" * math.isfinite(self.most),
-        ]
-        words = " ".join(filter(None, [kind, *ends]))
+        bounds = {"above": self.above, "from": self.least, "below": self.below, "up to": self.most}
+        finite = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
+        words = " ".join([kind, *finite])
         return f'{words}, as "{example}"' if self.si else words
 
     def read(self, value: object) -> object:

@@ -95,10 +95,8 @@ def plane_text(cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
     """Constants along x and y, a table for each definition."""
     free = {x.replace("_free", ""): ends for x, ends in cuts.items() if "_free" in x}
     plane_strain = {x: ends for x, ends in cuts.items() if "_free" not in x}
-    text = cuts_text(PLANE_STRAIN, plane_strain, alpha, nature) + cuts_text(
-        FREE, free, alpha, nature
-    )
-    return text if free else f"{text}{ONLY}\n"
+    text = cuts_text(PLANE_STRAIN, plane_strain, alpha, nature)
+    return text + (cuts_text(FREE, free, alpha, nature) or f"{ONLY}\n")
 
 
 def loss_text(losses: Document | None) -> str:

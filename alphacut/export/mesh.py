@@ -35,14 +35,6 @@ EDGES = np.column_stack([[0, 1, 2, 3, 4, 5, 0, 1, 2], range(6, 15), [1, 2, 0, 4,
 """Nodes of a wedge's edges: an end, the middle, the other end."""
 
 
-def write_mesh(mesh: meshio.Mesh, path: Path) -> None:
-    """Writes a mesh for VTK, whole or not at all."""
-    import meshio
-
-    with whole_file(path) as partial:
-        meshio.write(partial, mesh, file_format="vtu")
-
-
 def wedges(
     points: Array, cells: Rows, phase: Rows, data: dict[str, Array] | None = None
 ) -> meshio.Mesh:
@@ -98,7 +90,7 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
         command = ["xvfb-run", "-a", *command]
     with tempfile.TemporaryDirectory() as folder, whole_file(path) as partial:
         file = Path(folder) / "mesh.vtu"
-        write_mesh(prism_mesh(cell, mesh.size, mesh.layers), file)
+        prism_mesh(cell, mesh.size, mesh.layers).write(file, file_format="vtu")
         words = [*command, str(file), str(partial)]
         done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode or not partial.is_file():

@@ -22,7 +22,7 @@ from alphacut.questions.question import PEAK_ERROR
 from alphacut.stages.store import Stage, StageResult, Work
 
 DEFAULT_TOLERANCE = Tolerance(1e-3, "")
-"""Tolerance where none is named: a share of each peak."""
+"""Tolerance where none is named: a fraction of each peak."""
 FOLLOWERS = ("graph-follower", "improved-graph-follower")
 PEAK_BOUNDS = ("lower", "upper", "error", "reached", "least_proved", "least_reached")
 """Bounds of peaks as `Peaks` names them."""
@@ -57,7 +57,7 @@ class EnvelopeTask:
         units = {Output(x).unit for x in structure.outputs}
         tolerance = self.section.tolerance or DEFAULT_TOLERANCE
         value = f"{tolerance.value:g} {tolerance.unit}"
-        allowed = f"a share, or {', '.join(sorted(units))}"
+        allowed = f"a fraction, or {', '.join(sorted(units))}"
         require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
         return tolerance
 

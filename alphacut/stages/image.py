@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,6 +35,9 @@ from alphacut.stages.losses import LossCuts, loss_document
 from alphacut.stages.store import Stage, StageResult, Work
 from alphacut.stochastic.segmentation import segmented
 
+if TYPE_CHECKING:
+    import xarray
+
 ACCURACY = 1e-5
 """Relative energy that the solver may leave."""
 NATURE = "guaranteed"
@@ -61,9 +64,7 @@ def compute_cuts(
     Raises:
         RefusedError: The image cannot give what the case asks for.
     """
-    import xarray
-
-    start, tick = perf_counter(), work.tick or (lambda share: None)
+    start, tick = perf_counter(), work.tick or (lambda fraction: None)
     study, aspect = study_of(cell), cell.pixel[-1] / cell.pixel[0]
     modal = study.images(None, None)
     division, solver = usual_division(modal), ConjugateGradient(ACCURACY)
@@ -88,24 +89,36 @@ def compute_cuts(
         "division": model.division,
         "references": {"hashin_shtrikman_E_GPa": study.isotropic_bounds},
     }
-    constants = np.array([cut.constants for cut in cuts])
-    stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
-    variables: dict[str, Any] = {
-        "E": (("alpha", "bound"), np.array([cut.modulus for cut in cuts]), {"units": "Pa"}),
-        "stiffness": (("alpha", "bound", "row", "column"), stiffness, {"units": "Pa"}),
-        **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(NAMES)},
-        "phase": (("y", "x"), study.ranges(None)[0].astype(np.float32)),
-    }
-    axes = {"alpha": list(alpha), "bound": ["lower", "upper"], "row": AXES, "column": AXES}
+    losses: dict[str, Array] = {}
     if cell.losses:
         phase, count = study.ranges(None)[0], len(cell.pairs)
         energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
         ends, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
-        cuts_of = {name: ends[..., k] for k, name in enumerate(CONSTANTS)}
-        variables |= {f"loss_{name}": (("alpha", "bound"), x) for name, x in cuts_of.items()}
+        losses = {name: ends[..., k] for k, name in enumerate(CONSTANTS)}
         of_constants = dict(zip(CONSTANTS, map(float, errors), strict=True))
-        facts["loss"] = loss_document(cuts_of, of_constants, Nature.ESTIMATED)
-    return StageResult(facts, xarray.Dataset(variables, axes, {"nature": NATURE}))
+        facts["loss"] = loss_document(losses, of_constants, Nature.ESTIMATED)
+    return StageResult(facts, _dataset(alpha, cuts, study.ranges(None)[0], losses))
+
+
+def _dataset(
+    alpha: tuple[float, ...], cuts: Sequence[ImageCut], phase: Rows, losses: Mapping[str, Array]
+) -> xarray.Dataset:
+    """Bounds on each level in SI, and the phase of each pixel."""
+    import xarray
+
+    young, constants = (
+        np.array([getattr(cut, x) for cut in cuts]) for x in ("modulus", "constants")
+    )
+    stiffness = np.array([[cut.bounds.lower, cut.bounds.upper] for cut in cuts])
+    variables: dict[str, Any] = {
+        "E": (("alpha", "bound"), young, {"units": "Pa"}),
+        "stiffness": (("alpha", "bound", "row", "column"), stiffness, {"units": "Pa"}),
+        **{name: (("alpha", "bound"), constants[:, k]) for k, name in enumerate(NAMES)},
+        **{f"loss_{name}": (("alpha", "bound"), cut) for name, cut in losses.items()},
+        "phase": (("y", "x"), phase.astype(np.float32)),
+    }
+    axes = {"alpha": list(alpha), "bound": ["lower", "upper"], "row": AXES, "column": AXES}
+    return xarray.Dataset(variables, axes, {"nature": NATURE})
 
 
 def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:

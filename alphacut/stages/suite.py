@@ -16,7 +16,7 @@ from alphacut.frame import Accelerogram
 from alphacut.frame.questions.peaks import Peaks, joined, output_of
 from alphacut.frame.structures.linear import modal_damping_ratios
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.questions.question import SuiteMotion
@@ -77,15 +77,10 @@ def nominal_mode(structure: Structure) -> Nominal:
     Raises:
         RefusedError: The structure is not linear.
     """
-    linear = structure.linear
-    require(
-        linear is not None,
-        "records",
-        value="with a system that is not linear",
-        allowed="linear structures",
-    )
-    assert linear is not None
-    omega, ratios = modal_damping_ratios(linear)
+    if structure.linear is None:
+        what = "with a system that is not linear"
+        raise RefusedError("records", what, "linear structures")
+    omega, ratios = modal_damping_ratios(structure.linear)
     return Nominal(2 * pi / float(omega[0]), float(ratios[0]))
 
 

@@ -68,7 +68,7 @@ WRONG = [  # text in the case, its replacement; key, and what the message says
     ('duration = "2 s"', "", "envelope.duration", "is missing"),
     ('step = "0.02 s"', 'step = "0.03 s"', "envelope.duration", "whole multiples"),
     ('displacements = "10 mm"', "", "frame.displacements", "nothing moves the frame"),
-    ('tolerance = "0.1 mm"', 'tolerance = "1 kg"', "envelope.tolerance", "a share"),
+    ('tolerance = "0.1 mm"', 'tolerance = "1 kg"', "envelope.tolerance", "a fraction"),
     ('second_moment = "1e-5 m^4"', "", "frame.second_moment", "or stiffness"),
     ('stages = ["envelope"]', 'stages = ["modulus"]', "radius", "stage modulus needs"),
     ('stages = ["envelope"]', "stages = []", "stages", "one entry"),
