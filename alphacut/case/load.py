@@ -123,6 +123,7 @@ def _suggested_key(key: str) -> str:
 
 
 def _problem(key: str, detail: ErrorDetails) -> InputProblem:
+    """What is wrong with the value of a key, which may be missing, and what is allowed."""
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
         return replace(InputProblem.from_error(cause), key=cause.key or key)

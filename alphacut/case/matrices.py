@@ -189,8 +189,8 @@ class MatricesSection(Section):
     def _pattern(self) -> Array:
         if isinstance(self.direction, dict):
             return self._vector("direction", self.direction)
-        ends = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
-        return np.array(ends)
+        pattern = [float(name.rpartition(".")[2] == self.direction) for name in self.unknowns]
+        return np.array(pattern)
 
     @property
     def starts(self) -> bool:
@@ -211,7 +211,7 @@ class MatricesSection(Section):
 
     def require_pattern(self) -> None:
         """Refuses a structure that the ground does not move."""
-        ends = sorted({name.rpartition(".")[2] for name in self.unknowns})
-        allowed = f"one of {', '.join(ends[:8])}, or a table by unknown"
+        directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
+        allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
         moved = bool(self._pattern().any())
         require(moved, "matrices.direction", value=self.direction or None, allowed=allowed)

@@ -50,6 +50,7 @@ class Tolerance:
 
 
 def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
+    """Parse a tolerance such as "0.2 mm" or "0.1 %"."""
     for unit in ("m", "N", ""):
         try:
             number = quantity.number(value, unit)

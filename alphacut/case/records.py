@@ -60,6 +60,7 @@ def _files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
 
 
 def _scale(value: object, _: ValidationInfo) -> Scale:
+    """Parse a scale such as 1.2 or "PGA = 0.3 g"."""
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = (part.strip() for part in str(value).partition("="))
     try:
@@ -76,6 +77,7 @@ def _scale(value: object, _: ValidationInfo) -> Scale:
 
 
 def _trim(value: object, _: ValidationInfo) -> Trim:
+    """Parse the times to keep, such as ["2 s", "30 s"]."""
     allowed = '"arias" for 5 to 95 % of the Arias intensity, or two times as ["2 s", "30 s"]'
     if value == "arias":
         return "arias"

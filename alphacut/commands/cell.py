@@ -122,8 +122,8 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
     for key, number in document["fibres"].items():
         rows.append((fibre_label(key), *_value_and_error(number)))
     rows += [*plane_rows(document)]
-    if ends := document["references"].get("hashin_shtrikman_E_GPa"):
-        rows.append((f"{ISOTROPIC}, GPa", f"{ends[0]:.4f} … {ends[1]:.4f}", ""))
+    if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
+        rows.append((f"{ISOTROPIC}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", ""))
     if "difference" in document:
         rows.append(("difference of both methods", f"{document['difference']:.1e}", ""))
     iterations = ", ".join(map(str, result.iterations))

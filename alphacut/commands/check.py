@@ -68,9 +68,9 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
             f"{read.step:g} s",
             f"{len(read.samples)}",
         )
-        ends = (f"{read.offset_share:.2%}", f"{read.peak / GRAVITY:.3g} g")
+        raw = (f"{read.offset_share:.2%}", f"{read.peak / GRAVITY:.3g} g")
         used = tuple(f"{measures[name] / GRAVITY:.3g} g" for name in ("PGA", "Sa(T1)"))
-        rows.append((*of_file, *ends, *used, f"{record.duration:.4g} s"))
+        rows.append((*of_file, *raw, *used, f"{record.duration:.4g} s"))
     head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
     text = text_table((*head, "Sa(T1) used", "motion"), rows)
     return text + "".join(f"warning: {words}\n" for words in warnings(records))
@@ -119,8 +119,8 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
 
 
 def _numbers(number: FuzzyNumber, unit: str) -> str:
-    ends = dict.fromkeys((number.support.lower, *number.cut(1.0), number.support.upper))
-    return " … ".join(engineering(x, unit) for x in ends)
+    corners = dict.fromkeys((number.support.lower, *number.cut(1.0), number.support.upper))
+    return " … ".join(engineering(x, unit) for x in corners)
 
 
 ABOUT = "check a case, and print what it was read as and its first natural period"

@@ -79,22 +79,23 @@ def summary(document: Document) -> str:
 
 def bounds_text(document: Document) -> str:
     """Line on the Hashin–Shtrikman bounds; empty where there are none."""
-    ends = document["references"].get("hashin_shtrikman_E_GPa")
-    return f"{ISOTROPIC}: {ends[0]:.4f} … {ends[1]:.4f} GPa\n" if ends else ""
+    bounds = document["references"].get("hashin_shtrikman_E_GPa")
+    return f"{ISOTROPIC}: {bounds[0]:.4f} … {bounds[1]:.4f} GPa\n" if bounds else ""
 
 
 def cuts_text(title: str, cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
     """Table of the lowest and highest cut of each constant; empty where there are none."""
     rows = [
-        (fibre_label(x), cut(ends, 0, nature), cut(ends, -1, nature)) for x, ends in cuts.items()
+        (fibre_label(x), cut(bounds, 0, nature), cut(bounds, -1, nature))
+        for x, bounds in cuts.items()
     ]
     return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
 
 
 def plane_text(cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
     """Constants along x and y, a table for each definition."""
-    free = {x.replace("_free", ""): ends for x, ends in cuts.items() if "_free" in x}
-    plane_strain = {x: ends for x, ends in cuts.items() if "_free" not in x}
+    free = {x.replace("_free", ""): bounds for x, bounds in cuts.items() if "_free" in x}
+    plane_strain = {x: bounds for x, bounds in cuts.items() if "_free" not in x}
     text = cuts_text(PLANE_STRAIN, plane_strain, alpha, nature)
     return text + (cuts_text(FREE, free, alpha, nature) or f"{ONLY}\n")
 
@@ -105,9 +106,9 @@ def loss_text(losses: Document | None) -> str:
         return ""
     rows = []
     for name in CONSTANTS:
-        ends = (cut(losses[name], level, Nature.ATTAINED) for level in (0, -1))
+        bounds = (cut(losses[name], level, Nature.ATTAINED) for level in (0, -1))
         error = f"{losses['error'][name]:.1e}" if losses["error"] else "not declared"
-        rows.append((f"loss factor of {name}", *ends, error))
+        rows.append((f"loss factor of {name}", *bounds, error))
     return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
 
 

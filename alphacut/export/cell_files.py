@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from alphacut.export.mesh import COMPONENTS, wedges
+from alphacut.export.mesh import COMPONENTS, wedge_mesh
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.io.files import say, whole_file
@@ -38,7 +38,7 @@ def write_cell(fields: CellFields, path: Path) -> int:
         return _write_gmsh(fields, path)
     import meshio
 
-    mesh = wedges(fields.points, fields.cells, fields.phase, _at_points(fields))
+    mesh = wedge_mesh(fields.points, fields.cells, fields.phase, _at_points(fields))
     if kind == "abaqus":
         say(f"{path} holds mesh and phases; displacements and stresses go to .msh, .vtu or .xdmf")
         mesh = _abaqus(fields)

@@ -35,7 +35,7 @@ EDGES = np.column_stack([[0, 1, 2, 3, 4, 5, 0, 1, 2], range(6, 15), [1, 2, 0, 4,
 """Nodes of a wedge's edges: an end, the middle, the other end."""
 
 
-def wedges(
+def wedge_mesh(
     points: Array, cells: Rows, phase: Rows, data: dict[str, Array] | None = None
 ) -> meshio.Mesh:
     """Quadratic wedges in VTK's order with their phase: matrix 0, particle 1, interphase 2.
@@ -73,7 +73,7 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
         outline=cell.outline,
         thickness=RING_THICKNESS if thickness else 0.0,
     )
-    return wedges(grid.positions(cell.radius, thickness), grid.cells, grid.phase)
+    return wedge_mesh(grid.positions(cell.radius, thickness), grid.cells, grid.phase)
 
 
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
@@ -128,8 +128,8 @@ def edges(part: UnstructuredGrid) -> PolyData:
     """Edges of quadratic wedges in VTK's order, each as two straight pieces."""
     import pyvista
 
-    wedges = part.cells.reshape(-1, 16)[:, 1:]
-    lines = np.unique(np.concatenate([wedges[:, ends] for ends in EDGES]), axis=0)
+    cells = part.cells.reshape(-1, 16)[:, 1:]
+    lines = np.unique(np.concatenate([cells[:, nodes] for nodes in EDGES]), axis=0)
     return pyvista.PolyData(part.points, lines=np.column_stack([np.full(len(lines), 3), lines]))
 
 

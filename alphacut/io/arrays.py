@@ -44,6 +44,7 @@ def read_array(path: Path, name: str = "") -> Array:
 
 
 def _read(path: Path, name: str) -> Array:
+    """The array of a file by the reader that its ending calls for."""
     import scipy.io
     import scipy.sparse
 

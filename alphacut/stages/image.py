@@ -93,8 +93,8 @@ def compute_cuts(
     if cell.losses:
         phase, count = study.ranges(None)[0], len(cell.pairs)
         energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
-        ends, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
-        losses = {name: ends[..., k] for k, name in enumerate(CONSTANTS)}
+        bounds, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
+        losses = {name: bounds[..., k] for k, name in enumerate(CONSTANTS)}
         of_constants = dict(zip(CONSTANTS, map(float, errors), strict=True))
         facts["loss"] = loss_document(losses, of_constants, Nature.ESTIMATED)
     return StageResult(facts, _dataset(alpha, cuts, study.ranges(None)[0], losses))
@@ -122,7 +122,7 @@ def _dataset(
 
 
 def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
-    """Ends of the loss factors of E, G, K at modal moduli, (levels, 2, 3), and errors, (3,)."""
+    """Bounds of the loss factors of E, G, K at modal moduli, (levels, 2, 3), and errors, (3,)."""
 
     def constants_of(moduli: Array) -> Array:
         return plane_constants(moduli, average)
@@ -130,10 +130,10 @@ def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Ar
     shares, _ = energies.shares(constants_of)
     equal = np.array([bulk_and_shear_losses(None, False)] * len(shares))
     corners = cuts.corners(shares, equal)
-    ends = np.einsum("lecpx,pxc->lec", corners, shares)
+    bounds = np.einsum("lecpx,pxc->lec", corners, shares)
     widest = corners[0, 1, 0]
     _, errors = first_order(energies, widest, constants_of)
-    return ends, errors + np.ptp(widest) ** 2 * ends[0, 1]
+    return bounds, errors + np.ptp(widest) ** 2 * bounds[0, 1]
 
 
 def _widths(
@@ -175,8 +175,8 @@ def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) 
     }
 
 
-def _pair(ends: Ends) -> dict[str, float]:
-    return {"lower": ends[0] / GPA, "upper": ends[1] / GPA}
+def _pair(bounds: Ends) -> dict[str, float]:
+    return {"lower": bounds[0] / GPA, "upper": bounds[1] / GPA}
 
 
 def cut_at(number: FuzzyNumber, level: Level) -> tuple[float, float]:
@@ -219,15 +219,15 @@ class ImageStudy:
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Area share of each phase at the modal values, dark first."""
+        """Area fraction of each phase at the modal values, dark first."""
         phase = self.ranges(None)[0]
         shares = np.bincount(phase.ravel(), minlength=len(self.cell.pairs)) / phase.size
         if self.cell.labels is not None:
             names = [f"label {label:g}" for label in self.cell.labels]
         else:
-            ends = [f"{number.modal:g}" for number in self.cell.threshold or ()]
-            between = (f"grey {a} … {b}" for a, b in pairwise(ends))
-            names = [f"grey below {ends[0]}", *between, f"grey above {ends[-1]}"]
+            greys = [f"{number.modal:g}" for number in self.cell.threshold or ()]
+            between = (f"grey {a} … {b}" for a, b in pairwise(greys))
+            names = [f"grey below {greys[0]}", *between, f"grey above {greys[-1]}"]
         return dict(zip(names, map(float, shares), strict=True))
 
 

@@ -27,28 +27,28 @@ class LossCuts:
     """Cuts of the phases' loss factors.
 
     Args:
-        ends: Of Young's and of the bulk modulus, shape (levels, 2 ends, phases, 2); 0 where the
+        bounds: Of Young's and of the bulk modulus, shape (levels, 2, phases, 2); 0 where the
             bulk modulus has no loss factor of its own.
         has_bulk: Whether it has, for each phase.
     """
 
-    ends: Array
+    bounds: Array
     has_bulk: tuple[bool, ...]
 
     @classmethod
     def of_phases(cls, losses: Sequence[Losses], alpha: Sequence[float]) -> Self:
         """Cuts of fuzzy loss factors on some levels."""
         none = (0.0, 0.0)
-        ends = [
+        bounds = [
             [[young.cut(level), bulk.cut(level) if bulk else none] for young, bulk in losses]
             for level in alpha
         ]
         return cls(
-            np.moveaxis(np.array(ends), -1, 1), tuple(bulk is not None for _, bulk in losses)
+            np.moveaxis(np.array(bounds), -1, 1), tuple(bulk is not None for _, bulk in losses)
         )
 
     def corners(self, shares: Array, to_moduli: Array) -> Array:
-        """Losses that bring those of E, G and K to their ends, to first order.
+        """Phases' loss factors where those of E, G and K are least and greatest, to first order.
 
         Args:
             shares: ∂ln c/∂ln X by K and G of each phase, shape (phases, 2, 3).
@@ -56,16 +56,16 @@ class LossCuts:
                 (phases, 2, 2).
 
         Returns:
-            Of K and G of the phases, shape (levels, 2 ends, 3, phases, 2).
+            Of K and G of the phases, shape (levels, 2, 3, phases, 2).
         """
         slopes = np.einsum("pxj,pxc->cpj", to_moduli, shares)
-        lower, upper = np.moveaxis(self.ends[:, :, None], 1, 0)
+        lower, upper = np.moveaxis(self.bounds[:, :, None], 1, 0)
         least, most = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
         return np.asarray(np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([least, most])))
 
 
 def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:
-    """Ends of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
+    """Bounds of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
     assert result.energies is not None
     shares, _ = result.energies.shares(result.constants_of)
     # phases of a mesh, whose result knows no cell, have no bulk losses of their own
@@ -75,10 +75,10 @@ def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Ar
     errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
     if corners.max() <= MAX_FIRST_ORDER:
         return np.einsum("lecpx,pxc->lec", corners, shares), np.array(errors)
-    ends = np.empty(corners.shape[:3])
-    for corner in product(*map(range, ends.shape)):
-        ends[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
-    return ends, np.array(errors)
+    bounds = np.empty(corners.shape[:3])
+    for corner in product(*map(range, bounds.shape)):
+        bounds[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]
+    return bounds, np.array(errors)
 
 
 def loss_document(

@@ -107,11 +107,12 @@ class CellTask:
 
     @on_one_blas_thread
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of each point: E, nu, stresses, curves, systems, errors, certificate."""
+        """Outputs of each point: E, nu, stresses, curve, systems, errors and checks."""
         cells = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
         return [self._outputs(result) for result in self.model(cells)]
 
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
+        """Outputs of a cell by name, in SI; the stress curve has shape (CURVE_POINTS,)."""
         curve = result.curve
         fibres = fibre_constants(result).values if self.cell.fibres else {}
         losses = {} if self.losses is None else loss_outputs(result, self.losses)
@@ -321,7 +322,7 @@ def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array])
         if name in result.outputs:
             words, column = {"units": unit, "long_name": about}, result.column(name)
             points = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
-            reached = {"long_name": f"inputs that reach the ends of {name}, in SI"}
+            reached = {"long_name": f"inputs that reach the bounds of {name}, in SI"}
             variables[name] = (CUT, np.stack(result.bounds(name), axis=1), words)
             variables[f"{name}_at"] = ((*CUT, "parameter"), points, reached)
             variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
@@ -374,9 +375,13 @@ def cut_documents(result: Bounds, quantities: Mapping[str, tuple[str, str]]) -> 
 
 
 def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Array]:
-    """Outputs of a sample: ends of the loss factors on each level, and their errors."""
-    ends, errors = loss_bounds(result, cuts)
-    return {"loss_lower": ends[:, 0], "loss_upper": ends[:, 1], "loss_error": np.nan_to_num(errors)}
+    """Outputs of a sample: bounds of the loss factors on each level, and their errors."""
+    bounds, errors = loss_bounds(result, cuts)
+    return {
+        "loss_lower": bounds[:, 0],
+        "loss_upper": bounds[:, 1],
+        "loss_error": np.nan_to_num(errors),
+    }
 
 
 def loss_cuts(result: Bounds) -> dict[str, Array]:
@@ -430,7 +435,7 @@ def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
 
 def _stepped(data: xarray.Dataset, name: str) -> FuzzyNumber:
     """Fuzzy number of stored α-cuts; between two levels the wider cut holds."""
-    alpha, ends = data["alpha"].values, data[name].transpose("alpha", "bound").values
+    alpha, bounds = data["alpha"].values, data[name].transpose("alpha", "bound").values
     if tuple(alpha) == (1.0,):
-        return Crisp(float(ends.mean()))
-    return outer_steps(alpha, ends[:, 0], ends[:, 1])
+        return Crisp(float(bounds.mean()))
+    return outer_steps(alpha, bounds[:, 0], bounds[:, 1])

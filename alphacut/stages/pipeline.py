@@ -99,9 +99,9 @@ class Pipeline:
             return
         results.modulus = data = self.store.take(modulus.stage(self.campaign))
         cell.require_tolerance(data.document["error"], section.tolerance)
-        ends = data.arrays["E"].transpose("alpha", "bound").values[-1]
+        young = data.arrays["E"].transpose("alpha", "bound").values[-1]
         particles = self.campaign.cell.particles
-        cell.require_bounds((ends[0], ends[1]), data.document["references"], particles)
+        cell.require_bounds((young[0], young[1]), data.document["references"], particles)
 
     def structure(self, data: xarray.Dataset | None, key: str = "modulus") -> Structure:
         """The structure with the modulus and the loss factor of a stage, None for its own.

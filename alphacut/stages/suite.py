@@ -95,6 +95,7 @@ def suite(
 def _record(
     section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: Nominal
 ) -> SuiteRecord:
+    """A recording corrected, trimmed and scaled, with the duration of the motion under it."""
     ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
     measures = {
         "PGA": ground.extremes[0],
@@ -190,11 +191,11 @@ def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
     The peak of a structure is the largest over the records, so that each end is.
     """
     first = next(iter(peaks.values()))
-    ends = {
+    bounds = {
         name: np.max([getattr(x, name) for x in peaks.values()], axis=0) for name in PEAK_BOUNDS
     }
     columns = zip(*(x.natures for x in peaks.values()), strict=True)
-    return replace(first, natures=tuple(map(Nature.weakest, columns)), **ends)
+    return replace(first, natures=tuple(map(Nature.weakest, columns)), **bounds)
 
 
 def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
