@@ -166,7 +166,7 @@ def test_a_tolerance_that_is_missed_fails_but_for_a_graph_follower(
 def test_a_full_disk_is_said_to_be_full(tmp_path, monkeypatch, capfd):
     from alphacut.io import files
 
-    monkeypatch.setattr(files, "FULL", 1 << 60)
+    monkeypatch.setattr(files, "MIN_FREE_BYTES", 1 << 60)
     monkeypatch.setattr(files.os, "replace", lambda *_: (_ for _ in ()).throw(OSError("HDF error")))
     status, _, err = spoken(capfd, "envelope", written(tmp_path), "--out", tmp_path / "out")
     assert status == 1
