@@ -370,8 +370,7 @@ def cut_documents(result: Bounds, quantities: Mapping[str, tuple[str, str]]) -> 
     for name, (unit, _) in quantities.items():
         if name in result.outputs:
             size, key = (GPA, f"{name}_GPa") if unit == "Pa" else (1.0, name)
-            bounds: Array = np.stack(result.bounds(name), axis=1) / size
-            cuts[key] = as_cut(bounds)
+            cuts[key] = as_cut(np.asarray(np.stack(result.bounds(name), axis=1) / size, float))
     return cuts
 
 
