@@ -59,7 +59,7 @@ def least_peak(level: Level, output: int) -> tuple[float, Array]:
     data = sides[0].data
     motion = np.einsum("ks,kstp->ktp", data.share, data.table)  # of each mode at its points
     motion = motion.reshape(*motion.shape[:2], -1, int(data.points[0]))  # along q, along ω
-    cells = [_bounded(sides, motion, data.ends.astype(np.int64), 0, 0.0)]
+    cells = [_bounded(sides, motion, data.ends.astype(np.intp), 0, 0.0)]
     for number in range(1, 2 * BISECTIONS, 2):
         lowest = cells[0]
         halves = _halves(lowest, motion)
