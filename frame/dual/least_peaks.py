@@ -78,7 +78,7 @@ def _halves(cell: Cell, motion: Array) -> list[Rows]:
         Places of both halves; none where no range has a place between its ends.
     """
     varied, chosen = -1.0, (0, 0)
-    for k, (first, last, low, high) in enumerate(cell.places):
+    for k, (first, last, low, high) in enumerate(cell.places.tolist()):
         over = motion[k, cell.node, low : high + 1, first : last + 1]
         for axis, length in ((0, last - first), (2, high - low)):
             size = float(np.ptp(over, axis=1 - axis // 2).max())
@@ -94,9 +94,9 @@ def _halves(cell: Cell, motion: Array) -> list[Rows]:
 
 def _bounded(sides: list[Problem], motion: Array, places: Rows, number: int, known: float) -> Cell:
     """The cell at some places, with the largest over some nodes of the least ± output in it."""
-    middle = [(low + high) // 2 for low, high in places.reshape(-1, 2)]
-    at_middle = zip(motion, middle[1::2], middle[::2], strict=True)
-    expected: Array = np.sum([x[:, q, omega] for x, q, omega in at_middle], axis=0)
+    middle = [(low + high) // 2 for low, high in places.reshape(-1, 2).tolist()]
+    omega, q = middle[::2], middle[1::2]
+    expected: Array = motion[np.arange(len(motion)), :, q, omega].sum(0)
     size = np.abs(expected)
     summit = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
     nodes = np.argsort(np.where(summit, size, -1.0))[-TRIED:][::-1]
