@@ -137,7 +137,15 @@ class Polynomial:
 
 
 def fit(u: Array, data: Jet, degree: int) -> Polynomial:
-    """Least-squares fit to values and derivatives, V = (S, K), at unit points (S, d)."""
+    """Fits K polynomials of total `degree` to values and derivatives by least squares.
+
+    Derivatives of order k weigh 1 / degree^k, which is how they grow with the degree.
+
+    Args:
+        u: Points of the unit box, shape (S, d).
+        data: Values, gradients and Hessians there, V = (S, K).
+        degree: Total degree.
+    """
     index = exponents(u.shape[1], degree)
     d, w = u.shape[1], 1 / max(degree, 1)
     B = basis(u, index)

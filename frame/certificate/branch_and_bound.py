@@ -44,7 +44,7 @@ def enclosed(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> tuple[Array, int]:
-    """Encloses all problems of `optima`, whose points are the best known so far and improve.
+    """Upper bounds of all N problems of `optima` by branch and bound; its points improve.
 
     Args:
         model: The modal model.
@@ -57,8 +57,8 @@ def enclosed(
         progress: Called with the fraction done.
 
     Returns:
-        Proved bounds above the values, shape (N,), and boxes looked at, each as often as there are
-        problems that need it.
+        Proved upper bounds of side × output, shape (N,), and the number of boxes examined, each
+        counted once for each problem that needs it.
     """
     tree = Tree(model, lower, upper, optima, gap)
     frontier, size, used = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers), 0
@@ -289,5 +289,5 @@ def _tables(rate: Array, C: Array, d: int) -> Array:
 
 
 def _in_planes(x: Array) -> Array:
-    """Complex numbers as pairs of reals along a last axis."""
+    """Real and imaginary parts of complex numbers along a new last axis, shape (…, 2)."""
     return np.ascontiguousarray(x).view(float).reshape(*x.shape, 2)

@@ -56,7 +56,7 @@ def certify(
     budget: float = 4000,
     progress: Progress | None = None,
 ) -> Certificate:
-    """Encloses the bounds of all levels, the narrowest first.
+    """Attained and proved bounds of every output at each node and level, the narrowest level first.
 
     Args:
         model: The modal model.
@@ -116,7 +116,7 @@ def certify(
 
 
 def _between(model: ModalModel) -> Array:
-    """Bound of how far outputs stray from straight lines in the step to each node, shape (T, m).
+    """Bound of the interpolation error of outputs in the step to each node, shape (T, m).
 
     It is h²/8 times a bound of the second time derivative, and h/4 times a kink where a load jumps.
     """
@@ -150,7 +150,12 @@ def _between(model: ModalModel) -> Array:
 
 
 def _growth(model: ModalModel, margin: Array) -> Array:
-    """Bound of what the model's error, `margin` at the nodes (T, m), exceeds it by in between."""
+    """Bound of the growth of the model's error within the step to each node, shape (T, m).
+
+    Args:
+        model: The modal model.
+        margin: Bound of its error at the nodes, shape (T, m).
+    """
     growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
     swell = float(np.exp(np.maximum(-growth, 0.0).max() * model.flow.step))
     more = np.zeros_like(margin)

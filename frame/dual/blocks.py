@@ -198,7 +198,17 @@ def _turned(series: Series, rotation: Array) -> Series:
 
 
 def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Block | None:
-    """A block proved, or None where it is not enclosed."""
+    """Encloses a block's subspace over the box by Brouwer's theorem, as the module says.
+
+    Args:
+        block: Numbers of its modes, shape (p,).
+        rotation: R, shape (p, p).
+        series: Coefficients of L̃ᵀ, x̃ and M x̃ by degree.
+        centre: The structure.
+
+    Returns:
+        The block with proved remainders; None if the left sides may be singular or no bounds hold.
+    """
     mass, stiffness = centre.mass, centre.stiffness
     n, d, N = len(centre.basis), mass.inputs, len(series[0]) - 1
     o = np.setdiff1d(np.arange(n), block)

@@ -77,7 +77,7 @@ def with_motions_tested(envelope: Envelope, system: LinearSystem) -> Envelope:
 
 
 def structures_at(system: LinearSystem, envelope: Envelope, points: Array) -> list[LinearMotion]:
-    """A structure at inputs (S, n) of an envelope, ready to move."""
+    """Structure at each of S sets of inputs of an envelope, shape (S, n), as a `LinearMotion`."""
     matrices, rows = evaluate(system, tuple(envelope.inputs), points, derivatives=False)
     ground, n = system.ground, matrices.mass.value.shape[-1]
     record, step = (np.zeros(0), 0.0) if ground is None else (ground.samples, ground.step)
@@ -144,9 +144,9 @@ class Trial:
         return np.append(inside.ravel(), time[-1])
 
     def allowed(self, unknowns: int) -> int:
-        """Motions of so many unknowns that a share of the proof's work allows.
+        """Number of motions of so many unknowns that cost `SHARE` of the proof's multiplications.
 
-        Work is counted in multiplications.
+        It lies between `LEAST` and `MOST`.
         """
         nodes, outputs = self.envelope.lower.shape[1:]
         proof = 2 * self.envelope.lower.size * BOUND_WORK
@@ -166,7 +166,7 @@ class Trial:
         return np.array(list(dict.fromkeys(tuple(map(float, x)) for x in self._named(0))))
 
     def _in_order(self) -> Iterator[Array]:
-        """Points in the order of their worth, some of them more than once."""
+        """Yields inputs (n,) to test in the module's order, some of them more than once."""
         (low, high), levels = self.cuts, len(self.envelope.alpha)
         yield from self._named(0)
         yield np.array([number.modal for number in self.envelope.inputs.values()], float)
@@ -301,7 +301,10 @@ class _Check:
         raise ContradictionError(what, self._table())
 
     def _table(self) -> dict[str, Array]:
-        """Time, motion and attained bounds of the lowest level at the nodes, by column."""
+        """Columns by name, each (T,): time, and of each output motion and attained bounds.
+
+        The bounds are those of the lowest level.
+        """
         envelope, table = self.envelope, {"time [s]": self.envelope.time}
         for o, name in enumerate(envelope.named):
             table[f"motion of {name}"] = self.values[::QUARTERS, o]
