@@ -31,7 +31,7 @@ STEPS = 80
 
 
 @dataclass(order=True)
-class Cell:
+class PeakCell:
     """A cell with its bound.
 
     Args:
@@ -71,14 +71,15 @@ def least_peak(level: Level, output: int) -> tuple[float, Array]:
     return cells[0].bound, cells[0].at
 
 
-def _halves(cell: Cell, motion: Array) -> list[Rows]:
+def _halves(cell: PeakCell, motion: Array) -> list[Rows]:
     """Halves of the range over which a mode varies most at the cell's node, sharing the middle.
 
     Returns:
         Places of both halves; none where no range has a place between its ends.
     """
     varied, chosen = -1.0, (0, 0)
-    for k, (first, last, low, high) in enumerate(cell.places.tolist()):
+    for k in range(len(cell.places)):
+        first, last, low, high = (int(place) for place in cell.places[k])
         over = motion[k, cell.node, low : high + 1, first : last + 1]
         for axis, length in ((0, last - first), (2, high - low)):
             size = float(np.ptp(over, axis=1 - axis // 2).max())
@@ -92,7 +93,9 @@ def _halves(cell: Cell, motion: Array) -> list[Rows]:
     return [lower, upper]
 
 
-def _bounded(sides: list[Problem], motion: Array, places: Rows, number: int, known: float) -> Cell:
+def _bounded(
+    sides: list[Problem], motion: Array, places: Rows, number: int, known: float
+) -> PeakCell:
     """The cell at some places, with the largest over some nodes of the least ± output in it."""
     middle = [(low + high) // 2 for low, high in places.reshape(-1, 2).tolist()]
     omega, q = middle[::2], middle[1::2]
@@ -100,7 +103,7 @@ def _bounded(sides: list[Problem], motion: Array, places: Rows, number: int, kno
     size = np.abs(expected)
     summit = np.append(True, size[1:] >= size[:-1]) & np.append(size[:-1] >= size[1:], True)
     nodes = np.argsort(np.where(summit, size, -1.0))[-TRIED:][::-1]
-    cell = Cell(-np.inf, number, places, int(nodes[0]), np.zeros(sides[0].data.linear.shape[1]))
+    cell = PeakCell(-np.inf, number, places, int(nodes[0]), np.zeros(sides[0].data.linear.shape[1]))
     for node in map(int, nodes):
         if size[node] <= cell.bound:
             break
@@ -109,7 +112,7 @@ def _bounded(sides: list[Problem], motion: Array, places: Rows, number: int, kno
         bound = _on_slab(places, node, problem.side, -size[node], problem.data, u)
         least = -(bound + float(problem.constant[:, node].sum()))
         if least > cell.bound:
-            cell = Cell(least, number, places, node, u)
+            cell = PeakCell(least, number, places, node, u)
     cell.bound = max(cell.bound, known)
     return cell
 

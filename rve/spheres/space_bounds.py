@@ -23,7 +23,7 @@ def space_stiffness(phase: Phase) -> Array:
 def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
     """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
     share = np.asarray(fraction, float)
-    bulks, shears = np.transpose([matrix.bulk_and_shear, inclusion.bulk_and_shear]).tolist()
+    bulks, shears = zip(*(map(float, x.bulk_and_shear) for x in (matrix, inclusion)), strict=True)
     ends = [
         [
             _harmonic_about(share, pair, x)

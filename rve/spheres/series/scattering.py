@@ -25,7 +25,7 @@ def scattering(degrees: Array, matrix: Phase, inclusion: Phase) -> tuple[Array, 
         Of solutions 1 and 3, shape (k, 2, 2), and of solution 2, shape (k,).
     """
     n = np.asarray(degrees, float)
-    ratio = inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1]
+    ratio = float(inclusion.bulk_and_shear[1] / matrix.bulk_and_shear[1])
     soft, stiff = 1 / (1 + ratio), ratio / (1 + ratio)  # of one scale, pores and rigid alike
     stiffness = _surface_stiffness(n, inclusion.poisson)
 

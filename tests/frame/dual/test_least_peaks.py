@@ -50,12 +50,12 @@ def test_a_limit_below_the_least_peak_must_be_exceeded(found):
 def test_halves_cover_all_places_and_share_the_middle():
     motion = np.random.default_rng().normal(size=(2, 3, 13, 41))
     for ends in ([[0, 40, 0, 12], [0, 40, 0, 12]], [[3, 5, 2, 2], [4, 5, 2, 3]]):
-        cell = least_peaks.Cell(0.0, 0, np.array(ends), 1, np.zeros(2))
+        cell = least_peaks.PeakCell(0.0, 0, np.array(ends), 1, np.zeros(2))
         lower, upper = least_peaks._halves(cell, motion)
         np.testing.assert_array_equal(np.minimum(lower, upper)[:, ::2], cell.places[:, ::2])
         np.testing.assert_array_equal(np.maximum(lower, upper)[:, 1::2], cell.places[:, 1::2])
         changed = np.argwhere(lower != cell.places)
         ((mode, place),) = changed
         assert lower[mode, place] == upper[mode, place - 1]
-    atoms = least_peaks.Cell(0.0, 0, np.array([[7, 8, 0, 1]] * 2), 1, np.zeros(2))
+    atoms = least_peaks.PeakCell(0.0, 0, np.array([[7, 8, 0, 1]] * 2), 1, np.zeros(2))
     assert least_peaks._halves(atoms, motion) == []
