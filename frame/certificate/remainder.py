@@ -27,7 +27,11 @@ ROUNDING = 1e-13
 
 
 def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
-    """Bounds of |derivative| for |u_i| <= reach_i, orders 0 to 3, shapes (d,) * order + (K,)."""
+    """Bounds of the derivatives of K polynomials over the box |u_i| ≤ reach_i, orders 0 to 3.
+
+    Returns:
+        Four arrays, of shape (d,) * order + (K,): sums of |coefficient| times its monomial's bound.
+    """
     d = polynomial.index.shape[1]
     size = np.prod(reach**polynomial.index, axis=1)
 
@@ -46,7 +50,7 @@ def suprema(polynomial: Polynomial, reach: Array) -> list[Array]:
 
 
 def largest_growth(eigenvalue: Polynomial, reach: Array) -> Array:
-    """Bounds of Re λ_k for |u_i| <= reach_i, shape (n,)."""
+    """Upper bounds of the growth rates Re λ_k over the box |u_i| ≤ reach_i, shape (n,), in 1/s."""
     size = np.prod(reach**eigenvalue.index, axis=1)
     real = eigenvalue.coefficients.real
     return np.asarray(real[0] + size[1:] @ np.abs(real[1:]))
@@ -57,11 +61,12 @@ class MotionPart:
     """The free part of a modal model, or what one load adds.
 
     Args:
-        share: C_k, n m polynomials.
+        share: Coefficients C_k, n m polynomials.
         waves: Bounds of the derivatives of w by λ, orders 0 to 3, shape (4, T, n).
         elapsed: Bounds of ∫ |w| from 0 to t, shape (T, n).
-        push: What the part has been set off with up to t: 1, or a bound of ∫ |a|, as m/s, (T,).
-        left_out: Share of waves[0] by which the model's w may be wrong, shape (n,).
+        push: Bound of the impulse ∫ |a| of the load up to t, shape (T,), in m/s; 1 of the free
+            part.
+        left_out: Bound of the model's error of w, over waves[0], shape (n,).
         load: The load; None of the free part.
         number: Its place among the loads.
     """
@@ -76,7 +81,12 @@ class MotionPart:
 
 
 def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
-    """Free part of a model, and one of each load; `growth` bounds Re λ_k, (n,)."""
+    """The free part of a model and the part of each load, with bounds of their time functions.
+
+    Args:
+        model: The modal model.
+        growth: Upper bounds of Re λ_k, shape (n,), in 1/s.
+    """
     time = model.time[:, None]
     powers = time ** np.arange(4)[:, None, None]
     elapsed = np.where(
@@ -89,32 +99,52 @@ def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
         np.ones(len(time)),
         np.zeros(model.count),
     )
-    return [free, *(_forced(model, growth, k) for k in range(len(model.loads)))]
+    return [free, *(_forced_part(model, growth, k) for k in range(len(model.loads)))]
 
 
-def _forced(model: ModalModel, growth: Array, number: int) -> MotionPart:
-    """The part that a load adds."""
+def _forced_part(model: ModalModel, growth: Array, number: int) -> MotionPart:
+    """The part of a modal model that load `number` adds, R bounded by convolution with |a|.
+
+    Args:
+        model: The modal model.
+        growth: Upper bounds g of Re λ_k, shape (n,), in 1/s.
+        number: Index of the load among the model's.
+    """
     load, steps = model.loads[number], len(model.time) - 1
     if isinstance(load, Direct):
-        waves: Array = np.zeros((4, len(model.time), model.count))
-        waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
-        none = np.zeros(len(model.time))
-        return MotionPart(load.share, waves, 0 * waves[0], none, load.truncation, load, number)
-    parts = ceil(model.flow.step / load.history.step - 1e-9)
-    h, count = model.flow.step / parts, parts * steps
-    kernels = [_largest(growth, h, count, power) for power in range(4)]
-    # ∫ exp(g s) ds to the end of each interval, at most
-    swell = np.cumsum(kernels[0], axis=0) * h
-    size = Segments(load.history, h, count).magnitudes(count)
+        return _feedthrough_part(model, load, number)
+    substeps = ceil(model.flow.step / load.history.step - 1e-9)
+    h, count = model.flow.step / substeps, substeps * steps
+    kernels = [_kernel_maxima(growth, h, count, power) for power in range(4)]
+    # upper sums of ∫ exp(g s) ds from 0 to the end of each interval
+    integrated = np.cumsum(kernels[0], axis=0) * h
+    impulses = Segments(load.history, h, count).magnitudes(count)
     waves, elapsed, push = (
-        _convolved(kernel, size)[..., ::parts, :]
-        for kernel in (np.stack(kernels), swell, np.ones((count, 1)))
+        _convolution_bounds(kernel, impulses)[..., ::substeps, :]
+        for kernel in (np.stack(kernels), integrated, np.ones((count, 1)))
     )
     return MotionPart(load.share, waves, elapsed, push[:, 0], load.truncation, load, number)
 
 
-def _largest(growth: Array, step: float, count: int, power: int) -> Array:
-    """Largest τ^power exp(g τ) in each of `count` intervals, shape (count, n)."""
+def _feedthrough_part(model: ModalModel, load: Direct, number: int) -> MotionPart:
+    """The part of a load's direct feedthrough: w of the first mode is a(t), with no dynamics."""
+    waves: Array = np.zeros((4, len(model.time), model.count))
+    waves[0] = np.abs(load.at_nodes(np.zeros((1, model.count)))[0])
+    no_push = np.zeros(len(model.time))
+    return MotionPart(load.share, waves, 0 * waves[0], no_push, load.truncation, load, number)
+
+
+def _kernel_maxima(growth: Array, step: float, count: int, power: int) -> Array:
+    """Largest value of τ^power exp(g τ) in each of `count` intervals of time, shape (count, n).
+
+    It lies at an end of the interval, or at τ = −power / g where that is inside.
+
+    Args:
+        growth: g, shape (n,), in 1/s.
+        step: Length of an interval, in s.
+        count: Number of intervals, from τ = 0 on.
+        power: Exponent of τ.
+    """
     ends = (np.arange(count + 1) * step)[:, None]
     value = ends**power * np.exp(growth * ends)
     peak = -power / np.where(growth < 0, growth, -1e-300)
@@ -123,8 +153,11 @@ def _largest(growth: Array, step: float, count: int, power: int) -> Array:
     return np.asarray(np.maximum(np.maximum(value[:-1], value[1:]), np.where(inside, summit, 0.0)))
 
 
-def _convolved(kernel: Array, size: Array) -> Array:
-    """Upper sums of ∫ kernel(τ) |a(t − τ)| dτ at the ends of all intervals, (…, J + 1, n).
+def _convolution_bounds(kernel: Array, size: Array) -> Array:
+    """Upper bounds of ∫ kernel(τ) |a(t − τ)| dτ at t = 0 and the ends of J intervals.
+
+    Returns:
+        Upper sums with the rounding of the Fourier transforms, shape (…, J + 1, n).
 
     Args:
         kernel: Its maxima over the intervals, shape (…, J, n).
@@ -162,7 +195,7 @@ class Remainder:
         margin = np.zeros((len(model.time), m, 1 + d))
         for part in parts(model, growth):
             share = [x.reshape((*x.shape[:-1], n, m)) for x in suprema(part.share, reach)]
-            noise = _noise(model, rate[0], part.load)
+            noise = _rounding_bound(model, rate[0], part.load)
             for k in range(n):
                 of_mode = [x[..., k, :] for x in share], [x[..., k] for x in rate]
                 sizes = []
@@ -171,43 +204,48 @@ class Remainder:
                     waves = 2 * part.waves[: order + 1, :, k]
                     sizes.append(np.tensordot(waves, bounds, (0, 0)))  # (T, d, …, m)
                 third += np.moveaxis(sizes[3], -1, 1)
-                bent = np.einsum("tijm,j->tim", sizes[2], width)
-                slopes, middle = sizes[1] + bent, sizes[1] + bent / 2
-                values = sizes[0] + np.einsum("tim,i->tm", middle, width)
+                slope_change = np.einsum("tijm,j->tim", sizes[2], width)
+                slopes, mean_slope = sizes[1] + slope_change, sizes[1] + slope_change / 2
+                values = sizes[0] + np.einsum("tim,i->tm", mean_slope, width)
                 margin[..., 0] += noise[:, k, None] * values
                 margin[..., 1:] += noise[:, k, None, None] * np.moveaxis(slopes, -1, 1)
-        third[model.time == 0] = _at_rest(model, reach)
+        third[model.time == 0] = _initial_third_derivatives(model, reach)
         self.tensor, self.margin, self.rate, self.share = (1 + 1e-9) * third, margin, rate, share
 
 
-def _noise(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
-    """Bound of rounding in a mode's motion, as a share of its size, shape (T, n).
+def _rounding_bound(model: ModalModel, rate: Array, load: LoadTables | None) -> Array:
+    """Bound of the relative rounding error of each mode's motion at each node, shape (T, n).
 
-    Polynomials are sums of their terms, waves turn by λ t, and outputs are sums over modes; a
-    wave under a load is a series whose terms may pass its sum exp(REACH) times.
+    The rounding of λ enters exp(λ t) times |λ| t. A load's response is a Taylor series in λ, whose
+    terms may exceed its sum by the factor exp(REACH).
+
+    Args:
+        model: The modal model.
+        rate: Bounds of |λ_k|, shape (n,), in 1/s.
+        load: The load; None for the free motion.
     """
     count, d = model.eigenvalue.index.shape
     polynomial = count + model.degree + 2
-    turned = rate * model.time[:, None]
-    steps = polynomial * (2 + turned) + 12 * model.count + 4 * d**3 + 50
+    phase = rate * model.time[:, None]
+    operations = polynomial * (2 + phase) + 12 * model.count + 4 * d**3 + 50
     if load is not None:
-        steps = steps + (8 * load.longest + MOST_TERMS) * np.exp(REACH)
-    return np.finfo(float).eps * steps
+        operations = operations + (8 * load.longest + MOST_TERMS) * np.exp(REACH)
+    return np.finfo(float).eps * operations
 
 
-def _at_rest(model: ModalModel, reach: Array) -> Array:
-    """Bounds of third derivatives of the initial outputs, shape (m, d, d, d).
+def _initial_third_derivatives(model: ModalModel, reach: Array) -> Array:
+    """Bounds of third derivatives of the outputs at t = 0, |u_i| ≤ reach_i, shape (m, d, d, d).
 
-    They are sums over the modes, and most of these cancel.
+    They are summed over the modes before they are bounded, since most of the sum cancels.
     """
-    share = model.coefficient.coefficients
-    together = 2 * share.reshape(len(share), model.count, -1).sum(1).real
-    third = suprema(Polynomial(model.coefficient.index, together), reach)[3]
+    coefficients = model.coefficient.coefficients
+    mode_sum = 2 * coefficients.reshape(len(coefficients), model.count, -1).sum(1).real
+    third = suprema(Polynomial(model.coefficient.index, mode_sum), reach)[3]
     return np.moveaxis(third, -1, 0)
 
 
 def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
-    """Bounds of derivatives of C exp(λ t), divided by exp(λ t), by powers of t.
+    """Bounds of the derivatives of C exp(λ t), divided by exp(λ t), as coefficients of powers of t.
 
     Args:
         c: Bounds of the derivatives of C, shapes (d,) * its order + (m,).
@@ -215,7 +253,7 @@ def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
         order: Of the derivative.
 
     Returns:
-        For each power of t from 0 to `order`, shape (d,) * order + (m,).
+        One array for each power of t from 0 to `order`, shape (d,) * order + (m,).
     """
     d, m = len(r[1]), c[0].shape[-1]
     out: list[Array] = [np.zeros((d,) * order + (m,)) for _ in range(order + 1)]
@@ -231,7 +269,7 @@ def leibniz(c: list[Array], r: list[Array], order: int) -> list[Array]:
 
 
 def _partitions(items: list[str]) -> list[list[str]]:
-    """All ways to divide letters into blocks."""
+    """All set partitions of distinct letters, each a list of blocks (Faà di Bruno's formula)."""
     if not items:
         return [[]]
     first, found = items[0], []

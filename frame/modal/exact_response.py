@@ -43,7 +43,9 @@ class ExactResponse:
 
     @classmethod
     def from_model(cls, model: ModalModel, scale: Array, *, bent: bool = True) -> ExactResponse:
-        """Of the structure whose polynomials are `model`, in units of `scale` (m,).
+        """Exact response of the structure of `model`, outputs divided by `scale` (m,).
+
+        Loads are tabulated for all modes, those that the model leaves out too.
 
         Raises:
             ModalError: Under a load, a mode does not oscillate.
@@ -52,8 +54,8 @@ class ExactResponse:
         if loads and len(model.chosen) < len(frequencies(flow.system)):
             points = fit_points(len(cuts.names), 2)
             rate = fit(points, analyse(flow, cuts, points).eigenvalue, 2)
-            nothing = Polynomial(rate.index, np.zeros_like(rate.coefficients))
-            loads = tuple(replace(load, rate=rate, share=nothing) for load in loads)
+            zero = Polynomial(rate.index, np.zeros_like(rate.coefficients))
+            loads = tuple(replace(load, rate=rate, share=zero) for load in loads)
         return cls(model.in_units(scale), scale, loads, bent)
 
     @property
@@ -67,11 +69,16 @@ class ExactResponse:
         return self.model.outputs
 
     def value_at(self, unit: Array, node: Rows, output: Rows) -> Array:
-        """Values (N,) of one output at one node per point (N, d)."""
+        """Values (N,) of one output at one node for each of N points, unit coordinates (N, d)."""
         return self._values_and_gradients(unit, node, output, 0)[0]
 
     def at(self, unit: Array, node: Rows, output: Rows) -> tuple[Array, Array, Array]:
-        """Values (N,) and gradients (N, d), exact; Hessians (N, d, d) of the polynomials, or 0."""
+        """One output at one node for each of N points, unit coordinates (N, d), with derivatives.
+
+        Returns:
+            Exact values (N,) and gradients (N, d); Hessians (N, d, d) of the polynomials, or zero
+            where `bent` is false.
+        """
         f, g = self._values_and_gradients(unit, node, output, 1)
         if self.bent:
             return f, g, self.model.at(unit, node, output)[2]
@@ -92,16 +99,26 @@ class ExactResponse:
     def _at_modes(
         self, modes: Modes, indices: Rows, node: Rows, output: Rows
     ) -> tuple[Array, Array]:
-        """Outputs of modes `indices` (N,) with slopes, 2 Re Σ C_k w(λ_k) over start and loads."""
+        """Output 2 Re Σ C_k w(λ_k), over free motion and loads, of one set of modes a point.
+
+        Args:
+            modes: Modes with first derivatives at the distinct points.
+            indices: Which of these each of N points is, shape (N,).
+            node: Time node of each, shape (N,).
+            output: Index of the output of each, shape (N,).
+
+        Returns:
+            Values (N,) and gradients (N, d), divided by the outputs' scale.
+        """
         rate, slope = modes.eigenvalue.value[indices], modes.eigenvalue.first[:, indices]
         t, scale = self.time[node][:, None], self.scale[output]
         wave = np.exp(rate * t)
         parts = [(modes.coefficient, wave, t * wave)]
-        for share, load in zip(modes.loads, self.loads, strict=True):
-            parts.append((share, *load.response(rate, node)[:2]))
+        for coefficient, load in zip(modes.loads, self.loads, strict=True):
+            parts.append((coefficient, *load.response(rate, node)[:2]))
         f, g = np.zeros(len(indices)), np.zeros((len(slope), len(indices)))
-        for share, w, dw in parts:
-            value, first = share.value[indices, :, output], share.first[:, indices, :, output]
+        for C, w, dw in parts:
+            value, first = C.value[indices, :, output], C.first[:, indices, :, output]
             f += 2 * (value * w).real.sum(-1)
             g += 2 * (np.moveaxis(first, 1, 0) * w + value * dw * slope).real.sum(-1)
         return f / scale, (g / scale).T

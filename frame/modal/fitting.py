@@ -49,16 +49,19 @@ def fit_modes(
     energy: bool = False,
     degree: int | None = None,
 ) -> ModalModel:
-    """Fit polynomials of rising degree until held-out trajectories meet `tolerance`.
+    """Fits modal models of rising polynomial degree until test trajectories meet `tolerance`.
 
     Args:
-        flow: The trajectories to stand for.
-        boxes: The parameters' boxes.
-        tolerance: Wanted deviation, in units of the outputs.
+        flow: Flow whose trajectories the model approximates and is tested against.
+        boxes: Boxes of the parameters, one a level; the fit covers the widest.
+        tolerance: Largest deviation allowed, in units of the outputs.
         budget: Most eigen-analyses.
         scale: Factor on the tolerance for each output, shape (m,).
-        energy: Whether modes are left out by their energy alone, as a proof needs it.
+        energy: Whether modes are left out by bounds of their energy, as `needed_modes` says.
         degree: The only degree to fit, whatever its error; all from 2 on unless given.
+
+    Returns:
+        The most accurate model, with the largest deviation of each output at each node.
 
     Raises:
         ModalError: No oscillating modes, or double ones whose polynomials do not reach the
@@ -79,7 +82,7 @@ def fit_modes(
         count = sum(len(some.eigenvalue.value) for some in fitted_modes)
         if count < len(points):  # the points of lower degrees are among them
             fitted_modes.append(analyse(flow, boxes, points[count:], chosen))
-        model = _fitted(flow, boxes, points, joined(fitted_modes), total, chosen)
+        model = _model_from_modes(flow, boxes, points, joined(fitted_modes), total, chosen)
         error = np.abs(model.values(tests) - truth).max(0)
         reached.append(float((error / scale).max()))
         if best is None or reached[-1] < (best.error / scale).max():
@@ -121,38 +124,65 @@ def hopeless(reached: Sequence[float], tolerance: float, d: int, budget: int) ->
 
 
 def fit_points(d: int, degree: int) -> Array:
-    """Points of analysis for a total degree in d variables, shape (S, d)."""
+    """Points of the unit box for a fit of total `degree` in d variables, shape (S, d).
+
+    The centre comes first, then Chebyshev points: at least 2.5 data a coefficient up to six
+    variables and 5 beyond, with value, gradient and Hessian of each point as data.
+    """
     data = 1 + d + d * (d + 1) // 2
     count = ceil((2.5 if d <= 6 else 5) * terms(d, degree) / data)
     return np.vstack([np.zeros((1, d)), chebyshev_points(d, count)])
 
 
 def fit_states(model: ModalModel) -> list[Polynomial]:
-    """Polynomials of the states [φ_k; λ_k φ_k] of the model's modes.
+    """Fits polynomials of the modal states z_k = [φ_k; λ_k φ_k], q(t) = 2 Re Σ φ_k exp(λ_k t).
 
     Returns:
-        What the initial state puts into them, and what a unit impulse of each load does.
+        Vectors of n · 2N polynomials, mode by mode, of n modes and N unknowns: φ_k scaled by the
+        initial state, then φ_k scaled by a unit impulse of each load.
     """
     unit = fit_points(len(model.boxes.names), model.degree)
-    analysed = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
-    return _shares(unit, analysed, model.degree)
+    mode_data = analyse(model.flow, model.boxes, unit, model.chosen, states=True)
+    return _coefficient_polynomials(unit, mode_data, model.degree)
 
 
-def _fitted(
-    flow: LinearFlow, boxes: Boxes, points: Array, analysed: Modes, degree: int, chosen: Array
+def _model_from_modes(
+    flow: LinearFlow, boxes: Boxes, points: Array, mode_data: Modes, degree: int, chosen: Array
 ) -> ModalModel:
-    rate, time = fit(points, analysed.eigenvalue, degree), flow.time
-    free, *forced = _shares(points, analysed, degree)
-    kinds = [(LoadTables, course) for course in histories(flow.system).values()]
-    kinds += [(Direct, course) for course in courses_of_forces(flow.system)]
-    pairs = zip(kinds, forced, strict=False)  # without what acts at once, where nothing does
-    loads = tuple(kind(course, time, rate, share) for (kind, course), share in pairs)
-    nothing = np.zeros((len(time), len(flow.outputs)))
-    return ModalModel(flow, boxes, rate, free, loads, chosen, nothing, 0)
+    """Modal model whose eigenvalues and coefficients are fitted to eigen-analyses.
+
+    Args:
+        flow: The flow that was analysed.
+        boxes: Boxes of its parameters.
+        points: Unit coordinates of the analyses, shape (S, d).
+        mode_data: Eigenvalues and coefficients there, with derivatives.
+        degree: Total degree of the polynomials.
+        chosen: Indices of the modes, shape (n,).
+
+    Returns:
+        The model, its error and number of analyses still zero.
+    """
+    eigenvalue, time = fit(points, mode_data.eigenvalue, degree), flow.time
+    free, *forced = _coefficient_polynomials(points, mode_data, degree)
+    loads = [(LoadTables, history) for history in histories(flow.system).values()]
+    loads += [(Direct, history) for history in courses_of_forces(flow.system)]
+    # without direct feedthrough of forces to outputs, `forced` ends before `Direct` begins
+    responses = tuple(
+        response(history, time, eigenvalue, coefficient)
+        for (response, history), coefficient in zip(loads, forced, strict=False)
+    )
+    zero_error = np.zeros((len(time), len(flow.outputs)))
+    return ModalModel(flow, boxes, eigenvalue, free, responses, chosen, zero_error, 0)
 
 
-def _shares(points: Array, data: Modes, degree: int) -> list[Polynomial]:
-    """Polynomials of what the initial state puts into n modes' m rows, and what each load does."""
+def _coefficient_polynomials(points: Array, data: Modes, degree: int) -> list[Polynomial]:
+    """Fits C_k of the free motion, then of each load, as vectors of n m polynomials.
+
+    Args:
+        points: Unit coordinates, shape (S, d).
+        data: Modes there with derivatives, n modes and m observed rows.
+        degree: Total degree of the polynomials.
+    """
     flat = (
         jet.map(lambda x: x.reshape((*x.shape[:-2], -1))) for jet in (data.coefficient, *data.loads)
     )
@@ -160,7 +190,7 @@ def _shares(points: Array, data: Modes, degree: int) -> list[Polynomial]:
 
 
 def _held_out(d: int) -> Array:
-    """Corners and inner points that no fit uses, shape (≤ 24, d)."""
+    """Test points of the unit box, corners and inner ones that no fit uses, shape (≤ 22, d)."""
     rng = np.random.default_rng(20)
     corners = np.sign(rng.uniform(-1, 1, (12, d)))
     points: Array = np.unique(
@@ -178,18 +208,22 @@ def analyse(
     states: bool = False,
     order: int = 2,
 ) -> Modes:
-    """Eigen-analyses with derivatives at unit coordinates (S, d).
+    """Eigenvalues λ_k and coefficients C_k at S points, with derivatives by unit coordinates.
 
     Args:
-        flow: The trajectories.
-        boxes: The parameters' boxes.
-        unit: Where to analyse, shape (S, d).
-        chosen: Indices of the modes wanted; all when None.
-        states: Whether to observe the whole state [q; v] in place of the outputs.
+        flow: Flow of the structure, integrated exactly.
+        boxes: Boxes of its parameters; the unit box stands for the widest.
+        unit: Unit coordinates of the points, shape (S, d).
+        chosen: Indices of the n modes by rising |λ|; all when None.
+        states: Whether C_k is of the state [q; v], m = 2N, in place of the m outputs.
         order: Highest order of derivatives, 0, 1 or 2.
 
+    Returns:
+        Jets of λ_k, V = (S, n), in 1/s, and of C_k, V = (S, n, m): of the free motion, of each
+        load, and of the direct feedthrough of each force, if any.
+
     Raises:
-        ModalError: The structure has no such modes, or the motion is not the exact one.
+        ModalError: A mode does not oscillate, or the flow's integrator is not the exact one.
     """
     if not isinstance(flow.integrator, Exact):
         name = flow.integrator.name
@@ -203,63 +237,78 @@ def analyse(
     has_ground = flow.system.ground is not None
     found_modes = modes(matrices, rows, matrices.pushes(ground=has_ground), chosen)
     if not states and matrices.feeds is not None:
-        direct = _as_modes(matrices.feeds, found_modes.eigenvalue.value.shape[-1])
-        found_modes = replace(found_modes, loads=(*found_modes.loads, *direct))
+        feedthrough = _feedthrough(matrices.feeds, found_modes.eigenvalue.value.shape[-1])
+        found_modes = replace(found_modes, loads=(*found_modes.loads, *feedthrough))
     return found_modes.map(boxes.in_unit) if order else found_modes
 
 
-def _as_modes(feeds: Jet, count: int) -> list[Jet]:
-    """What each load adds at once, as twice the real part of a share of the first of n modes."""
+def _feedthrough(feeds: Jet, count: int) -> list[Jet]:
+    """Direct feedthrough of each load as coefficients C_k, V = (S, n, m) of n = `count` modes.
+
+    With `Direct`, where w of the first mode is a(t), 2 Re C_1 w is the feedthrough times a(t).
+
+    Args:
+        feeds: Outputs by a unit of each load, V = (S, m, L).
+        count: Number of modes.
+    """
     first = np.eye(count)[0][:, None] / 2
     columns = [feeds[..., i][..., None, :] for i in range(feeds.value.shape[-1])]
     return [column * first for column in columns]
 
 
 def needed_modes(flow: LinearFlow, boxes: Boxes, allowed: Array, *, energy: bool = False) -> Array:
-    """Indices of the modes whose share in some output matters.
+    """Indices (n,) of the modes at the box's centre that some output cannot do without.
 
     Args:
-        flow: The trajectories.
-        boxes: The parameters' boxes.
-        allowed: What all modes left out may reach together, for each output, shape (m,).
-        energy: Whether that is bounded by their energy, as a proof does it, and not by their own
-            shapes alone: fast modes add little to a displacement, but may hold much.
+        flow: Flow of the structure.
+        boxes: Boxes of its parameters.
+        allowed: Largest sum of the amplitudes of all omitted modes, for each output, shape (m,).
+        energy: Whether amplitudes are bounded by the modes' energy too, as a proof does it. Fast
+            modes hardly move a displacement, but may hold much energy.
     """
     matrices, rows = evaluate(flow.system, flow.names, boxes.centre[None], derivatives=False)
-    rate, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
-    state = np.abs(Y @ matrices.start.value[0])
-    pushes = matrices.pushes(ground=flow.system.ground is not None).value[0]
-    for course, push in zip(histories(flow.system).values(), pushes.T, strict=True):
-        # bound of |R(t; λ)|
-        size = course.extremes[0] / np.maximum(-rate.real, 1e-300)
-        most = np.minimum(float(impulses(course, flow.time)[-1]), size)
-        state += np.abs(Y @ np.append(0.0 * push, push))[:, None] * most[:, None]
-    upper = np.flatnonzero(rate.imag >= 0)
-    size = (2 * np.abs(rows.value[0] @ X).T * state / allowed)[upper]
+    eigenvalue, X, Y = (jet.value[0] for jet in eigenvectors(state_matrix(matrices)))
+    modal_state = np.abs(Y @ matrices.start.value[0])
+    accelerations = matrices.pushes(ground=flow.system.ground is not None).value[0]
+    for history, unit_load in zip(histories(flow.system).values(), accelerations.T, strict=True):
+        # |R(t; λ)| ≤ min(∫ |a|, max |a| / −Re λ)
+        steady = history.extremes[0] / np.maximum(-eigenvalue.real, 1e-300)
+        response = np.minimum(float(impulses(history, flow.time)[-1]), steady)
+        participation = np.abs(Y @ np.append(0.0 * unit_load, unit_load))
+        modal_state += participation[:, None] * response[:, None]
+    upper = np.flatnonzero(eigenvalue.imag >= 0)  # one of each conjugate pair
+    amplitude = 2 * np.abs(rows.value[0] @ X[:, upper]).T * modal_state[upper]
     if energy:
-        size = np.maximum(size, _by_energy(matrices, rows.value[0], X, state, upper) / allowed)
-    order = np.argsort(size.max(1))
-    small = order[:-1][(np.cumsum(size[order[:-1]], 0) <= 1).all(1)]
+        by_energy = _energy_amplitudes(matrices, rows.value[0], X[:, upper], modal_state[upper])
+        amplitude = np.maximum(amplitude, by_energy)
+    amplitude /= allowed
+    order = np.argsort(amplitude.max(1))
+    small = order[:-1][(np.cumsum(amplitude[order[:-1]], 0) <= 1).all(1)]
     return np.setdiff1d(upper, upper[small])
 
 
-def _by_energy(matrices: Matrices, rows: Array, X: Array, state: Array, upper: Array) -> Array:
-    """Bounds of what modes add to the outputs by their energy, shape (modes, m).
+def _energy_amplitudes(matrices: Matrices, rows: Array, shapes: Array, state: Array) -> Array:
+    """Bounds of the amplitudes of modes in the outputs by the modes' energy, shape (n, m).
 
     An output r q + s v is at most √(r K⁻¹ rᵀ + s M⁻¹ sᵀ) times √(qᵀ K q + vᵀ M v).
+
+    Args:
+        matrices: Mass and stiffness of N unknowns.
+        rows: Observation rows [r, s], shape (m, 2N).
+        shapes: Right eigenvectors [φ; λ φ], shape (2N, n).
+        state: Bounds of the modal states, shape (n, 1).
+
+    Raises:
+        ModalError: The stiffness is singular.
     """
     M, K = matrices.mass.value[0], matrices.stiffness.value[0]
     n = len(M)
     if not np.linalg.cond(K) < 1 / np.finfo(float).eps:
         raise ModalError("a mode does not oscillate: the stiffness lets the structure drift")
-    reading = [
-        np.einsum("oi,io->o", part, np.linalg.solve(matrix, part.T))
-        for part, matrix in ((rows[:, :n], K), (rows[:, n:], M))
-    ]
-    shapes = X[:, upper]
-    tests = [
-        np.einsum("ik,ij,jk->k", part.conj(), matrix, part).real
-        for part, matrix in ((shapes[:n], K), (shapes[n:], M))
-    ]
-    size = 2 * np.sqrt(np.maximum(tests[0] + tests[1], 0.0))[:, None] * state[upper]
-    return np.asarray(size * np.sqrt(np.maximum(reading[0] + reading[1], 0.0)))
+    row_norms, energies = np.zeros(len(rows)), np.zeros(shapes.shape[1])
+    for matrix, row, shape in ((K, rows[:, :n], shapes[:n]), (M, rows[:, n:], shapes[n:])):
+        row_norms += np.einsum("oi,io->o", row, np.linalg.solve(matrix, row.T))
+        energies += np.einsum("ik,ij,jk->k", shape.conj(), matrix, shape).real
+    # rounding may make squares negative
+    size = 2 * np.sqrt(np.maximum(energies, 0.0))[:, None] * state
+    return np.asarray(size * np.sqrt(np.maximum(row_norms, 0.0)))

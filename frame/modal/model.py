@@ -72,44 +72,53 @@ class ModalModel:
         return int(self.eigenvalue.index.sum(1).max())
 
     def in_units(self, scale: Array) -> ModalModel:
-        """The same with every output divided by its scale (m,)."""
-        share = self.coefficient.divided(np.tile(scale, self.count))
+        """Model with every output divided by its scale (m,)."""
+        coefficient = self.coefficient.divided(np.tile(scale, self.count))
         loads = tuple(load.in_units(scale) for load in self.loads)
-        return replace(self, coefficient=share, loads=loads, error=self.error / scale)
+        return replace(self, coefficient=coefficient, loads=loads, error=self.error / scale)
 
     @cached_property
     def started(self) -> bool:
-        """True where there is a free motion."""
+        """Whether the model has a free motion: an initial state, or no load at all."""
         return not self.loads or bool(self.coefficient.coefficients.any())
 
     @cached_property
     def together(self) -> Polynomial:
-        """λ_k and behind them the shares of each part, free and forced: n + n m of each part."""
+        """Polynomials λ_k, n, then C_k, n m of the free motion (if any) and of each load."""
         parts = [self.eigenvalue, *[self.coefficient] * self.started]
         parts += [load.share for load in self.loads]
         return Polynomial(parts[0].index, np.hstack([part.coefficients for part in parts]))
 
     @cached_property
     def of_output(self) -> list[Polynomial]:
-        """For each output λ_k and its shares of each part: n, and n of each part, polynomials."""
+        """For each output λ_k, n, then C_k, n of the free motion (if any) and of each load."""
         n, m = self.count, len(self.outputs)
-        rate, shares = np.split(self.together.coefficients, [n], axis=1)
+        rate, amplitudes = np.split(self.together.coefficients, [n], axis=1)
         index = self.together.index
-        return [Polynomial(index, np.hstack([rate, shares[:, o::m]])) for o in range(m)]
+        return [Polynomial(index, np.hstack([rate, amplitudes[:, o::m]])) for o in range(m)]
 
     def values(self, unit: Array) -> Array:
-        """Trajectories at unit coordinates (S, d), shape (S, T, m)."""
+        """Outputs at all nodes for unit coordinates (S, d), shape (S, T, m)."""
         n, time = self.count, self.time
         parts = self.together(unit)
         rate = parts[:, :n]
         waves = [np.exp(rate[:, None] * time[:, None])] if self.started else []
         waves += [load.at_nodes(rate) for load in self.loads]
-        shares = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
-        wave = np.concatenate(waves, -1)
-        return np.asarray(2 * (wave.real @ shares.real - wave.imag @ shares.imag))
+        C = parts[:, n:].reshape(len(unit), len(waves) * n, -1)
+        w = np.concatenate(waves, -1)
+        return np.asarray(2 * (w.real @ C.real - w.imag @ C.imag))
 
-    def at(self, unit: Array, node: Array, output: Array) -> Waves:
-        """Values (N,), gradients (N, d), Hessians (N, d, d) of one output, node by point (N, d)."""
+    def at(self, unit: Array, node: Array, output: Array) -> tuple[Array, Array, Array]:
+        """One output at one node for each of N points, with derivatives by unit coordinates.
+
+        Args:
+            unit: Unit coordinates of the points, shape (N, d).
+            node: Time node of each, shape (N,).
+            output: Index of the output of each, shape (N,).
+
+        Returns:
+            Values (N,), gradients (N, d) and Hessians (N, d, d), in the output's unit.
+        """
         n, d = self.count, unit.shape[1]
         row, column = np.triu_indices(d)
         coefficients = np.zeros((len(unit), 1 + d + len(row)))
@@ -117,26 +126,34 @@ class ModalModel:
             rows = np.flatnonzero(output == o)
             jets = self.of_output[o].jets(unit[rows])
             for number, wave in enumerate(self.waves(jets[:, 0, :n], node[rows]), 1):
-                share = jets[..., number * n : (number + 1) * n]
-                coefficients[rows] += composed(jets[..., :n], share, wave, d)
+                amplitude = jets[..., number * n : (number + 1) * n]
+                coefficients[rows] += composed(jets[..., :n], amplitude, wave, d)
         H = np.empty((len(unit), d, d))
         H[:, row, column] = H[:, column, row] = coefficients[:, 1 + d :]
         return coefficients[:, 0], coefficients[:, 1 : 1 + d], H
 
     def value_at(self, unit: Array, node: Array, output: Array) -> Array:
-        """Values (N,) of one output at one node per point (N, d)."""
+        """Values (N,) of one output at one node for each of N points, as in `at`."""
         values, n = np.zeros(len(unit)), self.count
         for o in np.unique(output):
             columns = np.flatnonzero(output == o)
             for rows in np.array_split(columns, -(-len(columns) // PIECE)):
                 parts = self.of_output[o](unit[rows])
                 for number, wave in enumerate(self.waves(parts[:, :n], node[rows]), 1):
-                    share = parts[:, number * n : (number + 1) * n]
-                    values[rows] += 2 * (share * wave[0]).real.sum(1)
+                    amplitude = parts[:, number * n : (number + 1) * n]
+                    values[rows] += 2 * (amplitude * wave[0]).real.sum(1)
         return values
 
     def waves(self, rate: Array, node: Array) -> Sequence[Waves]:
-        """The waves w, w', w'' of each part at one node per point, at eigenvalues (N, n)."""
+        """Time functions w(t; λ_k) of the free motion and of each load, with derivatives by λ.
+
+        Args:
+            rate: Eigenvalues λ_k, shape (N, n), in 1/s.
+            node: Time node of each point, shape (N,).
+
+        Returns:
+            w, dw/dλ and d²w/dλ², each of shape (N, n), of each part.
+        """
         parts = []
         if self.started:
             t = self.time[node][:, None]
@@ -146,12 +163,15 @@ class ModalModel:
 
 
 def composed(rate: Array, share: Array, waves: Waves, d: int) -> Array:
-    """2 Re Σ_k C_k w(λ_k) with gradient and Hessian (upper triangle) behind, shape (N, q).
+    """Value, gradient and Hessian of 2 Re Σ_k C_k w(λ_k) by the chain rule, shape (N, q).
+
+    A function's q = 1 + d + d (d + 1)/2 numbers are its value, its gradient and the upper triangle
+    of its Hessian.
 
     Args:
-        rate: λ_k likewise, shape (N, q, n).
-        share: C_k, shape (N, q, n).
-        waves: w, w' and w'' at λ_k, each (N, n).
+        rate: Those of λ_k, shape (N, q, n).
+        share: Those of C_k, shape (N, q, n).
+        waves: w, dw/dλ and d²w/dλ² at λ_k, each (N, n).
         d: Number of parameters.
     """
     w, dw, ddw = (x[:, None] for x in waves)

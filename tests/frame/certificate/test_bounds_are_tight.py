@@ -14,8 +14,8 @@ from alphacut.frame.certificate.certificate import certify
 from alphacut.frame.certificate.kernel import stays_below
 from alphacut.frame.certificate.remainder import (
     Remainder,
-    _convolved,
-    _largest,
+    _convolution_bounds,
+    _kernel_maxima,
     largest_growth,
     parts,
 )
@@ -206,7 +206,7 @@ def test_concave_bound_is_that_of_the_curvature_it_adds() -> None:
 @pytest.mark.parametrize("power", [1, 2, 3])
 def test_the_summit_of_a_decaying_wave_is_in_its_bound(power: int) -> None:
     """τ^r exp(−τ) has its summit at r, within an interval whose ends lie well below."""
-    bound = _largest(np.array([-1.0]), power * 0.9, 3, power)[:, 0]
+    bound = _kernel_maxima(np.array([-1.0]), power * 0.9, 3, power)[:, 0]
     fine = np.linspace(0, 0.9 * power, 2001) + 0.9 * power * np.arange(3)[:, None]
     truth = (fine**power * np.exp(-fine)).max(1)
     assert bound == pytest.approx(truth, rel=1e-6)
@@ -217,7 +217,7 @@ def test_convolutions_are_bounded_in_spite_of_rounding() -> None:
     rng = np.random.default_rng(5)
     kernel, size = np.exp(-0.01 * np.arange(4000))[:, None], rng.random(4000) * 1e3
     direct = np.convolve(kernel[:, 0], size)[:4000]
-    bound = _convolved(kernel, size)[1:, 0]
+    bound = _convolution_bounds(kernel, size)[1:, 0]
     assert (bound >= direct).all()
     assert (bound <= direct * (1 + 1e-8) + 1e-6).all()
 
