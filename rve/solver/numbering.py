@@ -39,8 +39,11 @@ def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> 
     shape = len(pairs), size // 2
     touch = sp.csr_matrix((np.ones(len(cell), np.int8), (cell, pairs[has_unknown])), shape)
     rows_touched = touch.T.tocsr()[rows.start // 2 : rows.stop // 2]
-    pattern = sp.kron((rows_touched @ touch).astype(bool), np.ones((2, 2), bool), "csr")
-    pattern.sort_indices()
+    neighbours = rows_touched @ touch
+    neighbours.sort_indices()
+    blocks = np.broadcast_to(np.int8(1), (neighbours.nnz, 2, 2))
+    bsr = blocks, neighbours.indices, neighbours.indptr
+    pattern = sp.bsr_matrix(bsr, shape=(len(rows), size)).tocsr()
     csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
     sizes = (len(rows), size)
     matrix = PETSc.Mat().createAIJ((sizes, sizes), bsize=2, comm=local_map.comm)
