@@ -57,6 +57,7 @@ class Data(NamedTuple):
         group_wave: Middle and half range of the group's responses, shape (2 sources, T), or (0, 1).
         group_linear: Linear parts of its shares and of their doubt, shape (2 sources, L).
         group_quadratic: Quadratic parts.
+        grain: Distance of the values that multipliers take, shape (1,).
     """
 
     table: Array
@@ -78,6 +79,7 @@ class Data(NamedTuple):
     group_wave: Array
     group_linear: Array
     group_quadratic: Array
+    grain: Array
 
 
 def roundings(modes: int, sources: int, inputs: int) -> int:
@@ -318,15 +320,17 @@ def minimise(
             mu[:], direction[:] = best, 0.0
             if drop < 0.1 * (target - aim):
                 break
-        elif not deflect(mu, gradient, direction, value - least + drop):
+        elif not deflect(mu, gradient, direction, value - least + drop, data.grain[0]):
             break
     mu[:] = best
     return least + remainder_bound(mu, data)
 
 
 @loops
-def deflect(mu: Array, gradient: Array, direction: Array, gain: float) -> bool:
-    """Move μ against the gradient and what is left of the last direction.
+def deflect(mu: Array, gradient: Array, direction: Array, gain: float, grain: float) -> bool:
+    """Move μ against the gradient and what is left of the last direction, to multiples of a grain.
+
+    Any μ gives a bound. On a grid its path is the same in all units: of rounding it would not be.
 
     Returns:
         False where there is no direction, or a multiplier leaves the range of `dual`.
@@ -343,7 +347,7 @@ def deflect(mu: Array, gradient: Array, direction: Array, gain: float) -> bool:
     if length < 1e-24:
         return False
     for z in range(len(mu)):
-        mu[z] -= gain / length * direction[z]
+        mu[z] = grain * np.rint((mu[z] - gain / length * direction[z]) / grain)
         if not abs(mu[z]) <= LARGEST:
             return False
     return True

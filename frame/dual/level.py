@@ -36,6 +36,9 @@ FLOORS = 1.0, 0.25
 """Multiples of the remainders' own part below which no effort is made: elsewhere, and there."""
 WORK_OF_PASSES = 0.0, 0.05, 0.75, 1.0
 """Shares of the work at which the passes of a level begin and end, about."""
+GRAIN = 2.0**-24
+"""Distance of multipliers as a share of the output's modal responses: far above rounding, so that
+units do not lead them elsewhere, and far below gaps."""
 BLOCK = 40
 """Nodes of a piece, about."""
 
@@ -246,7 +249,8 @@ class Problem:
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
         variables = _variables(level, o)
-        data = Data(*_tables(level, o, variables), *_models(level, variables), *group)
+        tables, models = _tables(level, o, variables), _models(level, variables)
+        data = Data(*tables, *models, *group, grain=_grain(level, o))
         require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
         out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
         at = np.zeros((total, data.linear.shape[1]))
@@ -335,6 +339,16 @@ def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
     constant[1] += gamma(roundings(len(level.single), sources, d)) * (size @ np.abs(wave))
     constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
     return [wave, linear, quadratic], constant
+
+
+def _grain(level: Level, o: int) -> Array:
+    """Distance of multipliers as a share of the modes' largest responses in sum, shape (1,)."""
+    responses = np.abs(level.tables.value[int(level.structure.order[o])]).max((2, 3))
+    size = sum(
+        float(np.abs(mode.share.value[:, o]) @ response)
+        for mode, response in zip(level.single, responses, strict=True)
+    )
+    return np.array([GRAIN * size or 1.0])
 
 
 def _radii(x: TaylorModel) -> Array:

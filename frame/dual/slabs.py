@@ -16,6 +16,9 @@ from alphacut.fuzzy.arrays import Array, Rows
 JUMPS, CLIMBS = 4, 16
 """Most steps of the model's ascent from one point: towards ends of the box, and along gradients."""
 
+GRID = 2.0**24
+"""Steps of the model's ascent in unit coordinates, so that rounding does not lead it elsewhere."""
+
 TRIED, MIN_PROGRESS = 8, 0.5
 """Slabs after which the effort for a node ends where its gap has fallen by less than this share of
 an even fall to what suffices."""
@@ -157,7 +160,7 @@ def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Arr
     size = 0.3 / (np.abs(slope).max() + 1e-300)
     for _ in range(CLIMBS):
         for i in range(d):
-            there[i] = min(max(here[i] + size * slope[i], -1.0), 1.0)
+            there[i] = np.rint(GRID * min(max(here[i] + size * slope[i], -1.0), 1.0)) / GRID
         new = model(there, node, side, data, slope_there)
         along = bend = 0.0
         for i in range(d):

@@ -287,3 +287,16 @@ def test_what_is_not_covered_is_said(model, width, match):
     fuzzy = {"k1": near(1.2e8, width), "k2": near(1.2e8, width)}
     with pytest.raises(UnprovedError, match=match):
         envelope(model, fuzzy, duration=1.0, step=0.1, method=DualProof(), progress=False)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 7e-3, 3e5])
+def test_a_motion_in_other_units_has_the_same_bounds(unit):
+    def bounds(factor):
+        shaken = Accelerogram(0.02, factor * record(2.0).acceleration)
+        frame = storeys(3, damping_ratio=0.03, ground=shaken, outputs=("q3", "drift1", "a3"))
+        return envelope(frame, each_storey(3), DualProof(), duration=2.0, step=0.02, alpha=(0,))
+
+    metres, others = bounds(1.0), bounds(unit)
+    allowed = 1e-9 * metres.upper.max((0, 1))
+    assert (np.abs(others.upper / unit - metres.upper) <= allowed).all()
+    assert (np.abs(others.lower / unit - metres.lower) <= allowed).all()
