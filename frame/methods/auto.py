@@ -3,9 +3,9 @@
 1. Up to six fuzzy inputs the branch and bound is a proof, for any number the dual bound is. The one
    with less forecast work comes first, the other where it refuses or leaves a wide gap. The branch
    and bound is first tried on the box as it is, and on parts of it where nothing else is left.
-2. A guarantee with a gap of more than a tenth of a peak is not the only answer: the search's
-   attained bounds stand inside it. Where a named tolerance is not proved, the search estimates the
-   envelope, and proved bounds stand outside it.
+2. A guarantee with a gap of more than a tenth of a peak is not the only answer: at the nodes that
+   may hold the peak a search looks for motions that attain more. Where a named tolerance is not
+   proved, the search estimates the envelope, and proved bounds stand outside it.
 3. Without a proof the search remains; where there are no oscillating modes, the follower.
 """
 
@@ -30,7 +30,7 @@ from alphacut.frame.methods.proof import Proof
 from alphacut.frame.methods.search import Search
 from alphacut.frame.parts import WIDE
 from alphacut.frame.structures.modes import ModalError
-from alphacut.fuzzy.arrays import Array
+from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
 from alphacut.fuzzy.refused import real
 
@@ -106,18 +106,22 @@ class Auto:
             return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
         search = Search(self.tolerance, seed=self.seed)
         try:
-            searched = search.run(flow, progress)
+            if proved is not None and not named:
+                nodes = _possible_peaks(proved)
+                searched = search.attained(flow, nodes, progress)
+                return _noted(
+                    with_attained(proved, flow, nodes, *searched), f"{proved.method} and search"
+                )
+            estimate = search.run(flow, progress)
         except ModalError as error:
             reasons.append(f"no search: {error}")
             if proved is None:
                 why = f"improved-graph-follower; unproved: {'; '.join(reasons)}"
                 return _noted(follower.run(flow, progress), why)
             return _noted(proved, "; ".join([f"{proved.method} succeeded", *reasons]))
-        if proved is not None and not named:
-            return _noted(with_attained(proved, searched), f"{proved.method} and search")
         outer = None if proved is None else proved.proved
         why = f"search; unproved: {'; '.join(reasons)}"
-        return _noted(replace(searched, outer=outer), why)
+        return _noted(replace(estimate, outer=outer), why)
 
     def _proofs(self, flow: UnitFlow, reasons: list[str]) -> Iterator[Proof | DualProof]:
         """Yield the proofs to try, the one with less forecast work first.
@@ -170,37 +174,49 @@ class Auto:
         return (1 + 1e-9) * flow.tolerance(self.tolerance) * flow.scale
 
 
-def with_attained(proved: Envelope, searched: Envelope) -> Envelope:
-    """Return a guaranteed envelope with the bounds that a search attains inside it.
+def with_attained(
+    proved: Envelope, flow: UnitFlow, nodes: Rows, values: Array, at: Array
+) -> Envelope:
+    """Return a guaranteed envelope with larger attained values inside it.
 
     Args:
         proved: The guaranteed envelope.
-        searched: Attained bounds of the same outputs on the same levels.
+        flow: The motion and its boxes.
+        nodes: Nodes with attained values, shape (J,).
+        values: Attained values of (−output, output), shape (A, J, m, 2).
+        at: Unit coordinates that attain them, shape (A, J, m, 2, d).
 
     Returns:
         The envelope with tighter inner bounds and errors, and a note on both peaks.
     """
     assert proved.inner is not None
-    peak = np.maximum(np.abs(searched.lower), np.abs(searched.upper)).max((0, 1))
+    physical = flow.boxes.to_physical(at)
+    values = values - ROUNDING * np.abs(values).max((0, 1, 3))[:, None]
     ends, places = [], []
-    for side, name in ((-1, "lower"), (1, "upper")):
-        inner, at = getattr(proved.inner, name).copy(), getattr(proved, f"{name}_at").copy()
-        found = getattr(searched, name) - side * ROUNDING * peak
-        better = side * found > side * inner
-        inner[better], at[better] = found[better], getattr(searched, f"{name}_at")[better]
+    for index, (side, name) in enumerate(((-1, "lower"), (1, "upper"))):
+        inner, where = getattr(proved.inner, name).copy(), getattr(proved, f"{name}_at").copy()
+        better = values[..., index] > side * inner[:, nodes]
+        inner[:, nodes] = np.where(better, side * values[..., index], inner[:, nodes])
+        where[:, nodes] = np.where(better[..., None], physical[..., index, :], where[:, nodes])
         ends.append(inner)
-        places.append(at)
+        places.append(where)
     combined = replace(
         proved,
         inner=Ends(*ends),
         lower_at=places[0],
         upper_at=places[1],
         error=np.maximum(proved.upper - ends[1], ends[0] - proved.lower),
-        evaluations=proved.evaluations + searched.evaluations,
-        seconds=proved.seconds + searched.seconds,
     )
     facts = {**combined.facts, "gap_of_peaks": _gap(combined)}
     return replace(combined, facts=facts, notes=(combined.peak_words, *combined.notes))
+
+
+def _possible_peaks(proved: Envelope) -> Rows:
+    """Return the nodes at which a proved bound lies above the attained peak, shape (J,)."""
+    assert proved.inner is not None
+    ends = ((proved.upper, proved.inner.upper), (-proved.lower, -proved.inner.lower))
+    above = [outer > inner.max(1, keepdims=True) for outer, inner in ends]
+    return np.flatnonzero(np.logical_or(*above).any((0, 2)))
 
 
 def _gap(proved: Envelope) -> float:

@@ -158,6 +158,47 @@ class Search:
             facts=facts,
         )
 
+    def attained(
+        self, flow: UnitFlow, nodes: Rows, progress: Progress | None = None
+    ) -> tuple[Array, Array]:
+        """Return large values of (−output, output) that exact motions attain at some nodes.
+
+        One search from a sample of each box, whose optima are tried on neighbouring nodes and in
+        the next wider box.
+
+        Args:
+            flow: The motion and its boxes.
+            nodes: Indices of the nodes, shape (J,).
+            progress: Called with the completed fraction.
+
+        Returns:
+            The values, shape (A, J, m, 2), and unit coordinates that attain them, (…, d).
+
+        Raises:
+            ModalError: As `run`.
+        """
+        if not isinstance(flow.flow, LinearFlow):
+            raise ModalError("search: the system is not linear; take the Graph Follower")
+        small = SMALL * flow.tolerance(self.tolerance)
+        model = fit_modes(flow.flow, flow.boxes, tolerance=small, scale=flow.scale)
+        exact = ExactResponse.from_model(model, flow.scale, bent=not _rough(model, flow))
+        levels, solved = len(flow.boxes.alpha), list[Optima]()
+        for done, level in enumerate(reversed(range(levels))):
+            box = (*flow.boxes.unit(level), small)
+            tick = subprogress(progress, done / levels, (done + 1) / levels)
+            optima = first_optima(exact.model, *box, nodes=nodes)
+            _evaluate(exact, optima, box, tick)
+            rows = np.arange(len(optima.value))
+            if solved:
+                optima.offer(exact, solved[-1].point, rows)
+            grid, fresh = rows.reshape(len(nodes), -1), np.ones(len(rows), bool)
+            refine(exact, optima, _exchanged(exact, optima, grid, fresh, tick), *box)
+            solved.append(optima)
+        shape = len(nodes), len(flow.outputs), 2
+        values = np.stack([optima.value.reshape(shape) for optima in solved[::-1]])
+        points = np.stack([optima.point.reshape(*shape, -1) for optima in solved[::-1]])
+        return values * flow.scale[:, None], points
+
     def _level(
         self,
         searches: tuple[_IndependentSearch, _IndependentSearch],

@@ -9,6 +9,7 @@ from alphacut.frame.calculus.jet import Array
 from alphacut.frame.calculus.low_discrepancy import chebyshev_points
 from alphacut.frame.modal.model import ModalModel
 from alphacut.frame.modal.optima import Optima, Response, best_of, trajectories
+from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 SAMPLES = 256
@@ -34,8 +35,9 @@ def first_optima(
     small: float,
     unit: Array | None = None,
     progress: Progress | None = None,
+    nodes: Rows | None = None,
 ) -> Optima:
-    """Optima of all nodes, outputs and sides in the box [lower, upper], from a sample of it.
+    """Optima of nodes, all outputs and sides in the box [lower, upper], from a sample of it.
 
     Args:
         model: The modal model.
@@ -44,11 +46,13 @@ def first_optima(
         small: What Newton's method may leave, in units of the outputs.
         unit: The sample in [−1, 1]^d, shape (n, d); the centre and Chebyshev points unless given.
         progress: Takes the share done.
+        nodes: Indices of the nodes, shape (J,); all of the model unless given.
     """
+    nodes = np.arange(len(model.time)) if nodes is None else nodes
     if unit is None:
         unit = np.vstack([np.zeros((1, len(lower))), chebyshev_points(len(lower), SAMPLES)])
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit
-    optima = best_of(points, trajectories(model, points), np.arange(len(model.time)))
+    optima = best_of(points, trajectories(model, points, nodes), nodes)
     if (upper > lower).any():
         refine(model, optima, np.arange(len(optima.value)), lower, upper, small, progress)
     return optima

@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from alphacut import frame
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
+from alphacut.frame.boxes import UnitFlow, boxes
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.methods import search
 from alphacut.fuzzy import Interval, Triangular
@@ -115,6 +116,23 @@ def test_a_search_attains_its_bounds_and_its_error_covers_the_proof(proofs, kind
     assert (found.upper + found.error >= proof.inner.upper - 1e-9 * peak).all()
     assert (found.lower - found.error <= proof.inner.lower + 1e-9 * peak).all()
     assert (found.error.max((0, 1)) <= 5e-3 * peak).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_values_that_a_search_attains_at_peaks_are_those_of_the_proof(proofs, kind):
+    system, inputs = KINDS[kind]
+    proof = proofs[kind]
+    motion = frame.LinearFlow(system, tuple(inputs), 4.0, 0.05, frame.Exact())
+    flow = UnitFlow(motion, boxes(inputs, MOTION["alpha"]))
+    nodes = np.unique(np.abs(proof.upper).argmax(1))
+    bounds, at = frame.Search(1e-4).attained(flow, nodes)
+    peak = np.abs(proof.upper).max((0, 1))
+    for index, (side, ends) in enumerate(((-1, proof.lower), (1, proof.upper))):
+        missed = side * ends[:, nodes] - bounds[..., index]
+        assert (missed >= -1e-9 * peak).all()
+        assert (missed <= 1e-3 * peak).all()
+    true = flow.values(at[0, 0, 0])[:, nodes[0], 0]
+    assert true * (-1, 1) == pytest.approx(bounds[0, 0, 0], abs=1e-9 * peak[0])
 
 
 @pytest.mark.parametrize("method", [frame.GraphFollower(tolerance=1e-3),
