@@ -1,10 +1,11 @@
 """Taylor models: polynomials over the unit box with a proved bound of all that they leave out.
 
-A Taylor model stands for functions f(u) of inputs u in [−1, 1]^d: |f(u) − p(u)| ≤ rest for all u of
-the box, p a polynomial (Makino, Berz 2003). Sums, products, powers and solutions of linear systems
-of Taylor models are Taylor models. What a product has above the order kept is bounded by the sums
-of magnitudes of its factors' coefficients, a power's by the derivative of the next order. So is the
-rounding of the coefficients, by γ_n of the operations that make them (Higham 2002, section 3.1).
+A Taylor model stands for functions f(u) of inputs u in [−1, 1]^d: |f(u) − p(u)| ≤ remainder for all
+u of the box, p a polynomial (Makino, Berz 2003). Sums, products, powers and solutions of linear
+systems of Taylor models are Taylor models. What a product has above the order kept is bounded by
+the sums of magnitudes of its factors' coefficients, a power's by the derivative of the next order.
+So is the rounding of the coefficients, by γ_n of the operations that make them (Higham 2002,
+section 3.1).
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class TaylorModel:
 
     Args:
         parts: Coefficients of degree 0, 1, …, shapes (monomials, *V); missing ones are zero.
-        rest: Bound of what they leave out and of their rounding, shape V, never negative.
+        remainder: Bound of what they leave out and of their rounding, shape V, never negative.
         inputs: Number of inputs d.
         order: Degree to which products are kept.
     """
@@ -47,7 +48,7 @@ class TaylorModel:
     __array_ufunc__ = None  # an array on the left leaves the operation to the model
 
     parts: tuple[Array, ...]
-    rest: Array
+    remainder: Array
     inputs: int
     order: int = ORDER
 
@@ -70,7 +71,7 @@ class TaylorModel:
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape V."""
-        return self.rest.shape
+        return self.remainder.shape
 
     @property
     def value(self) -> Array:
@@ -81,7 +82,7 @@ class TaylorModel:
     def T(self) -> TaylorModel:  # noqa: N802
         """Transposed matrices, V = (m, n) for (n, m)."""
         parts = tuple(part.swapaxes(-1, -2) for part in self.parts)
-        return TaylorModel(parts, self.rest.swapaxes(-1, -2), self.inputs, self.order)
+        return TaylorModel(parts, self.remainder.swapaxes(-1, -2), self.inputs, self.order)
 
     @staticmethod
     def stack(models: Sequence[TaylorModel]) -> TaylorModel:
@@ -101,11 +102,11 @@ class TaylorModel:
 
     def size(self) -> Array:
         """Bound of |f| over the box, shape V."""
-        return np.asarray(sum(self.sizes()) + self.rest)
+        return np.asarray(sum(self.sizes()) + self.remainder)
 
     def spread(self) -> Array:
         """Bound of |f − value|, shape V."""
-        return np.asarray(sum(self.sizes()[1:]) + self.rest)
+        return np.asarray(sum(self.sizes()[1:]) + self.remainder)
 
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds over the box, each of shape V."""
@@ -114,7 +115,7 @@ class TaylorModel:
 
     def loosened(self, more: ArrayLike) -> TaylorModel:
         """Functions that may be off by `more`, shape V."""
-        return TaylorModel(self.parts, self.rest + np.asarray(more), self.inputs, self.order)
+        return TaylorModel(self.parts, self.remainder + np.asarray(more), self.inputs, self.order)
 
     def at(self, u: Array) -> Array:
         """The polynomials' values at points u (S, d), shape (S, *V)."""
@@ -138,7 +139,7 @@ class TaylorModel:
         lists = (inputs[monomials(d, degree)] for degree in range(len(self.parts)))
         rows = [places(chosen, self.inputs) for chosen in lists]
         parts = tuple(part[at] for part, at in zip(self.parts, rows, strict=True))
-        return TaylorModel(parts, self.rest, d, self.order)
+        return TaylorModel(parts, self.remainder, d, self.order)
 
     def among(self, inputs: Rows, d: int) -> TaylorModel:
         """The same as functions of d inputs, of which those at `inputs` (rising) are its own."""
@@ -147,17 +148,17 @@ class TaylorModel:
             full = np.zeros((count(d, degree), *self.shape))
             full[places(inputs[monomials(self.inputs, degree)], d)] = part
             parts.append(full)
-        return TaylorModel(tuple(parts), self.rest, d, self.order)
+        return TaylorModel(tuple(parts), self.remainder, d, self.order)
 
     def cut(self, order: int) -> TaylorModel:
         """The same to a lower order, with the sizes of what is dropped in the rest."""
-        remainder = self.rest + sum(self.sizes()[order + 1 :])
+        remainder = self.remainder + sum(self.sizes()[order + 1 :])
         return TaylorModel(self.parts[: order + 1], np.asarray(remainder), self.inputs, order)
 
     def to_order(self, order: int) -> TaylorModel:
         """The same, whose products are kept to another order."""
         return (
-            TaylorModel(self.parts, self.rest, self.inputs, order)
+            TaylorModel(self.parts, self.remainder, self.inputs, order)
             if order >= self.order
             else self.cut(order)
         )
@@ -175,15 +176,15 @@ class TaylorModel:
         parts = []
         for degree, part in enumerate(moved):
             scale = half[monomials(self.inputs, degree)].prod(-1)
-            parts.append(scale.reshape(-1, *[1] * self.rest.ndim) * part)
+            parts.append(scale.reshape(-1, *[1] * self.remainder.ndim) * part)
         # sums of d terms, once for each derivative, of |middle| + half ≤ 1
         rounding = gamma((len(self.parts) + 1) * (self.inputs + 4)) * np.sum(self.sizes(), 0)
-        return TaylorModel(tuple(parts), self.rest + rounding, self.inputs, self.order)
+        return TaylorModel(tuple(parts), self.remainder + rounding, self.inputs, self.order)
 
     def __getitem__(self, index: Any) -> TaylorModel:
         key = index if isinstance(index, tuple) else (index,)
         parts = tuple(part[(slice(None), *key)] for part in self.parts)
-        return TaylorModel(parts, self.rest[key], self.inputs, self.order)
+        return TaylorModel(parts, self.remainder[key], self.inputs, self.order)
 
     def __add__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         b = other if isinstance(other, TaylorModel) else self.like(_numbers(other))
@@ -198,13 +199,17 @@ class TaylorModel:
                 if degree < len(x.parts):
                     part += _padded(x.parts[degree], len(shape))
             parts.append(part)
-        exact = TaylorModel(tuple(parts), self.rest + b.rest, self.inputs, max(self.order, b.order))
+        exact = TaylorModel(
+            tuple(parts), self.remainder + b.remainder, self.inputs, max(self.order, b.order)
+        )
         return exact.rounded(1)
 
     __radd__ = __add__
 
     def __neg__(self) -> TaylorModel:
-        return TaylorModel(tuple(-part for part in self.parts), self.rest, self.inputs, self.order)
+        return TaylorModel(
+            tuple(-part for part in self.parts), self.remainder, self.inputs, self.order
+        )
 
     def __sub__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
         return self + -(other if isinstance(other, TaylorModel) else _numbers(other))
@@ -217,7 +222,9 @@ class TaylorModel:
             return _product(self, other, np.multiply)
         factor = _numbers(other)
         parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
-        return TaylorModel(parts, self.rest * np.abs(factor), self.inputs, self.order).rounded(1)
+        return TaylorModel(parts, self.remainder * np.abs(factor), self.inputs, self.order).rounded(
+            1
+        )
 
     __rmul__ = __mul__
 
@@ -269,13 +276,15 @@ class TaylorModel:
 
     def rounded(self, count: int) -> TaylorModel:
         """The same after `count` roundings of coefficients and rest, whose sums did not cancel."""
-        return self.loosened(gamma(count) * np.sum(self.sizes(), 0) + gamma(count + 3) * self.rest)
+        return self.loosened(
+            gamma(count) * np.sum(self.sizes(), 0) + gamma(count + 3) * self.remainder
+        )
 
     def _linear(
         self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
     ) -> TaylorModel:
         """A linear map by numbers, sums of `terms`, under which the rest is not negative."""
-        remainder = np.asarray(bilinear(self.rest, np.abs(factor))) * (1 + gamma(terms + 2))
+        remainder = np.asarray(bilinear(self.remainder, np.abs(factor))) * (1 + gamma(terms + 2))
         rounding = gamma(terms) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
         return TaylorModel(parts, remainder + rounding, self.inputs, self.order)
@@ -285,7 +294,7 @@ def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
     """Joins Taylor models along a negative `axis` of V."""
     degrees = range(max(len(x.parts) for x in models))
     parts = tuple(np.concatenate([x.part(k) for x in models], axis) for k in degrees)
-    remainder = np.concatenate([x.rest for x in models], axis)
+    remainder = np.concatenate([x.remainder for x in models], axis)
     return TaylorModel(parts, remainder, models[0].inputs, max(x.order for x in models))
 
 
@@ -294,7 +303,7 @@ def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[T
     flat = [
         TaylorModel(
             tuple(part.reshape(len(part), -1) for part in x.parts),
-            x.rest.ravel(),
+            x.remainder.ravel(),
             x.inputs,
             x.order,
         )
@@ -302,9 +311,11 @@ def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[T
     ]
     moved, end, found = concatenate(flat, -1).within(low, high), 0, list[TaylorModel]()
     for x in models:
-        begin, end = end, end + x.rest.size
+        begin, end = end, end + x.remainder.size
         parts = tuple(part[:, begin:end].reshape(len(part), *x.shape) for part in moved.parts)
-        found.append(TaylorModel(parts, moved.rest[begin:end].reshape(x.shape), x.inputs, x.order))
+        found.append(
+            TaylorModel(parts, moved.remainder[begin:end].reshape(x.shape), x.inputs, x.order)
+        )
     return found
 
 
@@ -366,9 +377,11 @@ def _product(
     A coefficient of degree i + j is a sum over all ways to share its monomial and over the
     contracted axis, if any.
     """
-    d, order, ndim = a.inputs, max(a.order, b.order), max(a.rest.ndim, b.rest.ndim)
+    d, order, ndim = a.inputs, max(a.order, b.order), max(a.remainder.ndim, b.remainder.ndim)
     s, t = a.sizes(), b.sizes()
-    remainder = bilinear(a.rest, np.asarray(sum(t)) + b.rest) + bilinear(np.asarray(sum(s)), b.rest)
+    remainder = bilinear(a.remainder, np.asarray(sum(t)) + b.remainder) + bilinear(
+        np.asarray(sum(s)), b.remainder
+    )
     degrees = range(min(order, len(s) + len(t) - 2) + 1)
     parts = [np.zeros((count(d, k), *remainder.shape)) for k in degrees]
     inner = a.shape[-1] if bilinear == matmul else 1

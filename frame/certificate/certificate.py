@@ -128,7 +128,7 @@ def _between(model: ModalModel) -> Array:
     for part in parts(model, growth):
         size = suprema(part.share, reach)[0].reshape(model.count, -1)
         if isinstance(part.load, Direct):
-            at_once += 2 * part.load.history.stray(model.time)[:, None] * size.sum(0)
+            at_once += 2 * part.load.history.line_deviation(model.time)[:, None] * size.sum(0)
             continue
         wave = part.waves[0].copy()
         if part.load is not None:  # R'' = λ² R + λ a + a', and a' acts on Σ C_k alone

@@ -57,35 +57,35 @@ class Block:
         modes: Their numbers from below, from 0, rising, shape (p,).
         rate: Lᵀ: K x_j = Σ_i rate_ji M x_i, V = (p, p), in 1/s².
         shape: x_j, V = (p, n).
-        moved: M x_j, V = (p, n).
+        mass_shape: M x_j, V = (p, n).
         norm: x_iᵀ M x_j, V = (p, p).
     """
 
     modes: Rows
     rate: TaylorModel
     shape: TaylorModel
-    moved: TaylorModel
+    mass_shape: TaylorModel
     norm: TaylorModel
 
     @property
     def relative_error(self) -> float:
         """Largest error bound of the diagonals of L and N, relative to their middle values."""
-        rate, norm = (np.diag(x.rest) / np.diag(x.value) for x in (self.rate, self.norm))
+        rate, norm = (np.diag(x.remainder) / np.diag(x.value) for x in (self.rate, self.norm))
         return float(max(rate.max(), norm.max()))
 
     def cut(self, order: int) -> Block:
         """The same to a lower order."""
-        parts = (x.cut(order) for x in (self.rate, self.shape, self.moved, self.norm))
+        parts = (x.cut(order) for x in (self.rate, self.shape, self.mass_shape, self.norm))
         return Block(self.modes, *parts)
 
     def among(self, used: Rows, inputs: int) -> Block:
         """The same as functions of all inputs, of which those at `used` are its own."""
-        parts = (x.among(used, inputs) for x in (self.rate, self.shape, self.moved, self.norm))
+        parts = (x.among(used, inputs) for x in (self.rate, self.shape, self.mass_shape, self.norm))
         return Block(self.modes, *parts)
 
 
 @dataclass(frozen=True, eq=False)
-class Centre:
+class CentredMatrices:
     """M and K over the box in coordinates in which its middle has both diagonal.
 
     Args:
@@ -105,7 +105,7 @@ class Centre:
         """λ of the modes in the middle, rising, shape (modes,), in 1/s²."""
         return np.diag(self.stiffness.value)[: self.modes]
 
-    def apart(self, rate: float) -> Array:
+    def shifted_diagonal(self, rate: float) -> Array:
         """Diagonal of K − rate M in the middle, shape (n,)."""
         return np.asarray(
             np.diag(self.stiffness.value) - rate * (np.arange(len(self.basis)) < self.modes)
@@ -116,7 +116,7 @@ Series = tuple[list[Array], list[Array], list[Array]]
 
 
 def subspace_series(
-    block: Rows, degree: int, centre: Centre, lower: Series | None = None
+    block: Rows, degree: int, centre: CentredMatrices, lower: Series | None = None
 ) -> Series:
     """Perturbation series of a block: Λ x_j − λ_j M₀ x_j = Σ_i L_ij e_i + what lower degrees add.
 
@@ -131,7 +131,7 @@ def subspace_series(
     """
     mass, stiffness, d = centre.mass, centre.stiffness, centre.mass.inputs
     middle = centre.squared[block]
-    gaps = np.stack([centre.apart(x) for x in middle])
+    gaps = np.stack([centre.shifted_diagonal(x) for x in middle])
     gaps[:, block] = np.inf
     if lower is None:
         unit = np.eye(len(centre.basis))[block][None]
@@ -158,7 +158,9 @@ def subspace_series(
     return rate, shape, moved
 
 
-def narrowest_block(block: Rows, rotation: Array, centre: Centre, tolerance: float) -> Block | None:
+def narrowest_block(
+    block: Rows, rotation: Array, centre: CentredMatrices, tolerance: float
+) -> Block | None:
     """Enclosure of a block by series of the least degree whose error bound is below `tolerance`.
 
     Args:
@@ -197,7 +199,7 @@ def _turned(series: Series, rotation: Array) -> Series:
     return [turn @ x @ rotation for x in rate], [turn @ x for x in shape], [turn @ x for x in moved]
 
 
-def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Block | None:
+def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatrices) -> Block | None:
     """Encloses a block's subspace over the box by Brouwer's theorem, as the module says.
 
     Args:
@@ -219,11 +221,12 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Bl
     rounding = _rounding(x, mass, 0)
     Mx = TaylorModel(tuple(moved), _higher_terms(mass, x.sizes(), N) + rounding, **order)
     pencils = [
-        Pencil.of([part[:, j, j] for part in rate], mass, stiffness) for j in range(len(block))
+        Pencil.from_rate([part[:, j, j] for part in rate], mass, stiffness)
+        for j in range(len(block))
     ]
     diagonal = np.diag(L.value)
     systems = [
-        Comparison.of(pencil, centre.apart(float(ell)), o)
+        Comparison.over_box(pencil, centre.shifted_diagonal(float(ell)), o)
         for pencil, ell in zip(pencils, diagonal, strict=True)
     ]
     if not all(system.regular for system in systems):
@@ -254,7 +257,7 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: Centre) -> Bl
 def _higher_terms(mass: TaylorModel, x: list[Array], N: int) -> Array:
     """Bound of what M x̃ has above degree N, shape (p, n)."""
     sizes = mass.sizes()
-    higher = np.asarray(sum(x) @ mass.rest)
+    higher = np.asarray(sum(x) @ mass.remainder)
     for b in range(1, len(sizes)):
         higher = higher + sum(x[max(N + 1 - b, 0) :], np.zeros_like(x[0])) @ sizes[b]
     return higher
@@ -313,13 +316,13 @@ def _missed(pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorMod
         for m in range(1, N + 1):
             missed[j] += t[m] @ np.sum(of_x[N + 1 - m :], 0)[j]
     for a in range(N + 1):
-        missed += of_L[a] @ (sum(of_Mx[N + 1 - a :], np.zeros(x.shape)) + Mx.rest)
+        missed += of_L[a] @ (sum(of_Mx[N + 1 - a :], np.zeros(x.shape)) + Mx.remainder)
     return missed
 
 
 def _differences(L: TaylorModel) -> Array:
     """Bounds of |L̃_jj − L̃_ii| over the box, shape (p, p)."""
-    p = len(L.rest)
+    p = len(L.remainder)
     diagonal = L[np.arange(p), np.arange(p)]
     return (diagonal[:, None] - diagonal[None, :]).size()
 

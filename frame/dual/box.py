@@ -17,7 +17,7 @@ from alphacut.frame.dual.attained import (
     modes_at,
     outputs_at,
 )
-from alphacut.frame.dual.level import Level
+from alphacut.frame.dual.level import LevelModels
 from alphacut.frame.dual.structure import Classical, classical
 from alphacut.frame.dual.waves import Grid, Oscillators
 from alphacut.frame.structures.linear import LinearSystem, histories
@@ -77,8 +77,10 @@ class Box:
         nodes: Rows | slice = slice(None),
         allowed: Array | None = None,
         outputs: Rows | slice = slice(None),
-    ) -> Level:
-        """Models of some outputs, all unless given, at some nodes; `allowed` as of `Models.of`.
+    ) -> LevelModels:
+        """Models of the motion of `outputs` at `nodes`, both all unless given.
+
+        `allowed` is the doubt of each output that modes may leave which are not enclosed, (m,).
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
@@ -86,7 +88,7 @@ class Box:
         try:
             structure = with_outputs(self.structure, outputs)
             moved, time = sources(self.system, structure), self.time[nodes]
-            return Level.of(structure, self.loads, time, moved, allowed)
+            return LevelModels.from_structure(structure, self.loads, time, moved, allowed)
         except UnprovedError as refusal:
             if refusal.along is not None:
                 refusal.along = int(self.active[refusal.along])
@@ -123,7 +125,7 @@ class Box:
         once = np.zeros(total, int)
         columns = [outputs_at(modal, once, once + o, self.time, loads) for o in range(m)]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
-        return value, error, self._stray(modal)
+        return value, error, self._line_deviation(modal)
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -145,7 +147,7 @@ class Box:
         }
         return outputs_at(modal, point, output, self.time[node], loads)
 
-    def _stray(self, modal: Modal) -> Array:
+    def _line_deviation(self, modal: Modal) -> Array:
         """Bound of how far a motion strays from straight lines in the step to a node, (T, m)."""
         total, m = self._shape
         deviation, outputs = np.zeros((total, m)), np.arange(m)
@@ -156,7 +158,7 @@ class Box:
             for source, share in modal.share.items():
                 for o in outputs:
                     wave = oscillator.waves(source, int(modal.order[o]))
-                    deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.stray
+                    deviation[:, o] += read[o, k] * abs(share[0, k]) * wave.line_deviation
         return deviation
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dual.blocks import Block, Centre, narrowest_block
+from alphacut.frame.dual.blocks import Block, CentredMatrices, narrowest_block
 from alphacut.frame.dual.pencil import form_variation
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 
@@ -40,7 +40,7 @@ class Subspaces:
 
     blocks: list[Block]
     used: Rows
-    centre: Centre
+    centre: CentredMatrices
     low: Array
     high: Array
     variation: tuple[float, float]
@@ -53,7 +53,9 @@ class Subspaces:
         return np.setdiff1d(np.arange(self.centre.modes), np.concatenate([[], *taken]))
 
 
-def subspaces(centre: Centre, used: Rows, wanted: int, doubts: Array | None = None) -> Subspaces:
+def subspaces(
+    centre: CentredMatrices, used: Rows, wanted: int, doubts: Array | None = None
+) -> Subspaces:
     """Blocks of the lowest modes, from below until one is not enclosed.
 
     Args:
@@ -82,7 +84,7 @@ def subspaces(centre: Centre, used: Rows, wanted: int, doubts: Array | None = No
     return Subspaces(blocks, used, centre, *ends, (heavy, stiff), along)
 
 
-def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
+def centred_matrices(mass: TaylorModel, stiffness: TaylorModel) -> tuple[CentredMatrices, Rows]:
     """M and K in coordinates that make both diagonal in the middle of the box, of inputs used.
 
     Args:
@@ -113,13 +115,13 @@ def centred(mass: TaylorModel, stiffness: TaylorModel) -> tuple[Centre, Rows]:
     heavy, stiff = (basis.T @ matrix.on(used) @ basis for matrix in (mass, stiffness))
     weight = (np.arange(n) < len(a)).astype(float)
     diagonals = _diagonal(heavy, weight), _diagonal(stiff, np.diag(stiff.value))
-    return Centre(*diagonals, basis, len(a)), used
+    return CentredMatrices(*diagonals, basis, len(a)), used
 
 
 def _diagonal(matrix: TaylorModel, diagonal: Array) -> TaylorModel:
     """The same with a diagonal in the middle, which it has but for rounding, put into the rest."""
     middle = np.diag(diagonal)
-    remainder = matrix.rest + np.abs(matrix.value - middle)
+    remainder = matrix.remainder + np.abs(matrix.value - middle)
     return TaylorModel((middle[None], *matrix.parts[1:]), remainder, matrix.inputs, matrix.order)
 
 
@@ -131,21 +133,21 @@ def _require_stiff(values: Array, like: Array) -> None:
         )
 
 
-def _slopes(centre: Centre) -> Array:
+def _slopes(centre: CentredMatrices) -> Array:
     """∂λ_j/∂u_i in the middle, shape (modes, d)."""
     at = np.arange(centre.modes)
     stiff, heavy = (x.part(1)[:, at, at] for x in (centre.stiffness, centre.mass))
     return np.asarray((stiff - centre.squared * heavy).T)
 
 
-def _couplings(centre: Centre, some: Rows) -> Array:
+def _couplings(centre: CentredMatrices, some: Rows) -> Array:
     """First-order change of K − λ M between modes, λ the mean of both, shape (d, p, p)."""
     stiff, heavy = (x.part(1)[:, some[:, None], some] for x in (centre.stiffness, centre.mass))
     mean = (centre.squared[some, None] + centre.squared[some]) / 2
     return np.asarray(stiff - mean * heavy)
 
 
-def _nearness(centre: Centre, slopes: Array) -> Array:
+def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
     """How far λ_j and λ_k may vary against one another, over their distance, (modes, modes).
 
     At 1 their series meet a point where both are equal, for complex inputs within the unit discs.
@@ -159,7 +161,7 @@ def _nearness(centre: Centre, slopes: Array) -> Array:
 
 
 def _from_below(
-    centre: Centre, slopes: Array, wanted: int, doubts: Array
+    centre: CentredMatrices, slopes: Array, wanted: int, doubts: Array
 ) -> tuple[list[Block], tuple[int, int] | None]:
     """Blocks of the lowest modes; modes that are nearest one another where it ends before."""
     near, blocks = _nearness(centre, slopes), list[Block]()
@@ -191,7 +193,7 @@ def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
         modes = more
 
 
-def rotation(centre: Centre, modes: Rows) -> Array:
+def rotation(centre: CentredMatrices, modes: Rows) -> Array:
     """Rotation of modes after which K − λ M is nearly diagonal in the box, shape (p, p).
 
     Joint diagonalisation of the middle and of all first derivatives by Jacobi rotations (Cardoso,

@@ -61,7 +61,7 @@ class Coupling:
                 half = np.ptp(wave.value, axis=(1, 2)) / 2 + wave.error
                 by_slope = np.outer(self._slope(wave, source), self.slope[s, o])
                 added[:, o] += np.minimum(by_slope, 2 * np.outer(half, self.size[s, o]))
-                deviation[:, o] += np.outer(wave.stray, self.size[s, o])
+                deviation[:, o] += np.outer(wave.line_deviation, self.size[s, o])
         return added, deviation
 
     def _grid(self, duration: float) -> Grid:
@@ -90,7 +90,7 @@ def coupling_of(structure: Classical, shares: BlockShares, found: Subspaces) -> 
     norm = 1 + float(np.linalg.norm(block.norm.spread(), 2))
     read = np.sqrt(shares.of_outputs.size()) * structure.factor.size()
     of_columns = np.sqrt(norm) * np.linalg.norm(off, axis=1)
-    slope = (shares.answer.size().T @ of_columns)[:, None] * read
+    slope = (shares.participation.size().T @ of_columns)[:, None] * read
     size = norm * np.sqrt(shares.of_sources.size())[:, None] * read
     j = np.arange(len(off))
     low, high = block.rate[j, j].bounds()

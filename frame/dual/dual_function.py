@@ -53,7 +53,7 @@ class Data(NamedTuple):
         quadratic: Quadratic parts, packed by rows, shape (Z, L (L + 1)/2).
         cubic: Cubic parts, packed, shape (Z, monomials).
         size: Their sizes over the box, shape (Z,).
-        rest: Remainders with `EXPECTED` of `size`, shape (Z,).
+        remainder: Remainders with `EXPECTED` of `size`, shape (Z,).
         group_wave: Middle and half range of the group's responses, shape (2 sources, T), or (0, 1).
         group_linear: Linear parts of its shares and of their doubt, shape (2 sources, L).
         group_quadratic: Quadratic parts.
@@ -75,7 +75,7 @@ class Data(NamedTuple):
     quadratic: Array
     cubic: Array
     size: Array
-    rest: Array
+    remainder: Array
     group_wave: Array
     group_linear: Array
     group_quadratic: Array
@@ -209,9 +209,9 @@ def dual(
     total += box_maximum(slope, bend, u)
     products(u, bend)
     for z in range(len(mu)):
-        total += abs(mu[z]) * data.rest[z]
+        total += abs(mu[z]) * data.remainder[z]
         gradient[z] += dot(data.linear[z], u) + dot(data.quadratic[z], bend)
-        gradient[z] += np.sign(mu[z]) * data.rest[z]
+        gradient[z] += np.sign(mu[z]) * data.remainder[z]
     return total
 
 

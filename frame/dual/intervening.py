@@ -78,17 +78,19 @@ class BlockShares:
     Args:
         block: The block, in the inputs of the shares.
         read: a, V = (p, m).
-        driven: Xᵀ M v, V = (p, sources).
-        answer: β = N⁻¹ Xᵀ M v, V = (p, sources).
+        source_forces: Xᵀ M v, V = (p, sources).
+        participation: β = N⁻¹ Xᵀ M v, V = (p, sources).
     """
 
     block: Block
     read: TaylorModel
-    driven: TaylorModel
-    answer: TaylorModel
+    source_forces: TaylorModel
+    participation: TaylorModel
 
     @classmethod
-    def of(cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows) -> BlockShares:
+    def from_block(
+        cls, block: Block, rows: TaylorModel, excited: TaylorModel, used: Rows
+    ) -> BlockShares:
         """Shares of a block.
 
         Args:
@@ -101,17 +103,17 @@ class BlockShares:
         block = block.cut(min(degree_of_shares(block.norm.inputs), block.norm.order))
         if len(varying.present()):
             block = block.cut(excited.order).among(used, excited.inputs)
-            driven = block.moved @ fixed.T + block.moved @ varying.T
+            driven = block.mass_shape @ fixed.T + block.mass_shape @ varying.T
         else:
-            rounding = block.moved.size() @ excited.rest.T
-            driven = (block.moved @ fixed.T).loosened(rounding)
-        read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.rest.T)
+            rounding = block.mass_shape.size() @ excited.remainder.T
+            driven = (block.mass_shape @ fixed.T).loosened(rounding)
+        read = (block.shape @ rows.value.T).loosened(block.shape.size() @ rows.remainder.T)
         return cls(block, read, driven, solve(block.norm, driven))
 
     @property
     def share(self) -> TaylorModel:
         """a_j β_j of each column, V = (p, sources, m)."""
-        return self.answer[:, :, None] * self.read[:, None, :]
+        return self.participation[:, :, None] * self.read[:, None, :]
 
     @property
     def of_outputs(self) -> TaylorModel:
@@ -121,7 +123,7 @@ class BlockShares:
     @property
     def of_sources(self) -> TaylorModel:
         """β·N β of each source, V = (sources,)."""
-        return dots(self.driven, self.answer)
+        return dots(self.source_forces, self.participation)
 
 
 def degree_of_shares(inputs: int) -> int:

@@ -19,7 +19,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from alphacut.frame.dual.dual_function import Data, compiled, minimise
-from alphacut.frame.dual.level import Level, Problem
+from alphacut.frame.dual.level import LevelModels, OutputBounds
 from alphacut.fuzzy.arrays import Array, Rows
 
 BISECTIONS = 48
@@ -49,13 +49,13 @@ class PeakCell:
     at: Array = field(compare=False)
 
 
-def least_peak(level: Level, output: int) -> tuple[float, Array]:
+def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
     """Lower bound of an output's smallest peak over a box, 0 or more, and inputs near it.
 
     Returns:
         The bound, and the coordinates that the bound of the lowest cell names, shape (d,).
     """
-    sides = [Problem.of(level, output, s, 0.0) for s in (0, 1)]
+    sides = [OutputBounds.initial(level, output, s, 0.0) for s in (0, 1)]
     data = sides[0].data
     motion = np.einsum("ks,kstp->ktp", data.share, data.table)  # of each mode at its points
     motion = motion.reshape(*motion.shape[:2], -1, int(data.points[0]))  # along q, along ω
@@ -94,7 +94,7 @@ def _halves(cell: PeakCell, motion: Array) -> list[Rows]:
 
 
 def _bounded(
-    sides: list[Problem], motion: Array, places: Rows, number: int, known: float
+    sides: list[OutputBounds], motion: Array, places: Rows, number: int, known: float
 ) -> PeakCell:
     """The cell at some places, with the largest over some nodes of the least ± output in it."""
     middle = [(low + high) // 2 for low, high in places.reshape(-1, 2).tolist()]

@@ -13,7 +13,7 @@ from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, concatenate
 from alphacut.frame.dual.dual_function import EXPECTED, Data, require_in_range, roundings
 from alphacut.frame.dual.intervening import Oscillator
-from alphacut.frame.dual.models import Models
+from alphacut.frame.dual.models import MotionModels
 from alphacut.frame.dual.rest import Excitation
 from alphacut.frame.dual.slabs import Effort, bounds
 from alphacut.frame.dual.structure import Classical
@@ -44,13 +44,13 @@ BLOCK = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Tables:
+class ResponseTables:
     """Responses of the oscillators of a level, by order of the derivative that is observed.
 
     Args:
         value: For each order responses, shape (K, sources, T, Q W).
         error: Bounds of what interpolation and round-off miss, shape (K, sources, T).
-        stray: Bounds of what responses stray from straight lines in the step to a node, the same.
+        line_deviation: Bounds of their distance from straight lines between nodes, the same.
         grids: For each mode its points.
         time: Nodes, shape (T,), in s.
 
@@ -60,7 +60,7 @@ class Tables:
 
     value: dict[int, Array]
     error: dict[int, Array]
-    stray: dict[int, Array]
+    line_deviation: dict[int, Array]
     grids: list[Grid]
     time: Array
 
@@ -69,7 +69,9 @@ class Tables:
             require_in_range({"table": value})
 
 
-def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -> Tables:
+def response_tables(
+    single: Sequence[Oscillator], excitation: Excitation, orders: Rows
+) -> ResponseTables:
     """Tables of all oscillators; `orders` are those of all outputs."""
     loads, time, sources = excitation
     points, different = _points(single, float(time[-1])), sorted(map(int, set(orders)))
@@ -79,7 +81,7 @@ def tables(single: Sequence[Oscillator], excitation: Excitation, orders: Rows) -
     count = roundings(len(single), len(sources), single[0].omega.inputs)
     of_sums = {o: 2 * gamma(count) * np.abs(stacked[0][o]).max(-1) for o in different}
     error = {o: stacked[1][o] + of_sums[o] for o in different}
-    return Tables(stacked[0], error, stacked[2], grids, time)
+    return ResponseTables(stacked[0], error, stacked[2], grids, time)
 
 
 def _responses(
@@ -96,7 +98,7 @@ def _responses(
         waves = [oscillators.waves(source, order) for source in sources]
         value = np.stack([wave.value.reshape(len(time), -1) for wave in waves])
         error = np.stack([wave.error for wave in waves])
-        responses[order] = value, error, np.stack([wave.stray for wave in waves])
+        responses[order] = value, error, np.stack([wave.line_deviation for wave in waves])
     return responses
 
 
@@ -111,7 +113,7 @@ def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class LevelModels:
     """One level's models and tables.
 
     Args:
@@ -122,36 +124,41 @@ class Level:
     """
 
     structure: Classical
-    models: Models
-    tables: Tables
+    models: MotionModels
+    tables: ResponseTables
     sources: tuple[str, ...]
 
     @property
-    def single(self) -> list[Oscillator]:
-        """Oscillators, one a mode that is enclosed."""
-        return self.models.single
+    def oscillators(self) -> list[Oscillator]:
+        """Oscillators, one for each mode that is enclosed."""
+        return self.models.oscillators
 
-    def within(self, low: Array, high: Array) -> Level:
+    def within(self, low: Array, high: Array) -> LevelModels:
         """The same models over a part of the box, low ≤ u ≤ high."""
         return replace(self, models=self.models.within(low, high))
 
     @classmethod
-    def of(
+    def from_structure(
         cls,
         structure: Classical,
         loads: Mapping[str, History],
         time: Array,
         sources: tuple[str, ...],
         allowed: Array | None = None,
-    ) -> Level:
-        """The level of a structure over its box; `allowed` as of `Models.of`.
+    ) -> LevelModels:
+        """The level of a structure over its box; `allowed` as of `MotionModels.from_structure`.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
         excitation = (loads, time, sources)
-        models = Models.of(structure, excitation, allowed)
-        return cls(structure, models, tables(models.single, excitation, structure.order), sources)
+        models = MotionModels.from_structure(structure, excitation, allowed)
+        return cls(
+            structure,
+            models,
+            response_tables(models.oscillators, excitation, structure.order),
+            sources,
+        )
 
     def bounds(
         self,
@@ -179,7 +186,9 @@ class Level:
             The bounds, and unit coordinates, shape (T, m, 2, d).
         """
         problems = [
-            Problem.of(self, o, s, float(enough[o])) for o in range(len(enough)) for s in (0, 1)
+            OutputBounds.initial(self, o, s, float(enough[o]))
+            for o in range(len(enough))
+            for s in (0, 1)
         ]
         problems[0].run(np.arange(0), 1, 1, 0.0, 0.0)  # compiles before there are threads
         passes = (
@@ -206,23 +215,23 @@ class Level:
         shape = (len(out), len(enough), 2)
         return out.reshape(shape), at.reshape(*shape, -1)
 
-    def stray(self) -> Array:
+    def line_deviation(self) -> Array:
         """Bound of how far outputs stray from straight lines in the step to each node, (T, m)."""
         tables = self.tables
         columns = []
         for o in range(len(self.structure.order)):
             order = int(self.structure.order[o])
             total: Array = np.zeros(len(tables.time))
-            for k, mode in enumerate(self.single):
-                total = total + mode.share.size()[:, o] @ tables.stray[order][k]
-            for truncated in self.models.rests:
-                total = total + truncated.stray[:, o]
-            columns.append(total + self.models.strays[:, o])
+            for k, mode in enumerate(self.oscillators):
+                total = total + mode.share.size()[:, o] @ tables.line_deviation[order][k]
+            for truncated in self.models.truncated:
+                total = total + truncated.line_deviation[:, o]
+            columns.append(total + self.models.line_deviation[:, o])
         return np.stack(columns, -1)
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class OutputBounds:
     """Bounds of one output and side at all nodes.
 
     Args:
@@ -244,7 +253,9 @@ class Problem:
     attained: float
 
     @classmethod
-    def of(cls, level: Level, o: int, s: int, enough: float, attained: float = 0.0) -> Problem:
+    def initial(
+        cls, level: LevelModels, o: int, s: int, enough: float, attained: float = 0.0
+    ) -> OutputBounds:
         """Bounds of one output of a level, on one side."""
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
@@ -284,15 +295,15 @@ class Problem:
         self.out[0, nodes] = np.minimum(self.out[0, nodes], out[0])
 
 
-def _variables(level: Level, o: int) -> TaylorModel:
+def _variables(level: LevelModels, o: int) -> TaylorModel:
     """ω, g and the shares of each mode, in this order, V = (Z,)."""
-    models = ((mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in level.single)
+    models = ((mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in level.oscillators)
     return concatenate([x for of_mode in models for x in of_mode], -1)
 
 
-def _tables(level: Level, o: int, variables: TaylorModel) -> list[Array]:
+def _tables(level: LevelModels, o: int, variables: TaylorModel) -> list[Array]:
     """The first fields of `Data`: the table, its points, and the ranges of all variables."""
-    grids, single = level.tables.grids, level.single
+    grids, single = level.tables.grids, level.oscillators
     centre, radius = (x.reshape(len(single), -1) for x in (variables.value, _radii(variables)))
     omega = np.stack([np.tile(g.omega, len(g.quotient)) for g in grids])
     decay = np.stack([(g.quotient[:, None] * g.omega).ravel() for g in grids])
@@ -306,27 +317,27 @@ def _tables(level: Level, o: int, variables: TaylorModel) -> list[Array]:
     return [value, *scaled, start, step, points, ends, *ranges]
 
 
-def _models(level: Level, variables: TaylorModel) -> list[Array]:
+def _models(level: LevelModels, variables: TaylorModel) -> list[Array]:
     """The next fields of `Data`: scaled models of all variables."""
     linear, quadratic, cubic, remainder = _scaled(variables, _radii(variables))
     size = np.asarray(np.abs(cubic).sum(1))
     # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
-    of_sums = 8 * gamma(roundings(len(level.single), len(level.sources), linear.shape[1]))
+    of_sums = 8 * gamma(roundings(len(level.oscillators), len(level.sources), linear.shape[1]))
     return [linear, quadratic, cubic, size, remainder + of_sums + EXPECTED * size]
 
 
-def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
+def _group(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
     """The last fields of `Data`, of modes known by sums, and all constants at all nodes, (2, T)."""
     tables, order = level.tables, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(tables.time)))
     constant[1] = level.models.added[:, o]
-    for k, mode in enumerate(level.single):
+    for k, mode in enumerate(level.oscillators):
         constant[1] += mode.share.size()[:, o] @ tables.error[order][k]
     d, sources = level.structure.rayleigh.inputs, len(level.sources)
-    if not level.models.rests:
+    if not level.models.truncated:
         return [np.zeros((0, x)) for x in (1, d, d * (d + 1) // 2)], constant
     waves, models = list[Array](), list[TaylorModel]()
-    for truncated in level.models.rests:
+    for truncated in level.models.truncated:
         middle, half = truncated.middle[:, o], truncated.half[:, o]
         waves += [middle, side * half]
         models += [truncated.share[:, o], truncated.doubt[:, o]]
@@ -336,17 +347,17 @@ def _group(level: Level, o: int, side: float) -> tuple[list[Array], Array]:
     linear, quadratic, cubic, remainder = _scaled(model, np.ones(len(wave)))
     constant[1] += (remainder + np.abs(cubic).sum(1)) @ np.abs(wave)
     size = np.abs(linear).sum(1) + np.abs(quadratic).sum(1)
-    constant[1] += gamma(roundings(len(level.single), sources, d)) * (size @ np.abs(wave))
+    constant[1] += gamma(roundings(len(level.oscillators), sources, d)) * (size @ np.abs(wave))
     constant[1] += gamma(len(wave) + 4) * np.abs(constant).sum(0)
     return [wave, linear, quadratic], constant
 
 
-def _grain(level: Level, o: int) -> Array:
+def _grain(level: LevelModels, o: int) -> Array:
     """Distance of multipliers as a share of the modes' largest responses in sum, shape (1,)."""
     responses = np.abs(level.tables.value[int(level.structure.order[o])]).max((2, 3))
     size = sum(
         float(np.abs(mode.share.value[:, o]) @ response)
-        for mode, response in zip(level.single, responses, strict=True)
+        for mode, response in zip(level.oscillators, responses, strict=True)
     )
     return np.array([GRAIN * size or 1.0])
 
@@ -360,7 +371,7 @@ def _scaled(x: TaylorModel, radius: Array) -> tuple[Array, ...]:
     # pairs by rows, as the kernel has them
     lists = monomials(x.inputs, 2)
     order = np.lexsort((lists[:, 1], lists[:, 0]))
-    remainder = np.asarray(x.rest + gamma(8) * x.size())
+    remainder = np.asarray(x.remainder + gamma(8) * x.size())
     parts = ((y / radius).T for y in (x.part(1), x.part(2)[order], x.part(3)))
     return (*(np.ascontiguousarray(y) for y in parts), remainder / radius)
 

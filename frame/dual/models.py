@@ -9,46 +9,49 @@ import numpy as np
 from alphacut.frame.calculus.rounding import gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, all_within
 from alphacut.frame.calculus.unproved import UnprovedError
-from alphacut.frame.dual.clusters import Subspaces, centred, subspaces
+from alphacut.frame.dual.clusters import Subspaces, centred_matrices, subspaces
 from alphacut.frame.dual.coupling import coupling_of
 from alphacut.frame.dual.intervening import BlockShares, Oscillator, oscillators, sources_of
-from alphacut.frame.dual.rest import Excitation, Rest, rest_of_block, rest_of_modes
+from alphacut.frame.dual.rest import Excitation, TruncatedModes, rest_of_block, rest_of_modes
 from alphacut.frame.dual.structure import Classical
 from alphacut.frame.dual.wanted import modes_wanted
 from alphacut.fuzzy.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Models:
+class MotionModels:
     """A structure's motion over a box.
 
     Args:
-        single: Oscillators, one a mode that is enclosed.
-        rests: Modes that are known by sums: those of a block, and all that are not enclosed.
+        oscillators: Oscillators, one a mode that is enclosed.
+        truncated: Modes that are known by sums: those of a block, and all that are not enclosed.
         added: Bound of what couples the oscillators of blocks, shape (T, m).
-        strays: Bound of how far blocks of several stray from straight lines between nodes, (T, m).
+        line_deviation: Bound of how far what blocks of several modes add strays from straight
+            lines between nodes, shape (T, m).
     """
 
-    single: list[Oscillator]
-    rests: list[Rest]
+    oscillators: list[Oscillator]
+    truncated: list[TruncatedModes]
     added: Array
-    strays: Array
+    line_deviation: Array
 
-    def within(self, low: Array, high: Array) -> Models:
+    def within(self, low: Array, high: Array) -> MotionModels:
         """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
-        models = [x for mode in self.single for x in mode.models]
-        models += [x for truncated in self.rests for x in (truncated.share, truncated.doubt)]
+        models = [x for mode in self.oscillators for x in mode.models]
+        models += [x for truncated in self.truncated for x in (truncated.share, truncated.doubt)]
         restricted = all_within(models, low, high)
-        count = 4 * len(self.single)
-        single = [mode.on_part(restricted[4 * k : 4 * k + 4]) for k, mode in enumerate(self.single)]
-        pairs = zip(self.rests, restricted[count::2], restricted[count + 1 :: 2], strict=True)
+        count = 4 * len(self.oscillators)
+        single = [
+            mode.on_part(restricted[4 * k : 4 * k + 4]) for k, mode in enumerate(self.oscillators)
+        ]
+        pairs = zip(self.truncated, restricted[count::2], restricted[count + 1 :: 2], strict=True)
         rests = [replace(truncated, share=share, doubt=doubt) for truncated, share, doubt in pairs]
-        return replace(self, single=single, rests=rests)
+        return replace(self, oscillators=single, truncated=rests)
 
     @classmethod
-    def of(
+    def from_structure(
         cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
-    ) -> Models:
+    ) -> MotionModels:
         """Models of a structure over its box.
 
         Args:
@@ -60,7 +63,7 @@ class Models:
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
-        centre, used = centred(structure.mass, structure.stiffness)
+        centre, used = centred_matrices(structure.mass, structure.stiffness)
         excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
         wanted, doubts = centre.modes, np.asarray(np.zeros(centre.modes))
         if allowed is not None:
@@ -71,13 +74,17 @@ class Models:
                 "no mode keeps clear of the others", "take narrower inputs", found.along
             )
         rows = structure.start.like(structure.rows) @ centre.basis
-        shares = [BlockShares.of(block, rows, excited, used) for block in found.blocks]
+        shares = [BlockShares.from_block(block, rows, excited, used) for block in found.blocks]
         nothing = np.zeros((len(excitation[1]), len(structure.order)))
         models = cls([], [], nothing, nothing)
         for of_block in shares:
             models = models.with_block(structure, of_block, found, excitation, allowed)
         truncated = rest_of_modes(structure, found, shares, (rows, excited), excitation)
-        return models if truncated is None else replace(models, rests=[*models.rests, truncated])
+        return (
+            models
+            if truncated is None
+            else replace(models, truncated=[*models.truncated, truncated])
+        )
 
     def with_block(
         self,
@@ -86,20 +93,22 @@ class Models:
         found: Subspaces,
         excitation: Excitation,
         allowed: Array | None,
-    ) -> Models:
+    ) -> MotionModels:
         """With a block as oscillators, or known by its sums where that is narrower."""
         more = oscillators(structure, of_block, found)
         if len(more) == 1:
-            return replace(self, single=self.single + more)
+            return replace(self, oscillators=self.oscillators + more)
         coupling = coupling_of(structure, of_block, found)
         added, strays = coupling.bounds(structure.order, excitation)
         ends = coupling.omega_range, coupling.quotient_range
         truncated = rest_of_block(structure, found, of_block, ends, excitation)
         scale = np.maximum(added.max(0) if allowed is None else allowed, 1e-300)
         if (truncated.width / scale).max() < (added.max(0) / scale).max():
-            return replace(self, rests=[*self.rests, truncated])
-        added, strays = self.added + added, self.strays + strays
-        return replace(self, single=self.single + more, added=added, strays=strays)
+            return replace(self, truncated=[*self.truncated, truncated])
+        added, strays = self.added + added, self.line_deviation + strays
+        return replace(
+            self, oscillators=self.oscillators + more, added=added, line_deviation=strays
+        )
 
 
 def inverse(basis: Array, like: TaylorModel) -> TaylorModel:

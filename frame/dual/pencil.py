@@ -31,7 +31,7 @@ def form_variation(matrix: TaylorModel, scale: Array) -> float:
     squares = _squares(matrix.inputs)
     part = matrix.part(2) * weight
     low += max(_norm_of_terms(sign * part, squares) for sign in (1.0, -1.0))
-    higher = sum(matrix.sizes()[3:]) + matrix.rest
+    higher = sum(matrix.sizes()[3:]) + matrix.remainder
     return low + float(np.linalg.norm(weight * higher, 2))
 
 
@@ -80,7 +80,7 @@ class Pencil:
     rounding: Array
 
     @classmethod
-    def of(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
+    def from_rate(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
         """The pencil of ℓ with coefficients (monomials,) of degree 0 to N."""
         N, d = len(rate) - 1, mass.inputs
         ell, of_k, of_m = (
@@ -88,14 +88,14 @@ class Pencil:
             [*stiffness.sizes()],
             mass.sizes(),
         )
-        sizes = [np.zeros_like(mass.rest) for _ in range(N + 2)]
+        sizes = [np.zeros_like(mass.remainder) for _ in range(N + 2)]
         for m in range(1, len(of_k)):
             sizes[m] = sizes[m] + of_k[m]
         for a in range(N + 1):
             for b in range(len(of_m)):
                 if (a, b) != (0, 0):
                     sizes[min(a + b, N + 1)] += ell[a] * of_m[b]
-        sizes[-1] = sizes[-1] + sum(ell) * mass.rest + stiffness.rest
+        sizes[-1] = sizes[-1] + sum(ell) * mass.remainder + stiffness.remainder
         parts, rounding = [], gamma(16) * np.stack(sizes[1:3])
         for m in (1, 2):
             part = stiffness.part(m)
@@ -143,7 +143,7 @@ class Comparison:
     least: float
 
     @classmethod
-    def of(cls, pencil: Pencil, gaps: Array, o: Rows) -> Comparison:
+    def over_box(cls, pencil: Pencil, gaps: Array, o: Rows) -> Comparison:
         """Bounds over the box; `gaps` are the T_jj in its middle, o all but the block."""
         total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
         distance, above = np.abs(gaps[o]), gaps[o] > 0

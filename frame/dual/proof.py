@@ -33,7 +33,7 @@ from alphacut.frame.boxes import Boxes, UnitFlow
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual.box import Box
 from alphacut.frame.dual.least_peaks import least_peak
-from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.level import OutputBounds
 from alphacut.frame.dual.pruning import prune_ends, remainder
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.envelope import Ends, Envelope
@@ -207,7 +207,7 @@ class _Bounding:
         shares = np.zeros((*self.top.shape, n))
         shares[..., active] = self.shares
         between = np.zeros(self.outer.shape[:2])
-        between[self.nodes] = self.level.stray() if self.needed.all() else 0.0
+        between[self.nodes] = self.level.line_deviation() if self.needed.all() else 0.0
         return PartBounds(
             self.outer,
             inner,
@@ -218,7 +218,7 @@ class _Bounding:
             remaining=self.remaining,
             pruned=self.pruned,
             least_peaks=least,
-            facts={"single_modes": len(self.level.single)},
+            facts={"single_modes": len(self.level.oscillators)},
         )
 
     def _least_peaks(self) -> Ends:
@@ -265,7 +265,7 @@ class _Bounding:
             for job in [pool.submit(improve, *peak) for peak in np.argwhere(above.any(0))]:
                 job.result()
 
-    def _problem(self, o: int, s: int) -> tuple[Problem, Rows]:
+    def _problem(self, o: int, s: int) -> tuple[OutputBounds, Rows]:
         """Bounds of one output and side, and the places of those that are above what suffices."""
         enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.top[o, s])
         problem = self._problem_of(o, s, enough, top)
@@ -274,9 +274,11 @@ class _Bounding:
         above = self.needed[self.nodes, o, s] & (bounds > top + enough)
         return problem, np.flatnonzero(above)
 
-    def _problem_of(self, o: int, s: int, enough: float, top: float) -> Problem:
-        """Bounds of one output and side; see `Problem.of`."""
-        return Problem.of(self.level, int(np.searchsorted(self.outputs, o)), s, enough, top)
+    def _problem_of(self, o: int, s: int, enough: float, top: float) -> OutputBounds:
+        """Bounds of one output and side; see `OutputBounds.initial`."""
+        return OutputBounds.initial(
+            self.level, int(np.searchsorted(self.outputs, o)), s, enough, top
+        )
 
     def _bound(self, o: int, s: int) -> None:
         """Bound an output at nodes where it may pass its peak."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from alphacut.frame.dual.level import Level, Problem
+from alphacut.frame.dual.level import LevelModels, OutputBounds
 from alphacut.frame.dual.slabs import sensitivities
 from alphacut.fuzzy.arrays import Array, Rows
 
@@ -23,7 +23,11 @@ STEPS = 40
 
 
 def prune_ends(
-    level: Level, problem: Problem, bound_index: tuple[int, int], above: Rows, best: Array
+    level: LevelModels,
+    problem: OutputBounds,
+    bound_index: tuple[int, int],
+    above: Rows,
+    best: Array,
 ) -> tuple[Array, Array, Array]:
     """Prune the ends of a box that hold no higher peak of one output and side.
 
@@ -55,15 +59,17 @@ def prune_ends(
 
 
 def _over_piece(
-    level: Level,
-    problem: Problem,
+    level: LevelModels,
+    problem: OutputBounds,
     bound_index: tuple[int, int],
     above: Rows,
     piece: tuple[Array, Array],
     slabs: int,
 ) -> Array:
     """Bounds over a piece of the box at nodes (J,), until one lies above the peak."""
-    inside = Problem.of(level.within(*piece), *bound_index, problem.enough, problem.attained)
+    inside = OutputBounds.initial(
+        level.within(*piece), *bound_index, problem.enough, problem.attained
+    )
     inside.out[0] = problem.out[0]
     for node in above[np.argsort(-problem.out[0, above])]:
         inside.run(np.array([node]), slabs, STEPS, 1.0, 0.0)
@@ -72,7 +78,7 @@ def _over_piece(
     return np.asarray(inside.out[0, above])
 
 
-def remainder(problem: Problem, node: int) -> tuple[float, Array]:
+def remainder(problem: OutputBounds, node: int) -> tuple[float, Array]:
     """What remainders add to a bound at a node at least, and the share of each input in it, (d,).
 
     At the maximum the multipliers are the slopes of the motion by the intervening variables.
@@ -85,7 +91,7 @@ def remainder(problem: Problem, node: int) -> tuple[float, Array]:
     upper = np.zeros((len(slope), d, d))
     upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)
     size = (np.abs(data.linear) + upper.sum(1) + upper.sum(2)) ** 2
-    by_input = np.abs(slope) * data.rest
+    by_input = np.abs(slope) * data.remainder
     shares = (by_input / np.maximum(size.sum(1), 1e-300)) @ size
     least = float(problem.constant[1, node] + by_input.sum())
     return least, np.asarray(shares / max(float(shares.sum()), 1e-300))

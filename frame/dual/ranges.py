@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from alphacut.frame.dual.waves import Oscillators, at_once, spanned
+from alphacut.frame.dual.waves import Oscillators, feedthrough, spanned
 from alphacut.frame.response.duhamel import absolute_moments
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
@@ -34,12 +34,12 @@ class Ranges:
     Args:
         low: Lower bounds.
         high: Upper bounds.
-        stray: Bounds of how far λ^κ e strays from a straight line in the step to a node.
+        line_deviation: Bounds of how far λ^κ e strays from a straight line in the step to a node.
     """
 
     low: Array
     high: Array
-    stray: Array
+    line_deviation: Array
 
 
 def response_ranges(
@@ -63,7 +63,7 @@ def response_ranges(
                 for k, (low, high, deviation) in enumerate(piece.bounds(source, order)):
                     ranges.low[k, s] = np.minimum(ranges.low[k, s], low)
                     ranges.high[k, s] = np.maximum(ranges.high[k, s], high)
-                    ranges.stray[k, s] = np.maximum(ranges.stray[k, s], deviation)
+                    ranges.line_deviation[k, s] = np.maximum(ranges.line_deviation[k, s], deviation)
     return found
 
 
@@ -111,7 +111,7 @@ class _Piece:
                 wave = self.table.waves(source, order)
                 least, most = _of_cells(wave.value, wave.error, self._squared() ** power)
                 low, high = np.maximum(low, least), np.minimum(high, most)
-                deviation = np.minimum(deviation, factor * wave.stray)
+                deviation = np.minimum(deviation, factor * wave.line_deviation)
             yield low, high, deviation
 
     def _squared(self) -> Array:
@@ -126,7 +126,7 @@ class _Piece:
         if source in self.loads:
             pushed, size = self.pushed[source], self.loads[source].extremes[0]
             before = np.append(pushed[:1], pushed[:-1]) + self.step * size
-            direct = np.abs(at_once(source, self.loads, order, self.time))
+            direct = np.abs(feedthrough(source, self.loads, order, self.time))
             more = size * bool(direct.any())
             most = np.maximum(before, pushed) * largest / slow + more
             return pushed * largest / slow + direct, most

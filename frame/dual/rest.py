@@ -36,7 +36,7 @@ UNKNOWN = 1e60
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class TruncatedModes:
     """Modes that are known by sums.
 
     Args:
@@ -44,14 +44,14 @@ class Rest:
         doubt: Bound of √(A B), V = (sources, m).
         middle: Middle of the responses that the share is multiplied by, shape (sources, m, T).
         half: Half their range, that the doubt is multiplied by.
-        stray: Bound of how far the motion strays from straight lines between nodes, (T, m).
+        line_deviation: Bound of the motion's distance from straight lines between nodes, (T, m).
     """
 
     share: TaylorModel
     doubt: TaylorModel
     middle: Array
     half: Array
-    stray: Array
+    line_deviation: Array
 
     @property
     def width(self) -> Array:
@@ -88,7 +88,7 @@ def rest_of_modes(
     shares: Sequence[BlockShares],
     coordinates: tuple[TaylorModel, TaylorModel],
     excitation: Excitation,
-) -> Rest | None:
+) -> TruncatedModes | None:
     """All modes that are not enclosed; None if there are none.
 
     Args:
@@ -115,7 +115,7 @@ def rest_of_block(
     of_block: BlockShares,
     ends: tuple[Ends, Ends],
     excitation: Excitation,
-) -> Rest:
+) -> TruncatedModes:
     """The modes of a block, known by their sums; `ends` are those of ω and g/ω."""
     return _known_by(_of_block(of_block), ends, structure, found, excitation)
 
@@ -126,7 +126,7 @@ def _known_by(
     structure: Classical,
     found: Subspaces,
     excitation: Excitation,
-) -> Rest:
+) -> TruncatedModes:
     """Modes of which sums and the ranges of ω and g/ω are known."""
     orders = sorted({int(order) for order in structure.order})
     (omega, quotient), (ground, time, sources) = ends, excitation
@@ -150,9 +150,9 @@ def _sums_over_modes(
         order, d = excited.order, excited.inputs
         mass, stiffness = (x.among(found.used, d) for x in (mass, stiffness))
     else:
-        excited = mass.like(excited.value).loosened(excited.rest)
+        excited = mass.like(excited.value).loosened(excited.remainder)
     mass, stiffness = mass.to_order(order), stiffness.to_order(order)
-    rows = stiffness.like(read.value).loosened(read.rest)
+    rows = stiffness.like(read.value).loosened(read.remainder)
     massive, light = slice(0, centre.modes), slice(centre.modes, None)
     heavy, stiff = found.variation
     forced = excited @ mass
@@ -208,7 +208,7 @@ def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Ar
             )
         parts.append(right_side / middle)
     found = TaylorModel(tuple(parts), np.zeros(rows.shape), rows.inputs, matrix.order)
-    missed = rows.rest + found.size() @ matrix.rest
+    missed = rows.remainder + found.size() @ matrix.remainder
     for degree, size in enumerate(rows.sizes()):
         missed = missed + gamma(_terms(matrix, degree)) * size
     for i, size in enumerate(found.sizes()):
@@ -220,23 +220,23 @@ def _row_series(matrix: TaylorModel, rows: TaylorModel) -> tuple[TaylorModel, Ar
 
 def _terms(matrix: TaylorModel, degree: int) -> int:
     """Roundings of a coefficient of rows A⁻¹, with the division by its middle."""
-    return len(matrix.rest) * 2**degree + degree + 4
+    return len(matrix.remainder) * 2**degree + degree + 4
 
 
 def _of_block(of_block: BlockShares) -> _Sums:
     """Sums over the modes of a block, whose projected stiffness is N L."""
     projected = of_block.block.norm @ of_block.block.rate.T
-    read, driven = of_block.read, of_block.driven
+    read, driven = of_block.read, of_block.source_forces
     flexible, pushed = solve(projected, read), solve(projected, driven)
     return _Sums(
-        (of_block.answer.T @ read, driven.T @ flexible),
+        (of_block.participation.T @ read, driven.T @ flexible),
         (of_block.of_outputs, dots(read, flexible)),
         (of_block.of_sources, dots(driven, pushed)),
     )
 
 
 def _diagonal(matrix: TaylorModel) -> TaylorModel:
-    at = np.arange(len(matrix.rest))
+    at = np.arange(len(matrix.remainder))
     return matrix[at, at]
 
 
@@ -263,12 +263,12 @@ def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
 
 def _least(
     structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
-) -> Rest:
+) -> TruncatedModes:
     """The bound of each source and output whose doubt is least at its largest."""
     of_outputs = [ranges[int(order)] for order in structure.order]
     low, high, deviation = (  # (powers, sources, m, T)
         np.stack(arrays, 2)
-        for arrays in zip(*((x.low, x.high, x.stray) for x in of_outputs), strict=True)
+        for arrays in zip(*((x.low, x.high, x.line_deviation) for x in of_outputs), strict=True)
     )
     middle, half = (low + high) / 2, (high - low) / 2
     middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]
@@ -279,4 +279,4 @@ def _least(
         share, doubt = share + pair[0] * (best == k), doubt + pair[1] * (best == k)
     s, o = np.indices(best.shape)
     strays = (doubts[..., None] * deviation).min(0).sum(0)
-    return Rest(share, doubt, middle[best, s, o], half[best, s, o], strays.T)
+    return TruncatedModes(share, doubt, middle[best, s, o], half[best, s, o], strays.T)

@@ -226,7 +226,7 @@ def refine(
     aim = sufficient(reached, 0.0, effort, constant)
     reached = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)
     mu[:] = slabs.mu[0]
-    floor = effort.floor * (constant[1] + dot(np.abs(mu), data.rest))
+    floor = effort.floor * (constant[1] + dot(np.abs(mu), data.remainder))
     count, start_value = 1, slabs.value[0]
     while count < effort.slabs:
         first = int(np.argmax(slabs.value[:count]))

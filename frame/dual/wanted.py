@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from alphacut.frame.calculus.taylor_model import TaylorModel
-from alphacut.frame.dual.blocks import Centre
+from alphacut.frame.dual.blocks import CentredMatrices
 from alphacut.frame.dual.ranges import POWERS
 from alphacut.frame.dual.rest import Excitation
 from alphacut.frame.dual.structure import Classical
-from alphacut.frame.dual.waves import at_once
+from alphacut.frame.dual.waves import feedthrough
 from alphacut.frame.response.duhamel import responses_at_nodes
 from alphacut.frame.structures.loads import History
 from alphacut.fuzzy.arrays import Array
@@ -22,7 +22,7 @@ MAX_NODES = 500
 
 def modes_wanted(
     structure: Classical,
-    centre: Centre,
+    centre: CentredMatrices,
     excited: TaylorModel,
     excitation: Excitation,
     allowed: Array,
@@ -57,7 +57,7 @@ def modes_wanted(
     for o, order in enumerate(structure.order):
         for s, source in enumerate(sources):
             waves = _waves(source, sigma, motions[source][0], int(order))
-            waves = waves + at_once(source, loads, int(order), time)
+            waves = waves + feedthrough(source, loads, int(order), time)
             steep = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
             moved[:, o] += np.abs(read[o] * given[s]) * steep  # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
             shares = []

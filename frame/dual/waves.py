@@ -39,8 +39,8 @@ class Waves:
         omega: Frequencies, shape (W,), in rad/s.
         quotient: g/ω, shape (Q,).
         value: Responses, shape (T, Q, W).
-        error: What they stray from bilinear interpolation at most, with rounding, shape (T,).
-        stray: What they stray from straight lines in the step to each node at most, shape (T,).
+        error: Bound of their distance from bilinear interpolation, with rounding, shape (T,).
+        line_deviation: Bound of their distance from a straight line in the step to each node, (T,).
         largest: Bounds of |G| and |G'| over the grid, shape (2, T).
     """
 
@@ -48,7 +48,7 @@ class Waves:
     quotient: Array
     value: Array
     error: Array
-    stray: Array
+    line_deviation: Array
     largest: Array
 
 
@@ -114,11 +114,11 @@ class Oscillators:
             rounding *= 1 + quotient
         else:
             value = G[0].imag / omega * (-1.0 if source == "load" else 1.0)
-            direct = at_once(source, self.loads, order, self.time)[:, None]
+            direct = feedthrough(source, self.loads, order, self.time)[:, None]
             value, rounding = value + direct, rounding / omega + 8 * UNIT_ROUNDOFF * np.abs(direct)
         shape = (len(self.time), len(g.quotient), len(g.omega))
         error, largest = self._error(np.abs(G).max(-1), bounds, order, start=source == "start")
-        error, deviation = error + rounding.max(-1), self._stray(largest[0], source, order)
+        error, deviation = error + rounding.max(-1), self._line_deviation(largest[0], source, order)
         return Waves(g.omega, g.quotient, value.reshape(shape), error, deviation, largest)
 
     def _error(
@@ -148,7 +148,7 @@ class Oscillators:
             across = high * second
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
-    def _stray(self, size: Array, source: str, order: int) -> Array:
+    def _line_deviation(self, size: Array, source: str, order: int) -> Array:
         """Bounds of how far responses stray from straight lines in the step to each node, (T,).
 
         It is h²/8 sup |ë|; ρ̇ = σ ρ + a, so that under a load ë has a and its slope besides; where
@@ -171,18 +171,18 @@ class Oscillators:
             kink += np.where(kinked, h / 4 * power * jump, 0.0)
         deviation = (h**2 / 8 * bend + kink) / low
         return np.asarray(
-            deviation + (load.stray(self.time) if _acts_at_once(source, order) else 0.0)
+            deviation + (load.line_deviation(self.time) if _has_feedthrough(source, order) else 0.0)
         )
 
 
-def at_once(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
+def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
     """What a force adds to the acceleration of its own mode at once, shape of `time`."""
-    if not _acts_at_once(source, order):
+    if not _has_feedthrough(source, order):
         return np.zeros_like(time)
     return loads[source].values(time)
 
 
-def _acts_at_once(source: str, order: int) -> bool:
+def _has_feedthrough(source: str, order: int) -> bool:
     return order == 2 and source.startswith("force")
 
 

@@ -127,7 +127,7 @@ class History:
         )
         return np.asarray(np.where(has_started & ~(ended & ~np.array(self.is_held)), inside, 0.0))
 
-    def stray(self, time: Array) -> Array:
+    def line_deviation(self, time: Array) -> Array:
         """Bound of how far f strays from straight lines in the step to each node (T,)."""
         h, values = np.diff(time, prepend=time[0]), self.values(time)
         if self.frequency:

@@ -8,8 +8,8 @@ from alphacut.frame import MatrixStructure
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual import rest
 from alphacut.frame.dual.box import over_box, sources
-from alphacut.frame.dual.clusters import centred, subspaces
-from alphacut.frame.dual.models import Models
+from alphacut.frame.dual.clusters import centred_matrices, subspaces
+from alphacut.frame.dual.models import MotionModels
 from alphacut.frame.dual.ranges import response_ranges
 from alphacut.frame.dual.waves import Oscillators, spanned
 from alphacut.frame.structures.loads import Accelerogram
@@ -66,7 +66,7 @@ def test_blocks_hold_the_subspaces_of_modes_that_cross(coupling):
     own = three_storeys_beside_a_mast(coupling)
     widths = {"kc": 0.1, "kb": 0.1, "ks": 40.0}
     structure, centre, radius = over(own, widths)
-    middle, used = centred(structure.mass, structure.stiffness)
+    middle, used = centred_matrices(structure.mass, structure.stiffness)
     found = subspaces(middle, used, 4)
     assert sum(len(block.modes) for block in found.blocks) == 4
     assert max(len(block.modes) for block in found.blocks) > 1
@@ -79,13 +79,13 @@ def test_blocks_hold_the_subspaces_of_modes_that_cross(coupling):
             turn = np.linalg.solve(seen[np.ix_(b, b)], block.shape.value[:, b].T)
             exact = seen[:, b] @ turn
             off = np.abs(block.shape.at(u[None])[0] - exact.T)
-            assert (off <= block.shape.rest + 1e-12).all()
+            assert (off <= block.shape.remainder + 1e-12).all()
             rate = np.linalg.solve(turn, squared[b, None] * turn)
             off = np.abs(block.rate.at(u[None])[0] - rate.T)
-            assert (off <= block.rate.rest + 1e-9).all()
+            assert (off <= block.rate.remainder + 1e-9).all()
             seen_mass = middle.basis.T @ M @ middle.basis
             off = np.abs(block.norm.at(u[None])[0] - exact.T @ seen_mass @ exact)
-            assert (off <= block.norm.rest + 1e-12).all()
+            assert (off <= block.norm.remainder + 1e-12).all()
 
 
 def test_half_of_a_remainder_of_a_block_would_not_do():
@@ -99,7 +99,7 @@ def test_half_of_a_remainder_of_a_block_would_not_do():
         [*springs, ("c", plan)], {"a": 1.0, "b": 1.0, "c": 0.0}, {"q": np.ones(3)}, v0=np.ones(3)
     )
     structure, centre, radius = over(own, {"a": 1e-9, "b": 1e-9, "c": 0.45})
-    middle, used = centred(structure.mass, structure.stiffness)
+    middle, used = centred_matrices(structure.mass, structure.stiffness)
     block = subspaces(middle, used, 3).blocks[0]
     assert len(block.modes) == 2
     off = {name: np.zeros(getattr(block, name).shape) for name in ("rate", "shape")}
@@ -115,7 +115,7 @@ def test_half_of_a_remainder_of_a_block_would_not_do():
             made = np.abs(getattr(block, name).at(u[None])[0] - value)
             off[name] = np.maximum(off[name], made)
     for name, value in off.items():
-        bound = getattr(block, name).rest
+        bound = getattr(block, name).remainder
         assert (value <= bound + 1e-12).all()
         assert (value > 0.2 * bound).any()
 
@@ -145,13 +145,13 @@ def crossing_pair(width):
 
 def test_what_couples_a_block_holds_and_half_would_not_do():
     time, (own, (structure, centre, radius)) = np.linspace(0, 4, 81), crossing_pair(0.2)
-    models = Models.of(structure, ({}, time, sources(own, structure)))
-    assert len(models.single) == 2
+    models = MotionModels.from_structure(structure, ({}, time, sources(own, structure)))
+    assert len(models.oscillators) == 2
     reached = np.zeros(len(time))
     for u in draws(3, 30):
         K, _ = pencil(own, "abc", centre + radius * u)
         total = free_motion(K, 0.02, np.array([0, 1.0]), time)[:, 0]
-        for mode in models.single:
+        for mode in models.oscillators:
             omega, decay = (float(x.at(u[None])[0]) for x in (mode.omega, mode.decay))
             share = mode.share.at(u[None])[0, 0, 0]
             total = total - share * np.exp(-decay * time) * np.sin(omega * time) / omega
@@ -182,9 +182,9 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
 
     monkeypatch.setattr(rest, "_least", chosen)
     monkeypatch.setattr("alphacut.frame.dual.models.modes_wanted", lambda *_: (1, np.zeros(9)))
-    models = Models.of(structure, ({"load": RECORD}, time, ("load",)), np.ones(1))
-    (others,) = models.rests
-    assert len(models.single) == 1
+    models = MotionModels.from_structure(structure, ({"load": RECORD}, time, ("load",)), np.ones(1))
+    (others,) = models.truncated
+    assert len(models.oscillators) == 1
     ratios = np.zeros(len(time))
     for u in draws(2, 20):
         K, _ = pencil(own, "ab", centre + radius * u)
@@ -194,9 +194,9 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         wave = Oscillators(point, {"load": RECORD}, time).waves("load", 0).value[:, 0, 0]
         motion = shape[0, 1] * shape[:, 1].sum() * wave
         share, doubt = (x.at(u[None])[0, 0, 0] for x in (others.share, others.doubt))
-        width = (doubt + others.doubt.rest[0, 0]) * others.half[0, 0]
+        width = (doubt + others.doubt.remainder[0, 0]) * others.half[0, 0]
         off = np.abs(motion - share * others.middle[0, 0])
-        slack = others.share.rest[0, 0] * np.abs(others.middle[0, 0])
+        slack = others.share.remainder[0, 0] * np.abs(others.middle[0, 0])
         assert (off <= width + slack + 1e-12).all()
         ratios = np.maximum(ratios, off / np.maximum(width + slack, 1e-300))
     assert ratios[1:].max() > TIGHT
@@ -232,7 +232,7 @@ def test_unknowns_without_mass_follow_the_others():
     )
     structure, centre, radius = over(full, {"k": 0.1, "s": 0.3})
     light = structure.mass * np.diag([1.0, 1.0, 0.0])
-    middle, used = centred(light, structure.stiffness)
+    middle, used = centred_matrices(light, structure.stiffness)
     found = subspaces(middle, used, 2)
     assert middle.modes == 2
     for u in draws(2, 20):
@@ -242,10 +242,13 @@ def test_unknowns_without_mass_follow_the_others():
         shape = np.vstack([shape, -(K[2, :2] @ shape) / K[2, 2]])
         for block in found.blocks:
             k = int(block.modes[0])
-            assert abs(block.rate.at(u[None])[0, 0, 0] - squared[k]) <= block.rate.rest[0, 0] + 1e-9
+            assert (
+                abs(block.rate.at(u[None])[0, 0, 0] - squared[k])
+                <= block.rate.remainder[0, 0] + 1e-9
+            )
             seen = np.linalg.solve(middle.basis, shape[:, k])
             off = np.abs(block.shape.at(u[None])[0, 0] - seen / seen[k])
-            assert (off <= block.shape.rest[0] + 1e-12).all()
+            assert (off <= block.shape.remainder[0] + 1e-12).all()
 
 
 def test_a_structure_that_moves_rigidly_is_refused_in_one_line():
@@ -253,4 +256,4 @@ def test_a_structure_that_moves_rigidly_is_refused_in_one_line():
     own = matrices([("k", K)], {"k": 1.0}, {"q": np.array([1.0, -1])}, v0=np.array([1.0, 0]))
     structure, _, _ = over(own, {"k": 0.1})
     with pytest.raises(UnprovedError, match="improved-graph-follower"):
-        centred(structure.mass, structure.stiffness)
+        centred_matrices(structure.mass, structure.stiffness)

@@ -7,7 +7,7 @@ from alphacut.frame import Auto, StoreyFrame, envelope
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual import dual_function as kernel
 from alphacut.frame.dual.box import Box
-from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.level import OutputBounds
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
@@ -202,9 +202,9 @@ def test_any_multipliers_bound_any_motion():
     values = LinearFlow(model, list(fuzzy), 4.0, 0.5, Exact()).values(centre + radius * unit)
     for o in range(len(level.structure.order)):
         for s, side in enumerate((-1.0, 1.0)):
-            problem = Problem.of(level, o, s, 1.0)
+            problem = OutputBounds.initial(level, o, s, 1.0)
             columns, rows = problem.data.points.astype(int)
-            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.single), 1))
+            whole = np.tile([0, columns - 1, 0, rows - 1], (len(level.oscillators), 1))
             for node in range(1, len(time)):
                 size = np.abs(values[:, node, o]).max() * 10.0 ** rng.uniform(-2, 1)
                 mu = size * rng.normal(size=len(problem.data.linear))

@@ -12,7 +12,7 @@ from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.certificate import branch_and_bound
 from alphacut.frame.dual import level, proof
 from alphacut.frame.dual.dual_function import deflect, require_in_range
-from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.level import OutputBounds
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.methods.proof import Proof
 from alphacut.frame.structures.loads import Accelerogram
@@ -172,7 +172,7 @@ def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
         tops[id(problem), effort.slabs].add(effort.top)
         problem.out[1, nodes] = problem.top + 1.0
 
-    monkeypatch.setattr(Problem, "improve", improve)
+    monkeypatch.setattr(OutputBounds, "improve", improve)
     over, _, _ = level_of(*CASES["matrices"], np.arange(0, 3.01, 0.02))
     over.bounds(np.full(len(over.structure.order), 1e-6), 0.1, 2, 20, workers=1)
     assert len(tops) > 3
@@ -181,11 +181,11 @@ def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
 
 def problem_of_matrices():
     model, fuzzy = CASES["matrices"]
-    return Problem.of(level_of(model, fuzzy, np.arange(0, 1.01, 0.1))[0], 0, 1, 1e-6)
+    return OutputBounds.initial(level_of(model, fuzzy, np.arange(0, 1.01, 0.1))[0], 0, 1, 1e-6)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e101])
-@pytest.mark.parametrize("name", ["table", "linear", "rest"])
+@pytest.mark.parametrize("name", ["table", "linear", "remainder"])
 def test_models_that_are_not_finite_are_refused(name, wrong):
     data = problem_of_matrices().data
     values = getattr(data, name).copy()
@@ -211,4 +211,4 @@ def test_a_level_with_a_table_of_nan_raises():
     level, _, _ = level_of(model, fuzzy, np.arange(0, 1.01, 0.1))
     value = {order: np.full_like(x, np.nan) for order, x in level.tables.value.items()}
     with pytest.raises(UnprovedError, match="table is not finite"):
-        Problem.of(replace(level, tables=replace(level.tables, value=value)), 0, 1, 1e-6)
+        OutputBounds.initial(replace(level, tables=replace(level.tables, value=value)), 0, 1, 1e-6)

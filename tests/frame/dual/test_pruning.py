@@ -6,7 +6,7 @@ import pytest
 from alphacut.frame import envelope
 from alphacut.frame.dual import pruning
 from alphacut.frame.dual.box import Box
-from alphacut.frame.dual.level import Problem
+from alphacut.frame.dual.level import OutputBounds
 from alphacut.frame.dual.proof import DualProof
 from alphacut.frame.dual.pruning import prune_ends
 from alphacut.frame.dynamics.flow import LinearFlow
@@ -41,7 +41,9 @@ def test_models_over_a_part_bound_motions_there(box, seed):
     values, unit = motions(box, *ends, rng)
     level = box.level()
     part, own = level.within(*ends), 2 * (unit - ends[0]) / (ends[1] - ends[0]) - 1
-    for whole, narrow, grid in zip(level.single, part.single, part.tables.grids, strict=True):
+    for whole, narrow, grid in zip(
+        level.oscillators, part.oscillators, part.tables.grids, strict=True
+    ):
         assert narrow.omega.at(own) == pytest.approx(whole.omega.at(unit), rel=1e-12)
         first, last = narrow.places(grid)[:2]
         inside = (grid.omega[first] <= narrow.omega.at(own)) & (
@@ -50,7 +52,7 @@ def test_models_over_a_part_bound_motions_there(box, seed):
         assert inside.all()
         assert last - first < len(grid.omega) - 1
     for o in range(2):
-        problem = Problem.of(part, o, SIDE, 1e-9)
+        problem = OutputBounds.initial(part, o, SIDE, 1e-9)
         problem.run(np.arange(len(TIME)), 4, 20, 0.0, 0.0)
         assert (values[:, :, o].max(0) <= problem.out[0] + 1e-12).all()
 
@@ -59,7 +61,7 @@ def test_what_is_pruned_is_bounded(box, monkeypatch):
     values, _ = motions(box, -np.ones(7), np.ones(7), np.random.default_rng(0))
     most, top = values[:, :, 0].max(0), values[:, :, 0].max()
     level, above = box.level(), np.flatnonzero(most > 0.8 * top)
-    problem = Problem.of(level, 0, SIDE, 0.05 * top, top)
+    problem = OutputBounds.initial(level, 0, SIDE, 0.05 * top, top)
     problem.run(np.arange(len(TIME)), 24, 40, 1.0, 0.0)
     best = problem.at[above[problem.out[0, above].argmax()]]
     tried, over_piece = [], pruning._over_piece

@@ -12,8 +12,8 @@ from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.calculus.unproved import UnprovedError
 from alphacut.frame.dual import dual_function
 from alphacut.frame.dual.box import over_box
-from alphacut.frame.dual.clusters import centred, subspaces
-from alphacut.frame.dual.level import Level, Problem
+from alphacut.frame.dual.clusters import centred_matrices, subspaces
+from alphacut.frame.dual.level import LevelModels, OutputBounds
 from alphacut.frame.dual.rest import _inverse_form
 from alphacut.frame.dual.structure import classical
 from alphacut.frame.dual.waves import Grid, Oscillators
@@ -47,7 +47,7 @@ def test_an_expansion_is_off_by_its_rest_at_most(law, expected):
     own, u = inputs(3), points(3)
     f = law(own)
     off = np.abs(f.at(u) - expected(own.at(u).T))
-    assert off.max() <= f.rest + 1e-12
+    assert off.max() <= f.remainder + 1e-12
 
 
 def test_a_matrix_product_of_expansions_contains_the_product():
@@ -56,9 +56,9 @@ def test_a_matrix_product_of_expansions_contains_the_product():
     cube = a @ a @ (a @ a)
     values = own.at(u).reshape(-1, 2, 2)
     assert (
-        np.abs(cube.at(u) - values @ values @ values @ values).max(0) <= cube.rest * (1 + 1e-9)
+        np.abs(cube.at(u) - values @ values @ values @ values).max(0) <= cube.remainder * (1 + 1e-9)
     ).all()
-    assert cube.rest.min() > 0
+    assert cube.remainder.min() > 0
 
 
 def test_a_power_of_what_may_be_zero_is_refused():
@@ -100,7 +100,7 @@ def test_half_of_a_remainder_of_series_would_not_do():
         (-fourth, -(1.21**4)),
         (fourth.contract(np.array([-2.0])), -2 * 1.21**4),
     ):
-        assert is_tight(abs(exact - sum(part.sum() for part in made.parts)), made.rest)
+        assert is_tight(abs(exact - sum(part.sum() for part in made.parts)), made.remainder)
 
 
 def test_half_of_a_remainder_of_powers_would_not_do():
@@ -111,7 +111,7 @@ def test_half_of_a_remainder_of_powers_would_not_do():
         (own**0.5, -1.0, 0.89**0.5),
         (own**-1.0, -1.0, 1 / 0.89),
     ):
-        assert is_tight(np.abs(made.at(np.array([[u]])) - exact), made.rest)
+        assert is_tight(np.abs(made.at(np.array([[u]])) - exact), made.remainder)
 
 
 def frame(storeys=4, width=0.05, **values):
@@ -137,7 +137,7 @@ def along(own, names, centre, radius, i):
 
 def modes(structure):
     """All blocks of a structure."""
-    centre, used = centred(structure.mass, structure.stiffness)
+    centre, used = centred_matrices(structure.mass, structure.stiffness)
     return subspaces(centre, used, centre.modes)
 
 
@@ -166,9 +166,9 @@ def test_eigenpairs_stay_within_their_remainders():
     for k, block in enumerate(found.blocks):
         squared, shape = block.rate[0, 0], block.shape[0]
         off = np.abs(squared.at(u) - [x[0][k] for x in exact])
-        assert off.max() <= squared.rest
+        assert off.max() <= squared.remainder
         off = np.abs(shape.at(u) - [x[1][:, k] for x in exact])
-        assert (off.max(0) <= shape.rest + 1e-12).all()
+        assert (off.max(0) <= shape.remainder + 1e-12).all()
         values, slack = np.array([x[0][k] for x in exact]), 1e-12 * found.high[k]
         assert found.low[k] <= values.min() + slack
         assert values.max() <= found.high[k] + slack
@@ -177,19 +177,22 @@ def test_eigenpairs_stay_within_their_remainders():
 def test_half_of_a_remainder_of_eigenpairs_would_not_do():
     own, names, centre, radius, _ = frame(2, 0.1)
     first = (0, 0)
-    for i, entries in ((0, {"rate": first, "shape": (0, 1), "norm": first}), (2, {"moved": first})):
+    for i, entries in (
+        (0, {"rate": first, "shape": (0, 1), "norm": first}),
+        (2, {"mass_shape": first}),
+    ):
         found, u = modes(along(own, names, centre, radius, i)), np.array([-1.0, 1])
         ends = exact_modes(own, names, centre, radius, u[:, None] * np.eye(4)[i])
         off = {name: [] for name in entries}
         seen = found.centre.mass.at(u[:, None])
         for at, M, (squared, shapes) in zip(u, seen, ends, strict=True):
             x = shapes[:, :1].T
-            exact = {"rate": squared[None], "shape": x, "norm": x @ M @ x.T, "moved": x @ M}
+            exact = {"rate": squared[None], "shape": x, "norm": x @ M @ x.T, "mass_shape": x @ M}
             for name, entry in entries.items():
                 value = getattr(found.blocks[0], name).at(np.array([[at]]))[0]
                 off[name].append(abs(exact[name][entry] - value[entry]))
         for name, entry in entries.items():
-            assert is_tight(np.max(off[name]), getattr(found.blocks[0], name).rest[entry])
+            assert is_tight(np.max(off[name]), getattr(found.blocks[0], name).remainder[entry])
 
 
 def test_half_of_the_range_of_eigenvalues_would_not_do():
@@ -229,7 +232,7 @@ def test_modes_that_cross_are_one_block_and_go_on_through_the_crossing():
 def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
     springs, time, parts = masses_on_springs(0.03), np.arange(0, 44.01, 0.25), 4
     both = springs.start.loosened(np.array([[0.0] * 3, [0.1, 0.1, 0.0]]))
-    level = Level.of(replace(springs, start=both), {}, time, ("velocity",))
+    level = LevelModels.from_structure(replace(springs, start=both), {}, time, ("velocity",))
     outer, _ = level.bounds(np.full(1, 1e-6), 0.1, 40, 100, 1)
     omega = np.sqrt(np.array([1.0, 1, 3])[:, None] * np.linspace(0.969, 1.031, 201))
     fine = np.arange(len(time) * parts - parts + 1) * 0.25 / parts
@@ -240,7 +243,7 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
         off = (most - side * middle)[parts::parts]
         assert is_tight(off, outer[1:, 0, column] - side * middle[parts::parts])
     off = np.abs(middle - np.interp(fine, time, middle[::parts]))[1:].reshape(-1, parts).max(1)
-    stray = level.stray()[1:, 0]
+    stray = level.line_deviation()[1:, 0]
     assert (off <= stray).all()
     assert (off > TIGHT * stray).any()
 
@@ -248,7 +251,9 @@ def test_half_of_what_springs_and_start_are_loosened_by_would_not_do():
 def test_half_of_the_cubic_part_would_not_do():
     own, names, centre, radius, _ = frame(1, 0.1)
     structure = along(own, names, centre, radius, 1)
-    data = Problem.of(Level.of(structure, {}, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0).data
+    data = OutputBounds.initial(
+        LevelModels.from_structure(structure, {}, np.array([0.0, 0.1]), ("velocity",)), 0, 1, 1.0
+    ).data
     whole, mu, u = np.array([[0, 0, 0, 0]]), np.array([1.0, 0, 0]), np.empty(1)
     bound = dual_function.dual(mu, whole, 1, 1.0, data, np.empty(3), u) + data.omega[0, 0]
     bound += dual_function.remainder_bound(mu, data)
@@ -305,8 +310,8 @@ def test_responses_are_those_of_a_fine_march_and_stray_as_stated():
             assert np.allclose(fine[::parts], wide.value, atol=1e-12 * np.abs(fine).max())
             line = np.array([np.interp(time, coarse, x) for x in wide.value.reshape(120, -1).T]).T
             off = np.abs(fine.reshape(len(time), -1) - line)[1:].reshape(119, -1).max(1)
-            assert (off <= wide.stray[1:] + 1e-13).all()
-            assert (off > TIGHT * wide.stray[1:]).any()
+            assert (off <= wide.line_deviation[1:] + 1e-13).all()
+            assert (off > TIGHT * wide.line_deviation[1:]).any()
 
 
 @pytest.mark.parametrize("order", [3, 4])
@@ -332,5 +337,5 @@ def test_forms_of_inverses_stay_within_their_rests(order):
     for u in rng.uniform(-1, 1, (300, d)):
         (a,), (x,), (y,) = (model.at(u[None]) for model in (A, left, right))
         off = np.abs(x @ np.linalg.inv(a) @ y.T - found.at(u[None])[0])
-        shares.append((off / found.rest).max())
+        shares.append((off / found.remainder).max())
     assert 3e-3 <= max(shares) <= 1

@@ -12,7 +12,7 @@ import pytest
 from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.dual.blocks import (
-    Centre,
+    CentredMatrices,
     _rounded,
     _rounding,
     _turned,
@@ -58,7 +58,7 @@ def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
     frame, box, rng = drawn(1, stiff, RECORD)
     radius = 1e-9 * box.centre
     narrow = Box(frame, box.names, box.time, box.centre - radius, box.centre + radius)
-    single = narrow.level().single
+    single = narrow.level().oscillators
     assert len(single) == 3
     ends = [
         (mp.mpf(float(a)), mp.mpf(float(b))) for a, b in zip(narrow.low, narrow.high, strict=True)
@@ -72,7 +72,7 @@ def test_modes_over_a_narrow_box_are_off_by_their_rounding_at_most(stiff):
             for mode, w, c in zip(single, omega, share, strict=True):
                 for name, model, true in (("omega", mode.omega, w), ("share", mode.share[0, 0], c)):
                     off = abs(exact_value(model, unit) - true)
-                    shares[name].append(float(off) / float(model.rest))
+                    shares[name].append(float(off) / float(model.remainder))
     for values in shares.values():
         assert IDLE <= np.max(values) <= 1
 
@@ -105,7 +105,7 @@ def test_rests_of_arithmetic_are_rounding_and_no_hundred_times_more():
         p, numbers = exact_inputs(rng), rng.normal(size=(3, 2))
         square, column = rng.normal(size=(2, 2)) + 4 * np.eye(2), rng.normal(size=2)
         low, high = np.sort(rng.uniform(-1, 1, (2, 3)), axis=0)
-        p = TaylorModel((p.parts[0], 1e-7 * p.parts[1]), p.rest, 3)
+        p = TaylorModel((p.parts[0], 1e-7 * p.parts[1]), p.remainder, 3)
         product = p[0] * p[1]
         both = TaylorModel(product.parts, np.zeros(()), 3)
         made = {
@@ -126,12 +126,12 @@ def test_rests_of_arithmetic_are_rounding_and_no_hundred_times_more():
             made["part"], exact["part"] = both.within(low, high), exact_value(both, moved)
             for name, model in made.items():
                 off = float(abs(exact_value(model, u) - exact[name]))
-                shares.setdefault(name, []).append(off / float(model.rest))
+                shares.setdefault(name, []).append(off / float(model.remainder))
     assert all(IDLE <= np.max(values) <= 1 for values in shares.values())
 
 
 def pencil(rng):
-    """M and K of three unknowns and one input, diagonal in the middle, as a `Centre`."""
+    """M and K of three unknowns and one input, diagonal in the middle, as a `CentredMatrices`."""
     slopes = 0.05 * rng.normal(size=(2, 3, 3))
     slopes = slopes + slopes.swapaxes(1, 2)
     middle = np.eye(3), np.diag([1.0, 3.0, 7.0])
@@ -139,7 +139,7 @@ def pencil(rng):
         TaylorModel((x[None], slope[None]), np.zeros((3, 3)), 1)
         for x, slope in zip(middle, slopes, strict=True)
     )
-    return Centre(*models, np.eye(3), 3)
+    return CentredMatrices(*models, np.eye(3), 3)
 
 
 def matmul_exact(*matrices):
@@ -183,8 +183,8 @@ def test_series_leave_a_residual_of_rounding_in_the_degrees_they_keep(block):
 def test_what_is_put_onto_a_diagonal_is_put_into_the_rest():
     matrix = TaylorModel.constant([[2.0, 1e-9], [-1e-9, 3.0]], 1)
     found = _diagonal(matrix, np.array([2.0, 3.5]))
-    assert (np.abs(found.value - matrix.value) <= found.rest).all()
-    assert found.rest == pytest.approx(np.array([[0, 1e-9], [1e-9, 0.5]]))
+    assert (np.abs(found.value - matrix.value) <= found.remainder).all()
+    assert found.remainder == pytest.approx(np.array([[0, 1e-9], [1e-9, 0.5]]))
 
 
 def test_gamma_is_that_of_the_worst_sum():
