@@ -43,7 +43,7 @@ class Modal:
     Args:
         squared: λ, shape (S, n), rising, in 1/s².
         sigma: Exponents −g + iω, shape (S, n), in 1/s.
-        turn: Bound of |dσ/dλ|, the same shape.
+        sigma_slope: Bound of |dσ/dλ|, the same shape.
         is_alike: Whether all modes of a point have one ratio of damping, shape (S,).
         shape: Displacements of the modes, of unit mass, shape (S, n, n).
         share: c of each source, by its name, shape (S, n).
@@ -57,7 +57,7 @@ class Modal:
 
     squared: Array
     sigma: Array
-    turn: Array
+    sigma_slope: Array
     is_alike: Mask
     shape: Array
     share: dict[str, Array]
@@ -168,9 +168,15 @@ class AttainedWaves:
 def _wave(
     source: str, sigma: Array, turn: Array, order: Rows, rho: tuple[Array, ...], most: Array
 ) -> AttainedWaves:
-    """Responses of derivative `order` (N,) from ρ, ρ′ and the rounding of ρ, each (N, n).
+    """Responses e of all modes to one source, with bounds of their rounding and slopes.
 
-    `most` holds bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).
+    Args:
+        source: load, velocity, start or the name of a force.
+        sigma: Exponents σ of the modes, shape (N, n), in 1/s.
+        turn: Bound of |dσ/dλ|, shape (N, n).
+        order: Derivative of the motion that is read, shape (N,).
+        rho: ρ(σ; t), its derivative by σ, and the rounding of ρ, each (N, n).
+        most: Bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).
     """
     value, slope, error = rho
     omega, order, size = sigma.imag, order[:, None], np.abs(sigma)
@@ -214,7 +220,7 @@ def outputs_at(
         time: Node of each value, shape (N,), in s.
         loads: The loads by name.
     """
-    sigma, turn, t = modal.sigma[point], modal.turn[point], time[:, None]
+    sigma, turn, t = modal.sigma[point], modal.sigma_slope[point], time[:, None]
     free = np.exp(sigma * t)
     of_free = free, t * free, (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(free)
     most = {"velocity": np.stack([np.ones_like(time), time])}
@@ -245,7 +251,15 @@ def _error(
     share: tuple[Array, Array],
     wave: AttainedWaves,
 ) -> Array:
-    """Bound of the rounding of Σ r c e, shape (N,)."""
+    """Bound of the rounding of Σ_k r_k c_k e_k over the modes k, shape (N,).
+
+    Args:
+        modal: Modes at all points.
+        point: Point of each value, shape (N,).
+        read: Output coefficients r and their rounding, each (N, n).
+        share: Participations c in the source and their rounding, each (N, n).
+        wave: Responses e.
+    """
     (r, r_error), (c, c_error) = (tuple(np.abs(x) for x in pair) for pair in (read, share))
     e, n = np.abs(wave.value), wave.value.shape[-1]
     error = (r * c * wave.error + (r_error * c + r * c_error) * e).sum(-1)

@@ -74,7 +74,7 @@ class Block:
         return float(max(rate.max(), norm.max()))
 
     def cut(self, order: int) -> Block:
-        """The same to a lower order."""
+        """Block with its Taylor models cut to a lower order."""
         parts = (x.cut(order) for x in (self.rate, self.shape, self.mass_shape, self.norm))
         return Block(self.modes, *parts)
 
@@ -364,7 +364,10 @@ class _Unknowns:
         return None
 
     def _images(self, systems: list[Comparison], Y: Array, E: Array) -> tuple[Array, Array]:
-        """Bounds of Z and D that the equations give for those; products of both count twice."""
+        """Bounds of |Z|, (p, n), and |D|, (p, p), by the module's equations from |Z| ≤ Y, |D| ≤ E.
+
+        Products of Z and D count twice, so that the map contracts.
+        """
         o, F = self.others, self.coupling
         right = self.missed + E @ self.side + (F + 2 * E) @ Y @ self.heavy
         new_Y = np.zeros_like(Y)

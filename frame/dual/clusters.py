@@ -163,7 +163,17 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
 def _from_below(
     centre: CentredMatrices, slopes: Array, wanted: int, doubts: Array
 ) -> tuple[list[Block], tuple[int, int] | None]:
-    """Blocks of the lowest modes; modes that are nearest one another where it ends before."""
+    """Enclosed blocks of the lowest modes, up to the first that cannot be enclosed.
+
+    Args:
+        centre: M and K in the coordinates of the box's middle.
+        slopes: ∂λ_j/∂u_i in the middle, shape (modes, d).
+        wanted: Number of modes to enclose.
+        doubts: Relative error of each mode's λ that suffices, shape (modes,).
+
+    Returns:
+        The blocks, and the closest pair of modes at which it ended early; None if it did not.
+    """
     near, blocks = _nearness(centre, slopes), list[Block]()
     free: Rows = np.arange(centre.modes)
     while len(free) and free[0] < wanted:
@@ -185,7 +195,13 @@ def _from_below(
 
 
 def _component(linked: Mask, modes: Rows, free: Rows) -> Rows:
-    """All free modes that are linked to some, by others or directly."""
+    """Numbers of the free modes linked to `modes`, directly or through others, rising.
+
+    Args:
+        linked: Which pairs are linked, shape (modes, modes).
+        modes: Numbers to begin with.
+        free: Numbers of the modes that are in no block.
+    """
     while True:
         more = np.union1d(modes, np.intersect1d(free, np.flatnonzero(linked[modes].any(0))))
         if len(more) == len(modes):

@@ -158,7 +158,13 @@ def oscillators(structure: Classical, of_block: BlockShares, found: Subspaces) -
 
 
 def _in_all(model: TaylorModel, structure: Classical, used: Rows) -> TaylorModel:
-    """A model of third order in all inputs."""
+    """Model cut to the structure's order, as a function of all its inputs.
+
+    Args:
+        model: Functions of the inputs at `used`, or of all.
+        structure: The structure.
+        used: Inputs that mass and stiffness depend on.
+    """
     d = structure.start.inputs
     model = model.cut(structure.start.order)
     return model if model.inputs == d else model.among(used, d)
@@ -167,7 +173,15 @@ def _in_all(model: TaylorModel, structure: Classical, used: Rows) -> TaylorModel
 def _oscillator(
     structure: Classical, squared: TaylorModel, ratio: TaylorModel, share: TaylorModel, ends: Ends
 ) -> Oscillator:
-    """The oscillator of one λ, which lies between two ends."""
+    """Oscillator of one mode.
+
+    Args:
+        structure: The structure, with its Rayleigh factors.
+        squared: λ, V = (), in 1/s².
+        ratio: Damping ratio ζ, V = ().
+        share: Amplitudes c, V = (sources, m).
+        ends: Proved least and greatest λ.
+    """
     root = squared**0.5
     a, b = structure.rayleigh[0], structure.rayleigh[1]
     decay = a * 0.5 + b * squared * 0.5 + ratio * root
@@ -180,7 +194,7 @@ def _oscillator(
 
 
 def damped_range(structure: Classical, low: float, high: float, modes: Rows) -> tuple[Ends, Ends]:
-    """Ranges of ω and g/ω of modes whose λ lie between two ends.
+    """Ranges of ω and g/ω of modes whose λ lie in [low, high].
 
     Raises:
         UnprovedError: One may not oscillate.

@@ -72,7 +72,13 @@ class ResponseTables:
 def response_tables(
     single: Sequence[Oscillator], excitation: Excitation, orders: Rows
 ) -> ResponseTables:
-    """Tables of all oscillators; `orders` are those of all outputs."""
+    """Tables of the responses of all oscillators, with their errors.
+
+    Args:
+        single: The oscillators.
+        excitation: The loads, the nodes and the names of the sources.
+        orders: Derivative of the motion that each output takes, shape (m,).
+    """
     loads, time, sources = excitation
     points, different = _points(single, float(time[-1])), sorted(map(int, set(orders)))
     grids = [spanned(mode.omega_range, mode.quotient_range, points) for mode in single]
@@ -103,7 +109,7 @@ def _responses(
 
 
 def _points(single: Sequence[Oscillator], duration: float) -> tuple[int, int]:
-    """Points of the modes' tables, all as many as the most demanding one needs."""
+    """Number of table points along ω and along g/ω, the same for all modes."""
     most, slow = [2.0, 2.0], 2 / duration if duration > 0 else np.inf
     for mode in single:
         (low, high), (least, top) = mode.omega_range, mode.quotient_range
@@ -134,7 +140,7 @@ class LevelModels:
         return self.models.oscillators
 
     def within(self, low: Array, high: Array) -> LevelModels:
-        """The same models over a part of the box, low ≤ u ≤ high."""
+        """Models over the part low ≤ u ≤ high of the box, with the same response tables."""
         return replace(self, models=self.models.within(low, high))
 
     @classmethod
@@ -146,7 +152,15 @@ class LevelModels:
         sources: tuple[str, ...],
         allowed: Array | None = None,
     ) -> LevelModels:
-        """The level of a structure over its box; `allowed` as of `MotionModels.from_structure`.
+        """Models of a structure's motion over its box, and the response tables of its oscillators.
+
+        Args:
+            structure: The structure.
+            loads: Histories by name.
+            time: Nodes, shape (T,), in s.
+            sources: Names of what moves the structure.
+            allowed: Doubt of each output that modes may leave which are not enclosed, shape (m,);
+                None to enclose as many modes as possible.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
@@ -197,14 +211,17 @@ class LevelModels:
             (AT_PEAKS * slabs, steps, 1.0, FLOORS[1]),
         )
         with ThreadPoolExecutor(workers) as pool:
-            for number, (slabs, steps, loose, floor) in enumerate(passes):
+            for number, (slabs, steps, slack_below_peak, remainder_multiple) in enumerate(passes):
                 # what a pass compares with is fixed before its first block: no result depends on
                 # which thread ends first
-                efforts = [problem.effort(slabs, steps, loose, floor) for problem in problems]
+                efforts = [
+                    problem.effort(slabs, steps, slack_below_peak, remainder_multiple)
+                    for problem in problems
+                ]
                 jobs = [
                     pool.submit(problem.improve, nodes, effort)
                     for problem, effort in zip(problems, efforts, strict=True)
-                    for nodes in _blocks(problem.left(loose))
+                    for nodes in _blocks(problem.open_nodes(slack_below_peak))
                 ]
                 advance = subprogress(tick, *WORK_OF_PASSES[number : number + 2])
                 for done, job in enumerate(jobs, start=1):
@@ -236,7 +253,7 @@ class OutputBounds:
 
     Args:
         side: −1 or 1.
-        enough: Gap at which a bound is left.
+        wanted_gap: Distance of bound and attained value that suffices.
         constant: What the motion has besides the model, and what a bound has besides, (2, T).
         data: Models and tables of the output.
         out: Bounds and the model's values, shape (2, T).
@@ -245,7 +262,7 @@ class OutputBounds:
     """
 
     side: float
-    enough: float
+    wanted_gap: float
     constant: Array
     data: Data
     out: Array
@@ -256,7 +273,15 @@ class OutputBounds:
     def initial(
         cls, level: LevelModels, o: int, s: int, enough: float, attained: float = 0.0
     ) -> OutputBounds:
-        """Bounds of one output of a level, on one side."""
+        """Infinite bounds of output o, negated where s = 0, to be improved by `run`.
+
+        Args:
+            level: Models and response tables over the box.
+            o: Output.
+            s: 0 for bounds of −output, 1 for bounds of the output.
+            enough: Distance of bound and attained value that suffices.
+            attained: Value of side × output that is known to be attained.
+        """
         side, total = (-1.0, 1.0)[s], len(level.tables.time)
         group, constant = _group(level, o, side)
         variables = _variables(level, o)
@@ -268,25 +293,39 @@ class OutputBounds:
         return cls(side, enough, constant, data, out, at, attained)
 
     @property
-    def top(self) -> float:
-        """The largest value so far."""
+    def incumbent(self) -> float:
+        """The largest attained value of side × output so far."""
         return float(max(self.out[1].max(), self.attained))
 
-    def left(self, loose: float) -> Rows:
-        """Nodes whose gap is too wide."""
-        allowed = self.enough + loose * np.maximum(self.top - self.out[1], 0.0)
+    def open_nodes(self, slack_below_peak: float) -> Rows:
+        """Nodes (J,) at which the bound exceeds the model's value by more than suffices.
+
+        `slack_below_peak` is as of `Effort`.
+        """
+        allowed = self.wanted_gap + slack_below_peak * np.maximum(self.incumbent - self.out[1], 0.0)
         return np.flatnonzero(self.out[0] - self.out[1] > allowed)
 
-    def run(self, nodes: Rows, slabs: int, steps: int, loose: float, floor: float) -> None:
-        """Improve the bounds at nodes, with an effort compared with the values so far."""
-        self.improve(nodes, self.effort(slabs, steps, loose, floor))
+    def run(
+        self,
+        nodes: Rows,
+        slabs: int,
+        steps: int,
+        slack_below_peak: float,
+        remainder_multiple: float,
+    ) -> None:
+        """Improve bounds and model values at nodes (J,); other arguments as of `Effort`."""
+        self.improve(nodes, self.effort(slabs, steps, slack_below_peak, remainder_multiple))
 
-    def effort(self, slabs: int, steps: int, loose: float, floor: float) -> Effort:
-        """An effort that is compared with the largest value so far."""
-        return Effort(slabs, steps, self.enough, self.top, loose, floor)
+    def effort(
+        self, slabs: int, steps: int, slack_below_peak: float, remainder_multiple: float
+    ) -> Effort:
+        """Effort for each node, compared with the largest attained value so far; see `Effort`."""
+        return Effort(
+            slabs, steps, self.wanted_gap, self.incumbent, slack_below_peak, remainder_multiple
+        )
 
     def improve(self, nodes: Rows, effort: Effort) -> None:
-        """Improve the bounds at nodes; those of other nodes are not read."""
+        """Improve bounds and model values at nodes (J,); those of other nodes are not read."""
         out, at = np.empty((2, len(nodes))), np.empty((len(nodes), self.at.shape[1]))
         bounds(nodes, self.side, effort, self.constant, self.data, out, at)
         better = out[1] > self.out[1, nodes]
@@ -296,7 +335,7 @@ class OutputBounds:
 
 
 def _variables(level: LevelModels, o: int) -> TaylorModel:
-    """ω, g and the shares of each mode, in this order, V = (Z,)."""
+    """Taylor models of ω, g and the amplitudes of each mode, in this order, V = (Z,)."""
     models = ((mode.omega[None], mode.decay[None], mode.share[:, o]) for mode in level.oscillators)
     return concatenate([x for of_mode in models for x in of_mode], -1)
 
@@ -353,7 +392,7 @@ def _group(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]
 
 
 def _grain(level: LevelModels, o: int) -> Array:
-    """Distance of multipliers as a share of the modes' largest responses in sum, shape (1,)."""
+    """Spacing of multiplier values: `GRAIN` times Σ_k |c_k| max |e_k|, or 1 where it is 0, (1,)."""
     responses = np.abs(level.tables.value[int(level.structure.order[o])]).max((2, 3))
     size = sum(
         float(np.abs(mode.share.value[:, o]) @ response)
@@ -363,6 +402,7 @@ def _grain(level: LevelModels, o: int) -> Array:
 
 
 def _radii(x: TaylorModel) -> Array:
+    """Half ranges by which variables are scaled, positive, shape V."""
     return np.asarray(np.maximum(np.maximum(x.spread(), 1e-9 * np.abs(x.value)), LEAST_SPREAD))
 
 

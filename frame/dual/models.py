@@ -94,7 +94,15 @@ class MotionModels:
         excitation: Excitation,
         allowed: Array | None,
     ) -> MotionModels:
-        """With a block as oscillators, or known by its sums where that is narrower."""
+        """Models with a block added, as oscillators or, where that bounds it better, by its sums.
+
+        Args:
+            structure: The structure.
+            of_block: What the block takes from the sources and gives to the outputs.
+            found: All enclosed blocks.
+            excitation: The loads, the nodes and the names of the sources.
+            allowed: Allowed doubt of each output, shape (m,); None for the size of the coupling.
+        """
         more = oscillators(structure, of_block, found)
         if len(more) == 1:
             return replace(self, oscillators=self.oscillators + more)

@@ -171,7 +171,7 @@ class _Bounding:
     def __init__(self, proof: DualProof, flow: LinearFlow, box: Box, goal: Goal, k: int) -> None:
         self.proof, self.flow, self.box, self.goal = proof, flow, box, goal
         self.needed, self.outer = goal.needed[k], goal.outer[k].copy()
-        self.top = goal.incumbent[k].copy()
+        self.incumbent = goal.incumbent[k].copy()
         self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
         gap = proof.gap if self.needed.all() else proof.peaks
         self.outputs: Rows = np.flatnonzero(self.needed.any((0, 2)))
@@ -182,7 +182,7 @@ class _Bounding:
         self.shares = np.zeros((*self.outer.shape[1:], d))
 
     def bounds(self) -> PartBounds:
-        """Bounds of what is asked for, and what may hold a higher peak."""
+        """Bounds that are asked for, with the ends of the part that may hold a higher peak."""
         if self.needed.all():
             self._require_narrow()
             effort = self.proof.below, self.proof.slabs, self.proof.steps, self.goal.workers
@@ -197,14 +197,14 @@ class _Bounding:
         inner[self.needed] = np.where(side, value, -value) - error
         attained_error = np.zeros(self.outer.shape[:2])
         np.maximum.at(attained_error, (node, output), 2 * error)
-        self.top = np.maximum(self.top, inner.max(0))
+        self.incumbent = np.maximum(self.incumbent, inner.max(0))
         n, active = len(self.box.low), self.box.active
-        self.remaining = np.empty((2, *self.top.shape, n))
+        self.remaining = np.empty((2, *self.incumbent.shape, n))
         self.remaining[:] = np.stack([self.box.low, self.box.high])[:, None, None]
         self.pruned = np.full(self.outer.shape, -np.inf)
         self._at_peaks(self._prune)
         least = self._least_peaks() if self.needed.all() else None
-        shares = np.zeros((*self.top.shape, n))
+        shares = np.zeros((*self.incumbent.shape, n))
         shares[..., active] = self.shares
         between = np.zeros(self.outer.shape[:2])
         between[self.nodes] = self.level.line_deviation() if self.needed.all() else 0.0
@@ -223,7 +223,7 @@ class _Bounding:
 
     def _least_peaks(self) -> Ends:
         """Proved lower bound of each output's smallest peak, and a small one that is reached."""
-        outputs = range(len(self.top))
+        outputs = range(len(self.incumbent))
         with ThreadPoolExecutor(self.goal.workers) as pool:
             bounds, units = zip(*pool.map(partial(least_peak, self.level), outputs), strict=True)
         return Ends(np.array(bounds), self._small_peaks(np.stack(units)))
@@ -243,13 +243,13 @@ class _Bounding:
         return np.asarray(peaks.min(0))
 
     def _require_narrow(self) -> None:
-        """Refuse a part whose remainders are worth more than `WIDE` of a peak, if bisections help.
+        """Refuse a part whose Taylor remainders exceed `WIDE` of a peak, if bisections help.
 
         Raises:
             UnprovedError: They are.
         """
-        for o, s in np.ndindex(self.top.shape) if not self.goal.last else ():
-            problem = self._problem_of(o, s, 0.0, 0.0)
+        for o, s in np.ndindex(self.incumbent.shape) if not self.goal.last else ():
+            problem = self._initial_bounds(o, s, 0.0, 0.0)
             problem.run(np.arange(len(self.nodes)), 1, 1, 0.0, 0.0)
             node, shares = int(problem.out[1].argmax()), np.zeros(len(self.box.low))
             least, shares[self.box.active] = remainder(problem, node)
@@ -258,38 +258,38 @@ class _Bounding:
                 raise UnprovedError(what, "take narrower inputs", int(shares.argmax()))
 
     def _at_peaks(self, improve: Callable[[int, int], None]) -> None:
-        """Do something for all outputs and sides with bounds above what suffices."""
+        """Call `improve(output, side)` for each pair with a bound above what suffices."""
         enough = self.proof.peaks * self.goal.peak[:, None]
-        above = self.needed & (self.outer > self.top + enough)
+        above = self.needed & (self.outer > self.incumbent + enough)
         with ThreadPoolExecutor(self.goal.workers) as pool:
             for job in [pool.submit(improve, *peak) for peak in np.argwhere(above.any(0))]:
                 job.result()
 
-    def _problem(self, o: int, s: int) -> tuple[OutputBounds, Rows]:
-        """Bounds of one output and side, and the places of those that are above what suffices."""
-        enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.top[o, s])
-        problem = self._problem_of(o, s, enough, top)
+    def _open_bounds(self, o: int, s: int) -> tuple[OutputBounds, Rows]:
+        """Bounds of output o on side s so far, and places of nodes where they do not suffice."""
+        enough, top = self.proof.peaks * float(self.goal.peak[o]), float(self.incumbent[o, s])
+        problem = self._initial_bounds(o, s, enough, top)
         bounds = self.outer[self.nodes, o, s]
         problem.out[0] = bounds
         above = self.needed[self.nodes, o, s] & (bounds > top + enough)
         return problem, np.flatnonzero(above)
 
-    def _problem_of(self, o: int, s: int, enough: float, top: float) -> OutputBounds:
-        """Bounds of one output and side; see `OutputBounds.initial`."""
+    def _initial_bounds(self, o: int, s: int, enough: float, top: float) -> OutputBounds:
+        """Infinite bounds of output o on side s (0 for −output, 1 for the output)."""
         return OutputBounds.initial(
             self.level, int(np.searchsorted(self.outputs, o)), s, enough, top
         )
 
     def _bound(self, o: int, s: int) -> None:
-        """Bound an output at nodes where it may pass its peak."""
-        problem, above = self._problem(o, s)
+        """Improve the bounds of output o on side s at the nodes where they exceed its peak."""
+        problem, above = self._open_bounds(o, s)
         problem.run(above, PEAK_SLABS, PEAK_STEPS, 1.0, 0.0)
         nodes = self.nodes[above]
         self.outer[nodes, o, s], self.unit[nodes, o, s] = problem.out[0, above], problem.at[above]
 
     def _prune(self, o: int, s: int) -> None:
-        """Prune the ends of the part that hold no higher peak of an output."""
-        problem, above = self._problem(o, s)
+        """Prune the ends of the part that hold no higher peak of output o on side s."""
+        problem, above = self._open_bounds(o, s)
         nodes = self.nodes[above]
         problem.at[above] = self.unit[nodes, o, s]
         worst = int(above[problem.out[0, above].argmax()])

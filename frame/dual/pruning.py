@@ -51,7 +51,7 @@ def prune_ends(
                 piece = low.copy(), high.copy()
                 piece[1 - away][i] = end = (1 - 2 * share) * (1 if away else -1)
                 bounds = _over_piece(level, problem, bound_index, above, piece, slabs)
-                if bounds.max() > problem.attained + problem.enough:
+                if bounds.max() > problem.attained + problem.wanted_gap:
                     break
                 pruned = np.maximum(pruned, bounds)
                 (high if away else low)[i] = end
@@ -66,20 +66,34 @@ def _over_piece(
     piece: tuple[Array, Array],
     slabs: int,
 ) -> Array:
-    """Bounds over a piece of the box at nodes (J,), until one lies above the peak."""
+    """Upper bounds over a piece of the box at the nodes `above`, shape (J,).
+
+    The largest come first; where one stays above the peak the others are left as they were.
+
+    Args:
+        level: Models over the box.
+        problem: Bounds over the box.
+        bound_index: Output and side.
+        above: Places of the nodes, shape (J,).
+        piece: Lower and upper ends of the piece in unit coordinates, (d,) each.
+        slabs: Most slabs of a bound.
+    """
     inside = OutputBounds.initial(
-        level.within(*piece), *bound_index, problem.enough, problem.attained
+        level.within(*piece), *bound_index, problem.wanted_gap, problem.attained
     )
     inside.out[0] = problem.out[0]
     for node in above[np.argsort(-problem.out[0, above])]:
         inside.run(np.array([node]), slabs, STEPS, 1.0, 0.0)
-        if inside.out[0, node] > problem.attained + problem.enough:
+        if inside.out[0, node] > problem.attained + problem.wanted_gap:
             break
     return np.asarray(inside.out[0, above])
 
 
 def remainder(problem: OutputBounds, node: int) -> tuple[float, Array]:
-    """What remainders add to a bound at a node at least, and the share of each input in it, (d,).
+    """What the Taylor remainders add to a bound at a node at least, and the inputs' shares in it.
+
+    Returns:
+        The least addition, in the output's unit, and fractions of the inputs, shape (d,).
 
     At the maximum the multipliers are the slopes of the motion by the intervening variables.
     Remainders are of fourth degree: they are shared out by the squares of what the first and second

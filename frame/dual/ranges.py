@@ -101,7 +101,16 @@ class _Piece:
                 self.table = Oscillators(grid, loads, time)
 
     def bounds(self, source: str, order: int) -> Iterator[tuple[Array, Array, Array]]:
-        """Lower and upper bounds of λ^κ e, and of how far it strays, (T,) each, for all κ."""
+        """Yield, for each κ in `POWERS`, bounds of λ^κ e at nodes.
+
+        Args:
+            source: Name of a load or force, "velocity" or "start".
+            order: Derivative of the motion that is read.
+
+        Yields:
+            Lower and upper bounds, and the largest distance from a straight line in the step to
+            each node, (T,) each.
+        """
         size, between = self._sizes(source, order)
         fast = self.omega[1] * np.sqrt(1 + self.quotient[1] ** 2)
         for power in POWERS:

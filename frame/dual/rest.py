@@ -74,7 +74,7 @@ class _Sums:
     sources: tuple[TaylorModel, TaylorModel]
 
     def less(self, subtracted: _Sums) -> _Sums:
-        """What another's leave."""
+        """Sums less those of `subtracted`, term by term."""
         return _Sums(
             (self.shares[0] - subtracted.shares[0], self.shares[1] - subtracted.shares[1]),
             (self.outputs[0] - subtracted.outputs[0], self.outputs[1] - subtracted.outputs[1]),
@@ -127,7 +127,7 @@ def _known_by(
     found: Subspaces,
     excitation: Excitation,
 ) -> TruncatedModes:
-    """Modes of which sums and the ranges of ω and g/ω are known."""
+    """Truncated modes from their sums and from the ranges `ends` of ω and g/ω."""
     orders = sorted({int(order) for order in structure.order})
     (omega, quotient), (ground, time, sources) = ends, excitation
     ranges = response_ranges(omega, quotient, ground, time, sources, orders)
@@ -264,7 +264,13 @@ def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
 def _least(
     structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
 ) -> TruncatedModes:
-    """The bound of each source and output whose doubt is least at its largest."""
+    """Truncated modes, for each source and output by the power of λ that bounds them best.
+
+    Args:
+        structure: The structure.
+        bounds: C and the bound of √(A B) for each power, V = (sources, m).
+        ranges: Ranges of the responses by order of the derivative that is read.
+    """
     of_outputs = [ranges[int(order)] for order in structure.order]
     low, high, deviation = (  # (powers, sources, m, T)
         np.stack(arrays, 2)

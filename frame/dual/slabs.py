@@ -30,19 +30,20 @@ class Effort(NamedTuple):
     Args:
         slabs: Most slabs.
         steps: Most evaluations of the dual function for a slab.
-        enough: Gap at which a bound is left.
-        top: The output's peak.
-        loose: Gap that suffices below the peak, as a share of how far; at 1 only bounds above the
-            peak count.
-        floor: Multiple of the remainders' own part of a bound below which no effort is made.
+        wanted_gap: Distance of bound and attained value that suffices.
+        incumbent: The largest attained value of side × output over time.
+        slack_below_peak: Addition to the wanted gap of a node below the peak, as a share of its
+            distance from the peak; at 1 only bounds above the peak count.
+        remainder_multiple: Least gap worth any effort, as a multiple of what the remainders of the
+            Taylor models add to the bound.
     """
 
     slabs: int
     steps: int
-    enough: float
-    top: float
-    loose: float
-    floor: float
+    wanted_gap: float
+    incumbent: float
+    slack_below_peak: float
+    remainder_multiple: float
 
 
 class Slabs(NamedTuple):
@@ -63,7 +64,7 @@ class Slabs(NamedTuple):
 
 @loops
 def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> float:
-    """The output's model at inputs u, side × its value, and its gradient."""
+    """Side × the output's model at inputs u, without its constants; `gradient` (L,) is written."""
     bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
     products(u, bilinear)
     total = sensitivities(u, node, side, data, weight)
@@ -88,7 +89,10 @@ def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> floa
 
 @loops
 def sensitivities(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
-    """The modes' part of the model at inputs u; `weight` takes its slopes by all variables (Z,)."""
+    """Sum of the modes' responses, side × output, in the model at inputs u.
+
+    `weight` (Z,) is written: the sum's derivatives by all scaled intervening variables.
+    """
     bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
     products(u, bilinear)
     for a in range(len(z)):
@@ -96,13 +100,22 @@ def sensitivities(u: Array, node: int, side: float, data: Data, weight: Array) -
     weight[:] = 0.0
     total = 0.0
     for k in range(len(data.share)):
-        total += of_mode(z, k, node, side, data, weight)
+        total += mode_response(z, k, node, side, data, weight)
     return total
 
 
 @loops
-def of_mode(z: Array, k: int, node: int, side: float, data: Data, weight: Array) -> float:
-    """One mode's part of the model at scaled variables z; `weight` takes its derivatives."""
+def mode_response(z: Array, k: int, node: int, side: float, data: Data, weight: Array) -> float:
+    """Response of mode k, side × output, by bilinear interpolation in its table.
+
+    Args:
+        z: Scaled intervening variables of all modes, shape (Z,): ω, g, amplitudes of each.
+        k: Mode.
+        node: Node.
+        side: +1 or −1.
+        data: Models and tables of the output.
+        weight: Written in the mode's entries: derivatives by z, shape (Z,).
+    """
     width, sources = int(data.points[0]), data.share.shape[1]
     first = k * (2 + sources)
     w = data.centre[k, 0] + data.radius[k, 0] * z[first]
@@ -154,7 +167,19 @@ def ascend(u: Array, node: int, side: float, data: Data) -> float:
 
 @loops
 def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Array) -> float:
-    """Improve u by projected gradient steps of Barzilai's and Borwein's length; its value."""
+    """Improve inputs u by projected gradient ascent with Barzilai's and Borwein's step length.
+
+    Args:
+        u: Inputs in [−1, 1]^d; written: the best met.
+        node: Node.
+        side: +1 or −1.
+        data: Models and tables of the output.
+        value: The model's value at u.
+        slope: Its gradient there; overwritten.
+
+    Returns:
+        The model's value at the best inputs.
+    """
     d = len(u)
     here, there, slope_there = u.copy(), np.empty(d), np.empty(d)
     size = 0.3 / (np.abs(slope).max() + 1e-300)
@@ -184,7 +209,7 @@ def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Arr
 def bounds(
     nodes: Rows, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
 ) -> None:
-    """Bounds at rising nodes, each begun with the multipliers and inputs of the one before.
+    """Write bounds at rising nodes, each begun with the multipliers and inputs of the one before.
 
     Args:
         nodes: Nodes, shape (J,).
@@ -220,75 +245,123 @@ def refine(
     u: Array,
     out: Array,
 ) -> None:
-    """Bound at one node; the multipliers of the whole are left in `mu`, the best inputs in `u`."""
+    """Write the upper bound at one node, by best-first halving of the tables' ranges.
+
+    Args:
+        node: Node.
+        side: +1 or −1.
+        effort: When to stop.
+        constant: What the motion has besides the model, and what a bound has besides, shape (2,).
+        data: Models and tables of the output.
+        slabs: Scratch; its first `effort.slabs` entries are written.
+        mu: Multipliers to begin with; written: those of the undivided ranges, shape (Z,).
+        u: Inputs to begin with; written: those of the largest model value, shape (L,).
+        out: Written: the bound and the largest model value, shape (2,).
+    """
     slabs.ends[0], slabs.mu[0], slabs.value[0] = data.ends.astype(np.int64), mu, np.inf
-    reached = ascend(u, node, side, data)
-    aim = sufficient(reached, 0.0, effort, constant)
-    reached = examine(0, node, side, data, effort.steps, aim, slabs, reached, u)
+    model_value = ascend(u, node, side, data)
+    target = target_value(model_value, 0.0, effort, constant)
+    model_value = bound_slab(0, node, side, data, effort.steps, target, slabs, model_value, u)
     mu[:] = slabs.mu[0]
-    floor = effort.floor * (constant[1] + dot(np.abs(mu), data.remainder))
-    count, start_value = 1, slabs.value[0]
-    while count < effort.slabs:
-        first = int(np.argmax(slabs.value[:count]))
-        aim = sufficient(reached, floor, effort, constant)
-        even = start_value - (start_value - aim) * MIN_PROGRESS * count / effort.slabs
-        if slabs.value[first] <= aim or (count >= TRIED and slabs.value[first] > even):
+    least_gap = effort.remainder_multiple * (constant[1] + dot(np.abs(mu), data.remainder))
+    n_slabs, start_value = 1, slabs.value[0]
+    while n_slabs < effort.slabs:
+        worst = int(np.argmax(slabs.value[:n_slabs]))
+        target = target_value(model_value, least_gap, effort, constant)
+        even = start_value - (start_value - target) * MIN_PROGRESS * n_slabs / effort.slabs
+        too_slow = n_slabs >= TRIED and slabs.value[worst] > even
+        if slabs.value[worst] <= target or too_slow:
             break
-        if not halve_widest(slabs, first, count):
+        if not halve_widest(slabs, worst, n_slabs):
             break
-        for slab in (first, count):
-            reached = examine(slab, node, side, data, effort.steps, aim, slabs, reached, u)
-        count += 1
-    out[0] = slabs.value[:count].max() + constant[0] + constant[1]
-    out[1] = reached + constant[0]
+        for slab in (worst, n_slabs):
+            model_value = bound_slab(
+                slab, node, side, data, effort.steps, target, slabs, model_value, u
+            )
+        n_slabs += 1
+    out[0] = slabs.value[:n_slabs].max() + constant[0] + constant[1]
+    out[1] = model_value + constant[0]
 
 
 @compiled
-def sufficient(reached: float, floor: float, effort: Effort, constant: Array) -> float:
-    """Value of D at which a bound is left."""
-    below = max(0.0, effort.top - reached - constant[0])
-    return reached + max(effort.enough, floor) + effort.loose * below - constant[1]
+def target_value(model_value: float, least_gap: float, effort: Effort, constant: Array) -> float:
+    """Value of the dual function D at which a node's bound is tight enough.
+
+    Args:
+        model_value: Largest value of the model found at the node.
+        least_gap: Least gap worth any effort.
+        effort: Gaps that suffice.
+        constant: What the motion has besides the model, and what a bound has besides, shape (2,).
+    """
+    below_peak = max(0.0, effort.incumbent - model_value - constant[0])
+    gap = max(effort.wanted_gap, least_gap) + effort.slack_below_peak * below_peak
+    return model_value + gap - constant[1]
 
 
 @compiled
-def examine(
+def bound_slab(
     slab: int,
     node: int,
     side: float,
     data: Data,
     steps: int,
-    aim: float,
+    target: float,
     slabs: Slabs,
-    reached: float,
+    model_value: float,
     u: Array,
 ) -> float:
-    """Bound of one slab; the model's best value, with its inputs in `u`."""
+    """Improve the dual bound of one slab, and return the largest model value found so far.
+
+    Args:
+        slab: Number of the slab; its `value`, `mu` and `weight` in `slabs` are written.
+        node: Node.
+        side: +1 or −1.
+        data: Models and tables of the output.
+        steps: Most evaluations of the dual function.
+        target: Value of the dual function below which no effort is made.
+        slabs: All slabs.
+        model_value: Largest model value known before.
+        u: Its inputs; written where a larger one is found, shape (L,).
+    """
     here, mu, weight = np.empty(len(u)), slabs.mu[slab], slabs.weight[slab]
-    value = minimise(mu, slabs.ends[slab], node, side, data, steps, aim, reached, weight, here)
+    value = minimise(
+        mu, slabs.ends[slab], node, side, data, steps, target, model_value, weight, here
+    )
     slabs.value[slab] = min(value, slabs.value[slab])
-    if slabs.value[slab] > aim or slab == 0:
-        other = ascend(here, node, side, data)
-        if other > reached:
-            reached = other
+    if slabs.value[slab] > target or slab == 0:
+        new_value = ascend(here, node, side, data)
+        if new_value > model_value:
+            model_value = new_value
             u[:] = here
-    return reached
+    return model_value
 
 
 @compiled
-def halve_widest(slabs: Slabs, first: int, count: int) -> bool:
-    """Halve a slab along the ω or q whose sides differ most, into its place and `count`; if any."""
-    ends, weight = slabs.ends[first], slabs.weight[first]
-    width = len(weight) // len(ends)
-    most, at, axis = 0.0, -1, 0
+def halve_widest(slabs: Slabs, halved: int, n_slabs: int) -> bool:
+    """Halve a slab along the ω or q = g/ω whose two sides differ most; its upper half is appended.
+
+    Args:
+        slabs: All slabs; the lower half is written to number `halved`, the upper to `n_slabs`.
+        halved: Number of the slab.
+        n_slabs: Number of slabs before.
+
+    Returns:
+        Whether there is a range with a table point between its ends.
+    """
+    ends, weight = slabs.ends[halved], slabs.weight[halved]
+    n_variables = len(weight) // len(ends)  # of a mode: ω, g and its amplitudes
+    largest, mode, axis = 0.0, -1, 0
     for k in range(len(ends)):
-        for way in range(2):
-            if ends[k, 2 * way + 1] - ends[k, 2 * way] >= 2 and weight[k * width + way] > most:
-                most, at, axis = weight[k * width + way], k, way
-    if at < 0:
+        for direction in range(2):  # along ω, along q
+            n_intervals = ends[k, 2 * direction + 1] - ends[k, 2 * direction]
+            difference = weight[k * n_variables + direction]
+            if n_intervals >= 2 and difference > largest:
+                largest, mode, axis = difference, k, direction
+    if mode < 0:
         return False
-    half = (ends[at, 2 * axis] + ends[at, 2 * axis + 1]) // 2
-    slabs.ends[count], slabs.mu[count] = ends, slabs.mu[first]
-    slabs.value[count] = slabs.value[first]
-    slabs.ends[first, at, 2 * axis + 1] = half
-    slabs.ends[count, at, 2 * axis] = half
+    middle = (ends[mode, 2 * axis] + ends[mode, 2 * axis + 1]) // 2
+    slabs.ends[n_slabs], slabs.mu[n_slabs] = ends, slabs.mu[halved]
+    slabs.value[n_slabs] = slabs.value[halved]
+    slabs.ends[halved, mode, 2 * axis + 1] = middle
+    slabs.ends[n_slabs, mode, 2 * axis] = middle
     return True

@@ -82,7 +82,7 @@ def classical(system: LinearSystem, p: Mapping[str, TaylorModel]) -> Classical:
 
 
 def _accelerations(made: Assembly[TaylorModel], forces: TaylorModel) -> TaylorModel:
-    """M⁻¹ b of forces V = (n, k), the same shape; none of unknowns without mass."""
+    """Accelerations M⁻¹ b by forces b, V = (n, k); zero for unknowns without mass."""
     a, n = made.massive, len(made.pattern)
     return np.eye(n)[:, a] @ _solved(made.mass[a[:, None], a], forces[a])
 
@@ -108,6 +108,6 @@ def _require_classical(made: Assembly[TaylorModel]) -> None:
 
 
 def _solved(matrix: TaylorModel, right: TaylorModel) -> TaylorModel:
-    """A⁻¹ B of A₀⁻¹ A and A₀⁻¹ B: what varies in all of A alike is diagonal there."""
+    """Solution A⁻¹ B as that of A₀⁻¹ A and A₀⁻¹ B, A₀ the middle of A."""
     first: Array = np.asarray(np.linalg.inv(matrix.value))
     return solve(first @ matrix, first @ right)

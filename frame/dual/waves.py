@@ -95,7 +95,12 @@ class Oscillators:
         }
 
     def waves(self, source: str, order: int) -> Waves:
-        """The response to a unit share of `source`: a load, velocity or start."""
+        """Table of the responses to a unit amplitude of `source`.
+
+        Args:
+            source: Name of a load or force, "velocity" or "start".
+            order: Derivative of the motion that is read, 0 to 2.
+        """
         g = self.grid
         sigma = g.sigma.ravel()
         if source in self.forced:
@@ -176,7 +181,7 @@ class Oscillators:
 
 
 def feedthrough(source: str, loads: Mapping[str, History], order: int, time: Array) -> Array:
-    """What a force adds to the acceleration of its own mode at once, shape of `time`."""
+    """Direct feedthrough f(t) of a force to accelerations at nodes, shape of `time`, else 0."""
     if not _has_feedthrough(source, order):
         return np.zeros_like(time)
     return loads[source].values(time)

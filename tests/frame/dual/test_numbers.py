@@ -169,8 +169,8 @@ def test_a_pass_compares_with_what_is_known_when_it_begins(monkeypatch):
     tops = defaultdict(set)
 
     def improve(problem, nodes, effort):
-        tops[id(problem), effort.slabs].add(effort.top)
-        problem.out[1, nodes] = problem.top + 1.0
+        tops[id(problem), effort.slabs].add(effort.incumbent)
+        problem.out[1, nodes] = problem.incumbent + 1.0
 
     monkeypatch.setattr(OutputBounds, "improve", improve)
     over, _, _ = level_of(*CASES["matrices"], np.arange(0, 3.01, 0.02))
