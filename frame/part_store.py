@@ -71,7 +71,7 @@ class PartStore:
 
 
 def _arrays_of(bounds: PartBounds | UnprovedError) -> dict[str, Array]:
-    """Return bounds, or a refusal, as arrays by name."""
+    """Return bounds, or the text and input of a refusal, as arrays by name for `np.savez`."""
     if isinstance(bounds, UnprovedError):
         along = -1 if bounds.along is None else bounds.along
         return {"refusal": np.array([bounds.what, bounds.cure]), "along": np.array(along)}

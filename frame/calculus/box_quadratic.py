@@ -13,7 +13,7 @@ FACES_UP_TO = 6
 
 
 def gain(g: Array, H: Array, x: Array) -> Array:
-    """g·x + x·H·x/2 for g (N, d), H (N, d, d) and x (N, …, d)."""
+    """Values of g·x + x·H·x/2, shape (N, …), for g (N, d), H (N, d, d) and x (N, …, d)."""
     slope = (
         g + 0.5 * np.matmul(H, x[..., None])[..., 0]
         if x.ndim == 2
@@ -51,6 +51,7 @@ def local_maximum(
 
 
 def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> None:
+    """Maximise g·x + x·H·x/2 along one axis after the other, in place, x (N, d) in the boxes."""
     for i in range(g.shape[1]):
         curvature = H[:, i, i]
         slope = g[:, i] + np.einsum("nj,nj->n", H[:, i], x) - curvature * x[:, i]  # at x_i = 0
@@ -63,7 +64,10 @@ def _axes_ascent(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> No
 
 
 def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
-    """Projected Newton step on the free axes, halved at most twice."""
+    """Points (N, d) after a projected Newton step on the free axes, halved at most twice.
+
+    Where no length raises g·x + x·H·x/2, x stays as it is.
+    """
     slope = g + np.einsum("nij,nj->ni", H, x)
     free = ~(((x <= lower) & (slope <= 0)) | ((x >= upper) & (slope >= 0)))
     eye = np.eye(g.shape[1])
@@ -81,7 +85,7 @@ def _newton(g: Array, H: Array, lower: Array, upper: Array, x: Array) -> Array:
 
 
 def global_maximum(g: Array, H: Array, lower: Array, upper: Array) -> Array:
-    """Global maximum, shape (N, d), by the stationary points of all faces.
+    """Points (N, d) of the boxes where g·x + x·H·x/2 is largest, by all faces' stationary points.
 
     With more than `FACES_UP_TO` parameters the number of faces forbids this; then the best local
     maximum from 0 and from the corner that the gradient points to.

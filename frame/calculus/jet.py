@@ -142,7 +142,10 @@ def _matched(a: Jet, b: Jet) -> tuple[Jet, Jet]:
 
 
 def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
-    """Leibniz' rule for a product that is linear in both factors."""
+    """Product of two jets, with derivatives by Leibniz' rule.
+
+    `bilinear` is the product of arrays, linear in both: `np.multiply` or `np.matmul`.
+    """
     value, first = bilinear(a.value, b.value), bilinear(a.first, b.value)
     first, second = first + bilinear(a.value, b.first), np.zeros((0, 0, *value.shape))
     if len(a.second):
@@ -155,7 +158,7 @@ def _product(a: Jet, b: Jet, bilinear: Callable[[Array, Array], Array]) -> Jet:
 def variables(
     points: Array, names: Sequence[str], selected: Sequence[str], order: int = 2
 ) -> dict[str, Jet]:
-    """Independent variables of a Taylor expansion, one jet of shape (S,) per name.
+    """Independent variables of a Taylor expansion: a jet of shape (S,) for each name.
 
     Args:
         points: Values, shape (S, len(names)).

@@ -46,7 +46,16 @@ def basis(u: Array, index: Index) -> Array:
 
 @lru_cache(64)
 def _parents(index: bytes, shape: tuple[int, int]) -> tuple[Index, Index, list[int]]:
-    """Each monomial's first variable and the monomial without it; where total degrees begin."""
+    """Recursion by which monomials are evaluated: each is one variable times a lower monomial.
+
+    Args:
+        index: Bytes of the exponents (terms, d), by rising total degree.
+        shape: Their shape.
+
+    Returns:
+        Variable of each monomial and position of the lower one, (terms,) each; first position of
+        each total degree from 1 on, with the number of terms at the end.
+    """
     rows = np.frombuffer(index, np.int64).reshape(shape)
     axis, total = (rows > 0).argmax(1), rows.sum(1)
     parent = np.zeros(len(rows), np.int64)
@@ -216,7 +225,7 @@ class LowerGrid:
         return [self._along(axis, triangle) for triangle in triangles for axis in axes]
 
     def _along(self, axis: int, factor: Array) -> csr_array:
-        """A triangular matrix along one axis, on all terms."""
+        """Sparse matrix on all terms that applies a triangular `factor` along one axis, (S, S)."""
         degrees = self.index[:, axis]
         weights = len(factor) ** np.arange(len(self.degrees))
         order = np.argsort(keys := self.index @ weights)
@@ -247,7 +256,7 @@ def leja(count: int) -> Array:
 
 @lru_cache
 def _triangles(count: int) -> tuple[Array, Array]:
-    """L⁻¹ and U⁻¹ of the matrix L U of Chebyshev polynomials at Leja points."""
+    """L⁻¹ and U⁻¹, (count, count) each, where L U has entries T_k(x_j) at Leja points x_j."""
     upper = np.polynomial.chebyshev.chebvander(leja(count), count - 1)
     lower = np.eye(count)
     for k in range(count - 1):
@@ -257,7 +266,7 @@ def _triangles(count: int) -> tuple[Array, Array]:
 
 
 def _differentiated(B: Array, index: Index, axes: tuple[int, ...]) -> Array:
-    """Derivatives along `axes` of the monomials (S, terms) with values B."""
+    """Values (S, terms) of the monomials' derivatives along `axes`, from their values B."""
     position, factor = np.arange(len(index)), np.ones(len(index))
     for axis in axes:
         factor = factor * index[position, axis]

@@ -134,7 +134,7 @@ class TaylorModel:
         return np.flatnonzero(found)
 
     def on(self, inputs: Rows) -> TaylorModel:
-        """The same as functions of some inputs alone; they depend on no others."""
+        """The model as functions of the inputs at `inputs` (d,) alone; it depends on no others."""
         d = len(inputs)
         lists = (inputs[monomials(d, degree)] for degree in range(len(self.parts)))
         rows = [places(chosen, self.inputs) for chosen in lists]
@@ -142,7 +142,7 @@ class TaylorModel:
         return TaylorModel(parts, self.remainder, d, self.order)
 
     def among(self, inputs: Rows, d: int) -> TaylorModel:
-        """The same as functions of d inputs, of which those at `inputs` (rising) are its own."""
+        """The model as functions of d inputs; its present ones become those at `inputs`, rising."""
         parts = []
         for degree, part in enumerate(self.parts):
             full = np.zeros((count(d, degree), *self.shape))
@@ -164,7 +164,7 @@ class TaylorModel:
         )
 
     def within(self, low: Array, high: Array) -> TaylorModel:
-        """The same over a part of the box, low ≤ u ≤ high, as functions of its own unit box."""
+        """The model over the part low ≤ u ≤ high, (d,) each, in unit coordinates of the part."""
         middle, half = (low + high) / 2, (high - low) / 2
         moved = [np.zeros_like(part) for part in self.parts]
         for degree, part in enumerate(self.parts):
@@ -283,7 +283,13 @@ class TaylorModel:
     def _linear(
         self, bilinear: Callable[[Array, Array], Array], factor: Array, terms: int
     ) -> TaylorModel:
-        """A linear map by numbers, sums of `terms`, under which the rest is not negative."""
+        """Image under a linear map by numbers, with its rounding in the remainder.
+
+        Args:
+            bilinear: Product of coefficients and `factor`.
+            factor: Numbers.
+            terms: Number of terms of each sum in that product.
+        """
         remainder = np.asarray(bilinear(self.remainder, np.abs(factor))) * (1 + gamma(terms + 2))
         rounding = gamma(terms) * bilinear(np.sum(self.sizes(), 0), np.abs(factor))
         parts = tuple(np.asarray(bilinear(part, factor)) for part in self.parts)
@@ -299,7 +305,7 @@ def concatenate(models: Sequence[TaylorModel], axis: int) -> TaylorModel:
 
 
 def all_within(models: Sequence[TaylorModel], low: Array, high: Array) -> list[TaylorModel]:
-    """Taylor models over a part of the box, low ≤ u ≤ high, at the cost of one."""
+    """Each model over the part low ≤ u ≤ high, in the part's unit coordinates, all at once."""
     flat = [
         TaylorModel(
             tuple(part.reshape(len(part), -1) for part in x.parts),
@@ -372,7 +378,7 @@ def _padded(part: Array, ndim: int) -> Array:
 def _product(
     a: TaylorModel, b: TaylorModel, bilinear: Callable[[Array, Array], Array]
 ) -> TaylorModel:
-    """A product that is linear in both factors, to the higher order of both.
+    """Product a b by `bilinear` (elementwise or matrix), kept to the higher order of both.
 
     A coefficient of degree i + j is a sum over all ways to share its monomial and over the
     contracted axis, if any.

@@ -114,7 +114,7 @@ def stays_below(
 
 @compiled
 def along(bound: Array, r: Array, out: Array) -> None:
-    """Tensors of bounds (d^order, K) times radii along all their axes, into `out` (K,)."""
+    """Write to `out` (K,) the tensors `bound` (d^order, K) contracted with radii r on each axis."""
     d = len(r)
     out[:] = 0.0
     for a in range(len(bound)):
@@ -175,7 +175,10 @@ def turned(
 
 @compiled
 def taylor(w: Array, table: Array, J: Array, H: Array) -> None:
-    """Value and gradient, into J, and Hessian of an output, of its waves."""
+    """Write an output's value, gradient and packed Hessian, Σ_k w_k table_k, to J; unpack it to H.
+
+    J has shape (1 + d + d (d + 1)/2,), `table` (K, len(J)), the waves w (K,) and H (d, d).
+    """
     J[:] = 0.0
     for k in range(len(w)):
         for a in range(len(J)):
@@ -185,7 +188,7 @@ def taylor(w: Array, table: Array, J: Array, H: Array) -> None:
 
 @compiled
 def unpacked(J: Array, H: Array) -> None:
-    """Hessian (d, d) from the upper triangle behind value and gradient."""
+    """Write the Hessian to H (d, d) from J: value, gradient, upper triangle by rows."""
     a = 1 + len(H)
     for i in range(len(H)):
         for j in range(i, len(H)):

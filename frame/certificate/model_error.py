@@ -168,7 +168,7 @@ def _size_of_start(
 
 
 def _at_once(model: ModalModel, part: MotionPart, unit: Array) -> dict[str, Array]:
-    """What the share of a load misses that acts on outputs at once."""
+    """Defect of the direct feedthrough of a load, "outputs" (S, n, m), at unit coordinates."""
     system, (matrices, _) = model.flow.system, _evaluate(model, unit)
     assert matrices.feeds is not None
     missed = part.share(unit).reshape(len(unit), model.count, -1)
@@ -183,7 +183,19 @@ def _defects(
     ratio: RatioDamping | None,
     unit: Array,
 ) -> dict[str, Array]:
-    """Defects at unit coordinates (S, d) of the start and of each mode's motion."""
+    """Defects of one part of the motion at unit coordinates (S, d), by name.
+
+    Args:
+        model: The modal model.
+        part: Its free part, or that of a load.
+        states: Polynomials of the states [φ_k; w_k]: of the free part, then of each load.
+        ratio: Damping by one ratio for all modes; None for other damping.
+        unit: Unit coordinates, shape (S, d).
+
+    Returns:
+        "kinematic" λ φ − w and "dynamic" λ M w + D w + K φ, (S, n, N) each; "outputs", (S, n, m);
+        those of the start, and with `ratio` those of the damping.
+    """
     if isinstance(part.load, Direct):
         return _at_once(model, part, unit)
     system, (matrices, rows) = model.flow.system, _evaluate(model, unit)

@@ -121,7 +121,9 @@ class RatioDamping:
     def defects(
         self, unit: Array, points: Array, speed: Array, M: Array, K: Array
     ) -> tuple[Array, dict[str, Array]]:
-        """Force of the damping on the modes (S, n, N), and what it leaves out.
+        """Polynomial damping force 2 ζ σ M w on each mode (S, n, N), and its defects by name.
+
+        The defects are `own` = (K − μ M) w, `root` = μ − σ² and `speed` = w.
 
         Args:
             unit: Unit coordinates, shape (S, d).

@@ -70,7 +70,12 @@ class Walk(NamedTuple):
 
 
 def walk(history: History, time: Array) -> Walk:
-    """The load without its sine, and nodes `time` (T,) in s, rising."""
+    """Samples of a load, without its sine, up to the last of the nodes, with the nodes' places.
+
+    Args:
+        history: The load.
+        time: Nodes, rising, shape (T,), in s.
+    """
     samples, step = history.samples, history.step
     before = ceil(history.start / step)  # intervals in which there is no load
     time = time + (before * step - history.start)
@@ -114,7 +119,16 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
 def _walk_moments(
     sizes: Array, interval: Rows, since: Array, decay: float, h: float, out: Array
 ) -> None:
-    """Moments at nodes so long `since` the intervals, which rise, began."""
+    """Write the moments of `absolute_moments` to `out` (5, T).
+
+    Args:
+        sizes: Bound of |f| in each interval.
+        interval: Interval of each node, rising, shape (T,).
+        since: Time of each node since its interval began, shape (T,), in s.
+        decay: g, in 1/s.
+        h: Length of an interval, in s.
+        out: Written.
+    """
     state, moved, node = np.zeros(5), np.empty(5), 0
     for i in range(interval[-1] + 1):
         while node < len(interval) and interval[node] == i:
@@ -126,7 +140,7 @@ def _walk_moments(
 
 @njit(cache=True, nogil=True)
 def _move_moments(state: Array, decay: float, h: float, size: float, out: Array) -> None:
-    """Moments a time h later, under a load of at most `size`."""
+    """Write to `out` (5,) the moments `state` (5,) a time h later, under a load up to `size`."""
     fade = np.exp(-decay * h)
     for n in range(5):
         total, choices = 0.0, 1.0
@@ -208,7 +222,10 @@ def _with_sine(
     history: History,
     time: Array,
 ) -> tuple[Array, Array]:
-    """Responses and their rounding from those to the load without its sine.
+    """Responses to a load g(t) sin θ(t), and their rounding, from those to g at two exponents.
+
+    `walked` returns ρ_g with derivatives and its rounding for exponents; a load without a sine is
+    passed through.
 
     |ρ′| is at most t ∫ |g| exp(Re σ τ), by which rounding of an exponent is bounded.
     """

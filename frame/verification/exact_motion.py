@@ -152,7 +152,7 @@ class _EnergyState:
 
     @classmethod
     def from_motion(cls, motion: LinearMotion) -> _EnergyState:
-        """The state of a motion."""
+        """Energy-scaled state space of a motion, with M = L Lᵀ."""
         n, lower = len(motion.mass), cholesky(motion.mass, lower=True)
 
         def reduced(matrix: Array) -> Array:

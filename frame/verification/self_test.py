@@ -154,7 +154,7 @@ class Trial:
         return int(np.clip(SHARE * proof / motion, LEAST, MOST))
 
     def points(self, most: int) -> Array:
-        """Inputs to be tested, at most so many, shape (S, n)."""
+        """Distinct inputs to test, at most `most` of them, shape (S, n), in the module's order."""
         distinct = dict[tuple[float, ...], None]()
         for point in islice(self._in_order(), 4 * most):
             if len(distinct) < most and np.isfinite(point).all():

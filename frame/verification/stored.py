@@ -47,7 +47,7 @@ def variables(points: Array, motions: Sequence[LinearMotion]) -> Variables:
 
 
 def stored_motions(data: xarray.Dataset) -> tuple[Array, list[LinearMotion]]:
-    """Inputs (S, n) and structures that a dataset holds."""
+    """Inputs (S, n) and structures of the motions that a dataset holds."""
     points = data["motion_inputs"].values
     record, step = data["record"].values, float(data["record_step"])
     courses = _courses(data)
