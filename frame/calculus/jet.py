@@ -110,6 +110,7 @@ class Jet:
         return self**-1 * other
 
     def __pow__(self, exponent: float) -> Jet:
+        """Real power, with derivatives by the chain rule."""
         if exponent == 2:
             return self * self
         x, k = self.value, exponent

@@ -82,6 +82,7 @@ class _Writer:
         return self._apply(name, self.place(e.args[0]))
 
     def _power(self, base: Expr, exponent: Expr) -> int:
+        """Place of base ** exponent, written as products or roots where these are exact."""
         if exponent.is_Integer and abs(int(exponent)) <= 4:
             x = self.place(base)
             power = reduce(lambda a, b: self._apply("Mul", a, b), [x] * abs(int(exponent)))

@@ -151,7 +151,13 @@ class Tree:
         return outcome
 
     def _improve(self, frontier: Frontier, items: Array, value: Array) -> None:
-        """Take over the centres of items, the best last, and refine them."""
+        """Replace best points by the centres of higher items, and refine them by Newton's method.
+
+        Args:
+            frontier: The boxes.
+            items: Places of the higher items, by rising value.
+            value: Side × output at the centres of all items.
+        """
         count = np.zeros(len(self.best), np.int64)
         count[self.numbers] = np.arange(len(self.numbers))
         which = count[frontier.problem[items]]
@@ -215,7 +221,7 @@ class Frontier:
         )
 
     def pieces(self, most: int) -> Iterator[tuple[slice, slice]]:
-        """Boxes and items in parts of about `most` items, box by box."""
+        """Yield slices of boxes and of their items, about `most` items each, in order."""
         ends = np.append(np.searchsorted(self.box, np.arange(len(self.position))), len(self))
         start = 0
         while start < len(self.position):

@@ -45,7 +45,7 @@ class Coupling:
     decay_slope: float
 
     def bounds(self, orders: Rows, excitation: Excitation) -> tuple[Array, Array]:
-        """Bounds of what the coupling adds, and of how far all strays between nodes, (T, m) each.
+        """Bounds of what the coupling adds, and of a block's deviation between nodes, (T, m) each.
 
         Args:
             orders: Derivative of the motion that each output takes, shape (m,).

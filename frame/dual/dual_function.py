@@ -108,9 +108,9 @@ loops = njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "
 
 @loops
 def box_maximum(linear: Array, quadratic: Array, u: Array) -> float:
-    """Bound of max over the box of linear·u + Σ_{i ≤ j} q_ij u_i u_j, and where about.
+    """Upper bound of linear·u + Σ_{i ≤ j} q_ij u_i u_j over the box [−1, 1]^d.
 
-    The q_ij are packed by rows, i ≤ j; `u` is written.
+    The q_ij are packed by rows, i ≤ j; `u` (d,) is written: inputs near the maximum.
     """
     d = len(u)
     full, slack, slope = np.empty((d, d)), np.empty(d), linear.copy()
@@ -219,7 +219,7 @@ def dual(
 def most_of_mode(
     mu: Array, k: int, slab: Rows, node: int, side: float, data: Data, values: Array
 ) -> tuple[float, int]:
-    """The first line of D for one mode, and the point of its table at which it is met.
+    """Mode k's maximum in D(μ) over a slab of its table, and the table point that attains it.
 
     Loops run over slices from 0, without which they are not compiled to vector instructions: over
     all rows of the slab at once, then over each for the maximum of each column.

@@ -97,7 +97,11 @@ def _responses(
     sources: Sequence[str],
     orders: Sequence[int],
 ) -> dict[int, tuple[Array, Array, Array]]:
-    """Responses over a grid (sources, T, Q W), their error and stray (sources, T), by order."""
+    """By order: responses over a grid, shape (sources, T, Q W), and bounds of their errors.
+
+    The errors, (sources, T) each, are those of interpolation over the grid with rounding, and of
+    straight lines between nodes.
+    """
     oscillators = Oscillators(grid, loads, time)
     responses = {}
     for order in orders:
@@ -341,7 +345,7 @@ def _variables(level: LevelModels, o: int) -> TaylorModel:
 
 
 def _tables(level: LevelModels, o: int, variables: TaylorModel) -> list[Array]:
-    """The first fields of `Data`: the table, its points, and the ranges of all variables."""
+    """Fields of `Data` from `table` to `reach`: tables, their points, ranges of all variables."""
     grids, single = level.tables.grids, level.oscillators
     centre, radius = (x.reshape(len(single), -1) for x in (variables.value, _radii(variables)))
     omega = np.stack([np.tile(g.omega, len(g.quotient)) for g in grids])
@@ -357,7 +361,7 @@ def _tables(level: LevelModels, o: int, variables: TaylorModel) -> list[Array]:
 
 
 def _models(level: LevelModels, variables: TaylorModel) -> list[Array]:
-    """The next fields of `Data`: scaled models of all variables."""
+    """Fields of `Data` from `linear` to `remainder`: scaled models of all variables."""
     linear, quadratic, cubic, remainder = _scaled(variables, _radii(variables))
     size = np.asarray(np.abs(cubic).sum(1))
     # of the sums that multipliers enter; scaled variables are at most 1, those of tables 2 or so
@@ -366,7 +370,12 @@ def _models(level: LevelModels, variables: TaylorModel) -> list[Array]:
 
 
 def _group(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]:
-    """The last fields of `Data`, of modes known by sums, and all constants at all nodes, (2, T)."""
+    """What truncated modes and errors add to the bounds of output o.
+
+    Returns:
+        The fields `group_wave`, `group_linear` and `group_quadratic` of `Data`; constants of the
+        motion besides its model, and of a bound besides that, at all nodes, shape (2, T).
+    """
     tables, order = level.tables, int(level.structure.order[o])
     constant: Array = np.zeros((2, len(tables.time)))
     constant[1] = level.models.added[:, o]

@@ -52,7 +52,7 @@ class MotionModels:
     def from_structure(
         cls, structure: Classical, excitation: Excitation, allowed: Array | None = None
     ) -> MotionModels:
-        """Models of a structure over its box.
+        """Models of a structure's motion over its box: enclosed blocks of modes, and all others.
 
         Args:
             structure: The structure.

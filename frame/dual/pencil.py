@@ -161,7 +161,7 @@ class Comparison:
         return self.inverse is not None or self.least > 0
 
     def solved(self, right: Array) -> Array:
-        """Bounds of |y| where |r| ≤ right, shape (n − p,)."""
+        """Bounds of |y|, T y = r, entry by entry for |r| ≤ right, shape (n − p,)."""
         scale = self.distance**-0.5
         y: Array = np.full(len(right), np.inf)
         if self.least > 0:

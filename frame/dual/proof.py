@@ -132,7 +132,7 @@ class DualProof:
     def bounds(
         self, flow: LinearFlow, boxes: Boxes, goal: Goal
     ) -> list[PartBounds | UnprovedError]:
-        """Bounds on each level of a part, or why there are none."""
+        """Bounds on each level of a part, or the refusal of one whose modes are not enclosed."""
         found: list[PartBounds | UnprovedError] = []
         for k in range(len(boxes.alpha)):
             try:
@@ -142,6 +142,7 @@ class DualProof:
         return found
 
     def _of_level(self, flow: LinearFlow, boxes: Boxes, goal: Goal, k: int) -> PartBounds:
+        """Bounds on level k of a part; those of the exact motion where no input has a width."""
         low, high = boxes.lower[k], boxes.upper[k]
         box = Box(flow.system, boxes.names, flow.time, low, high)
         if (high > low).any():

@@ -68,7 +68,7 @@ class Grid:
 def spanned(
     omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
 ) -> Grid:
-    """Points that span ranges of ω and g/ω; at least two along each axis."""
+    """Grid of `points` equally spaced values over the ranges of ω and of g/ω."""
     q = quotient if quotient[1] > quotient[0] else (quotient[0], quotient[0] + 1e-12)
     w = omega if omega[1] > omega[0] * (1 + 1e-12) else (omega[0], omega[0] * (1 + 1e-9))
     return Grid(
