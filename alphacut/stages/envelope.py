@@ -12,6 +12,7 @@ import numpy as np
 from alphacut import frame
 from alphacut.case.motion import EnvelopeSection, Study, Tolerance
 from alphacut.case.structure import Structure
+from alphacut.frame.certificate.remainder import MOST_PARAMETERS
 from alphacut.frame.questions.peaks import Peaks, output_of, peaks, tightest
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.arrays import Array
@@ -84,8 +85,12 @@ class EnvelopeTask:
         result = frame.envelope(**self.arguments(structure), relative=relative, **_run(work))
         signed = [name for name in self.limited if name != output_of(name)]
         of_envelope = peaks(result, [*map(str, result.outputs), *signed])
-        if not has_close_peaks(of_envelope, self.limited):
-            of_envelope = tightest(of_envelope, self.close_peaks(structure, work))
+        # a proof of many inputs ends by its parts, and asked again it is hardly closer
+        many = len(structure.inputs(self.fuzzy)) > MOST_PARAMETERS
+        wide = wide_peaks(of_envelope, self.limited, np.inf if many else PEAK_ERROR)
+        if wide:
+            closer = replace(self, limited=wide).close_peaks(structure, work)
+            of_envelope = tightest(of_envelope, closer)
         return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
 
     def compute_peaks(self, structure: Structure, work: Work, nodes: int = 1) -> StageResult:
@@ -137,14 +142,23 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(map(output_of, peaks)))
 
 
-def has_close_peaks(peaks: Peaks, outputs: Sequence[str]) -> bool:
-    """True if each output has a guaranteed peak that is known to within `PEAK_ERROR`."""
-    if not set(outputs) <= set(peaks.outputs):
-        return False
-    columns = [peaks.outputs.index(output) for output in outputs]
-    proved = all(peaks.natures[column] is Nature.GUARANTEED for column in columns)
-    upper, reached = peaks.upper[:, columns], peaks.reached[:, columns]
-    return proved and bool((upper - reached <= PEAK_ERROR * np.abs(upper)).all())
+def wide_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, ...]:
+    """Outputs without a guaranteed peak that is known to within a gap.
+
+    Args:
+        peaks: Peaks of an envelope.
+        outputs: Outputs that matter; those that `peaks` has not are among the result.
+        gap: Distance of proved and reached peak, as a share of the proved one.
+    """
+    wide = []
+    for output in outputs:
+        column = peaks.outputs.index(output) if output in peaks.outputs else None
+        if column is not None and peaks.natures[column] is Nature.GUARANTEED:
+            upper, reached = peaks.upper[:, column], peaks.reached[:, column]
+            if (upper - reached <= gap * np.abs(upper)).all():
+                continue
+        wide.append(output)
+    return tuple(wide)
 
 
 def by_output(peaks: Peaks) -> Document:
