@@ -54,7 +54,14 @@ WATCHED = ((STOREYS + 1) * (BAYS + 1), 2 * (BAYS + 1))
 GUST, HERTZ = History(0.4, 1 + 0.3 * np.sin(np.arange(23.0) ** 2), is_static=True), 1.3
 FORCES = (40e3, 20e3)
 """Amplitudes of the gust on the roof and of the sine on the first floor, in N."""
-DIFFERENCES = ("exact_against_extrapolated", "forces_against_extrapolated", "same_scheme")
+MODAL_RATIOS = (0.02, 0.08)
+"""Damping ratios of the first and the last mode; those between rise evenly."""
+DIFFERENCES = (
+    "exact_against_extrapolated",
+    "forces_against_extrapolated",
+    "modal_damping_against_extrapolated",
+    "same_scheme",
+)
 """Differences of both programs that may be 1e-6 of the peak."""
 FOLLOWED, COARSE = 2.0, 0.1
 """Length and step of the envelopes' nodes, in s."""
@@ -210,13 +217,26 @@ def push(ops: Any) -> None:
     ops.load(first, FORCES[1], 0.0, 0.0)
 
 
-def motion(ops: Any, load: Callable[[], None], parts: int) -> Array:
-    """Roof and first drift by OpenSees with Newmark's scheme at nodes of the record, (T, 2)."""
+def motion(ops: Any, load: Callable[[], None], parts: int, ratios: Sequence[float] = ()) -> Array:
+    """Roof and first drift by OpenSees with Newmark's scheme at nodes of the record, (T, 2).
+
+    Args:
+        ops: OpenSees.
+        load: Puts the loads on the frame.
+        parts: Time steps in each step of the record.
+        ratios: Damping ratios of all modes; Rayleigh's damping unless given.
+    """
     build(ops, 1.0, 1.0)
     a, b = RAYLEIGH
-    ops.rayleigh(a, 0.0, b, 0.0)
+    if ratios:
+        ops.eigen("-fullGenLapack", len(ratios))
+        ops.modalDamping(*ratios)
+    else:
+        ops.rayleigh(a, 0.0, b, 0.0)
     load()
     solve_with(ops, ("Newmark", 0.5, 0.25), "Transient")
+    if ratios:  # whose damping matrix is full
+        ops.system("FullGeneral")
     found = [[ops.nodeDisp(node, 1) for node in WATCHED]]
     for _ in range(round(DURATION / STEP)):
         if ops.analyze(parts, STEP / parts) != 0:
@@ -228,7 +248,8 @@ def motion(ops: Any, load: Callable[[], None], parts: int) -> Array:
 def largest_difference(ops: Any, system: MatrixStructure, load: Callable[[], None]) -> float:
     """Largest difference of exact motions and OpenSees' extrapolated ones, as share of the peak."""
     exact = LinearFlow(system, (), DURATION, STEP, Exact()).values(np.zeros((1, 0)))[0]
-    coarse, fine = (motion(ops, load, parts) for parts in (20, 40))
+    ratios = [float(ratio) for ratio in system.ratios]
+    coarse, fine = (motion(ops, load, parts, ratios) for parts in (20, 40))
     extrapolated = fine + (fine - coarse) / 3
     return float((np.abs(exact - extrapolated).max(0) / np.abs(exact).max(0)).max())
 
@@ -246,6 +267,9 @@ def compare(seed: int) -> dict[str, float | str | bool]:
         ),
     )
 
+    ratios = np.linspace(*MODAL_RATIOS, system.size).tolist()
+    modal = replace(system, damping=(), ratios=ratios)
+
     def shaken() -> None:
         shake(ops, ground)
 
@@ -258,6 +282,7 @@ def compare(seed: int) -> dict[str, float | str | bool]:
         "moving": excited(system).size,
         "exact_against_extrapolated": largest_difference(ops, system, shaken),
         "forces_against_extrapolated": largest_difference(ops, pushed, lambda: push(ops)),
+        "modal_damping_against_extrapolated": largest_difference(ops, modal, shaken),
         "same_scheme": float(difference.max()),
     }
     told |= judged("modulus and masses", of_modulus(system), ("modulus", "mass"), 1, seed)
