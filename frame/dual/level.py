@@ -290,7 +290,8 @@ class OutputBounds:
         group, constant = _group(level, o, side)
         variables = _variables(level, o)
         tables, models = _tables(level, o, variables), _models(level, variables)
-        data = Data(*tables, *models, *group, _grain(level, o))
+        fields = [*tables, *models, *group, _grain(level, o)]
+        data = Data(*fields)
         require_in_range({name: x for name, x in data._asdict().items() if name != "table"})
         out = np.stack([np.full(total, np.inf), np.full(total, -HUGE)])
         at = np.zeros((total, data.linear.shape[1]))
