@@ -89,13 +89,13 @@ def test_a_fault_in_the_result_raises(monkeypatch, method, change, words):
 
 
 def test_tables_of_the_dual_off_by_a_hundredth_raise(monkeypatch):
-    made = level.tables
+    made = level.response_tables
 
     def smaller(*given):
         table = made(*given)
         return replace(table, value={order: 0.99 * x for order, x in table.value.items()})
 
-    monkeypatch.setattr(level, "tables", smaller)
+    monkeypatch.setattr(level, "response_tables", smaller)
     with pytest.raises(FailedError, match="the proof is wrong"):
         motion(frame(), INPUTS, method=DualProof(gap=1e-3))
 
