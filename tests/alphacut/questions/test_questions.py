@@ -10,11 +10,14 @@ from alphacut.case.content import Content
 from alphacut.case.limits import Limit, parse_limit
 from alphacut.entry import main
 from alphacut.figures.answers import DRAWINGS
+from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy import Triangular
 from alphacut.fuzzy.refused import RefusedError
+from alphacut.fuzzy.result import Nature
 from alphacut.questions.all import QUESTIONS
 from alphacut.questions.decision import DecisionQuestion
 from alphacut.questions.probability import shaped_like
+from alphacut.stages.envelope import wide_peaks
 
 ROOT = Path(__file__).parents[3]
 
@@ -22,6 +25,23 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture(scope="module")
 def summary(results):
     return json.loads((results / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():
+    cuts = np.ones((2, 3))
+    bounds = Peaks(
+        alpha=np.array([0.0, 1.0]),
+        outputs=("q1", "q2", "q3"),
+        lower=cuts,
+        upper=cuts * [1.0, 1.1, 1.0],
+        error=0 * cuts,
+        reached=cuts,
+        least_proved=cuts,
+        least_reached=cuts,
+        natures=(Nature.GUARANTEED, Nature.GUARANTEED, Nature.ESTIMATED),
+    )
+    assert wide_peaks(bounds, ("q1", "q2", "q3", "max q1"), 0.05) == ("q2", "q3", "max q1")
+    assert wide_peaks(bounds, ("q1", "q2"), 0.1) == ()
 
 
 def test_decision_and_probability_agree(summary):
