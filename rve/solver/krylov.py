@@ -54,6 +54,7 @@ def krylov_solver(
         RefusedError: PETSc refuses an option or its value, or does not use it.
         ConvergenceError: A factorisation failed.
     """
+    PETSc.garbage_cleanup(matrix.comm)  # solvers of samples before, which ranks drop together
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
