@@ -33,7 +33,7 @@ def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():
         alpha=np.array([0.0, 1.0]),
         outputs=("q1", "q2", "q3"),
         lower=cuts,
-        upper=cuts * [1.0, 1.1, 1.0],
+        upper=np.array([[1.0, 1.1, 1.0], [1.0, 1.0, 1.0]]),
         error=0 * cuts,
         reached=cuts,
         least_proved=cuts,
