@@ -55,29 +55,29 @@ exit status:
 
 def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str, Parser]]:
     """Parser of a program with its commands, and the commands' parsers by name."""
-    top = Parser(
+    parser = Parser(
         prog=program,
         description="From an uncertain microstructure to the fuzzy vibration of a structure.",
         epilog=STATUSES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    top.add_argument("--version", action="version", version=f"alphacut {own_version()}")
-    inner = top.add_subparsers(
+    parser.add_argument("--version", action="version", version=f"alphacut {own_version()}")
+    subparsers = parser.add_subparsers(
         dest="command", metavar="COMMAND", required=True, parser_class=Parser
     )
     by_name: dict[str, Parser] = {}
     for name, file in commands.items():
         command = command_of(name, file)
         about = f"{command.about[:1].upper()}{command.about[1:]}."
-        by_name[name] = inner.add_parser(
+        by_name[name] = subparsers.add_parser(
             name, help=command.about, description=about, allow_abbrev=False
         )
         command.arguments(by_name[name])
         by_name[name].add_argument(
             DEBUG, action="store_true", help="log what is done; a traceback with every error"
         )
-    return top, by_name
+    return parser, by_name
 
 
 def command_of(name: str, file: str) -> Command:
@@ -92,12 +92,12 @@ def main(
     program: str = "alphacut",
     names: Mapping[str, str] = COMMANDS,
 ) -> int:
-    """Runs one command.
+    """Runs one command; every error becomes one line on standard error and an exit status.
 
     Args:
         arguments: The command line after the program's name; the process's own if left out.
         program: The program's name, for messages.
-        names: Commands here, each with its file.
+        names: File in `alphacut.commands` of each command, by the command's name.
 
     Returns:
         Exit status, see `STATUSES`.
@@ -105,7 +105,7 @@ def main(
     words = sys.argv[1:] if arguments is None else arguments
     with stoppable() as signals, logged(DEBUG in words):
         try:
-            return _shown(words, program, names)
+            return _run_traced(words, program, names)
         except BadInput as error:
             for problem in error.problems:
                 say(str(problem))
@@ -114,28 +114,28 @@ def main(
             say(str(InputProblem.from_error(error)))
             return 2
         except KeyboardInterrupt:
-            number = (*signals, signal.SIGINT)[0]
-            how = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
-            what = f"{how}; a run continues from the stages and samples that it has finished"
-            return _ended(what, 128 + number)
-        except BrokenPipeError:
+            number = signals[0] if signals else signal.SIGINT
+            cause = f"ended by {signal.Signals(number).name}" if signals else "interrupted"
+            message = f"{cause}; a run continues from the stages and samples that it has finished"
+            return _end(message, 128 + number)
+        except BrokenPipeError:  # as by `| head`: the interpreter's last flush must not fail
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             return 0
         except CampaignError as error:
-            return _ended(str(error), 3)
+            return _end(str(error), 3)
         except ModuleNotFoundError as error:
-            return _ended(missing(error), 1)
+            return _end(missing(error), 1)
         except (RuntimeError, ValueError, ArithmeticError, OSError, MemoryError, ImportError) as e:
-            return _ended(str(e) or type(e).__name__, 1)
+            return _end(str(e) or type(e).__name__, 1)
 
 
 @contextmanager
 def logged(is_on: bool) -> Iterator[None]:
-    """Writes what is logged in the block on standard error, if it is on."""
-    logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
+    """Shows the log of the block, down to level DEBUG, on standard error if `is_on`."""
     if not is_on:
         yield
         return
+    logger, handler = logging.getLogger("alphacut"), logging.StreamHandler()
     level = logger.level
     logger.addHandler(handler)
     logger.setLevel(logging.DEBUG)
@@ -146,26 +146,27 @@ def logged(is_on: bool) -> Iterator[None]:
         logger.removeHandler(handler)
 
 
-def _shown(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
+def _run_traced(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
     """Exit status of a command; an error leaves its traceback in the log."""
     try:
-        return _run(arguments, program, names)
+        return _run_command(arguments, program, names)
     except Exception:
         LOG.debug("the command ended by this error", exc_info=True)
         raise
 
 
-def _run(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
-    ours, petsc = split_petsc(arguments)
-    named = {name: names[name] for name in ours[:1] if name in names}
+def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str]) -> int:
+    """Parses the command line and runs its command; returns the command's exit status."""
+    words, petsc = split_petsc(arguments)
+    # the parser of the named command alone saves the imports of the others
+    named = {name: names[name] for name in words[:1] if name in names}
     with uninterrupted():  # a signal amid imports is not lost to what they run
-        top, by_name = parsers(program, named or names)
-    options, left = top.parse_known_args(ours)
-    if left:
-        by_name[options.command].refuse(
-            next((word for word in left if word.startswith("-")), left[0])
-        )
-    if "case" not in options:
+        parser, by_name = parsers(program, named or names)
+    options, unknown = parser.parse_known_args(words)
+    if unknown:
+        first = next((word for word in unknown if word.startswith("-")), unknown[0])
+        by_name[options.command].refuse(first)
+    if "case" not in options:  # no prisms are solved
         require_petsc(petsc, False)
     options.petsc = petsc
     if options.json == "/dev/stdout":  # opened again, it would write over what a file holds
@@ -189,8 +190,8 @@ def _warn(message: Warning | str, *_: object, **__: object) -> None:
     say(f"warning: {message}")
 
 
-def _ended(message: str, status: int) -> int:
-    """Says why a command ended; other ranks under mpirun, which may wait, are stopped."""
+def _end(message: str, status: int) -> int:
+    """Prints why a command ended, aborts other ranks under mpirun, and returns `status`."""
     say(message)
     if ranks() > 1 and "mpi4py.MPI" in sys.modules:
         print(f"alphacut: rank {rank()}: {message}", file=sys.stderr, flush=True)

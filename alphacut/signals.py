@@ -17,28 +17,30 @@ SAME_SIGNAL_SECONDS = 1.0
 
 @contextmanager
 def stoppable() -> Iterator[list[int]]:
-    """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does; yields the numbers received.
+    """Lets SIGTERM and SIGHUP interrupt the block as Ctrl-C does.
 
-    What was ignored before, as under nohup, stays ignored.
+    A signal that was ignored before, as under nohup, stays ignored.
+
+    Yields:
+        The list of the signal numbers received, which grows while the block runs.
     """
-    is_main = threading.current_thread() is threading.main_thread()
-    received, last_time = list[int](), [-SAME_SIGNAL_SECONDS]
+    received, last_time = list[int](), -SAME_SIGNAL_SECONDS
+    is_main = threading.current_thread() is threading.main_thread()  # others may set no handlers
     handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS if is_main}
-    handlers = {
-        k: handler for k, handler in handlers.items() if handler not in (None, signal.SIG_IGN)
-    }
+    previous = {k: x for k, x in handlers.items() if x not in (None, signal.SIG_IGN)}
 
     def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal last_time
         received.append(number)
         interrupt, now = signal.getsignal(signal.SIGINT), time.monotonic()
-        if now - last_time[0] >= SAME_SIGNAL_SECONDS:
-            last_time[0] = now
+        if now - last_time >= SAME_SIGNAL_SECONDS:
+            last_time = now
             (interrupt if callable(interrupt) else signal.default_int_handler)(number, frame)
 
-    for number in handlers:
+    for number in previous:
         signal.signal(number, stop)
     try:
         yield received
     finally:
-        for number, handler in handlers.items():
+        for number, handler in previous.items():
             signal.signal(number, handler)

@@ -171,23 +171,25 @@ class Content(Section):
         return self.frame or self.pendulum or self.matrices
 
     @model_validator(mode="after")
-    def _mesh(self) -> Self:
-        """Refuses a mesh from a file without phases, and keys that say what the file holds."""
+    def _check_mesh(self) -> Self:
+        """Refuses a mesh file without [cell.phases] or the reverse, and keys that repeat the file.
+
+        A mesh file brings element sizes, layers and particles; only the support of θ is free.
+        """
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
             require(self.meshed is None, "mesh.file", value=None, allowed=allowed)
-            has_radius = self.radius is None or self.radius_map is not None
-            allowed = (
-                f"{RadiusMapSection.model_fields['a1'].description}; theta alone beside mesh.file"
-            )
-            require(has_radius, "radius.a1", value=None, allowed=allowed)
+            is_complete = self.radius is None or self.radius_map is not None
+            about = RadiusMapSection.model_fields["a1"].description
+            allowed = f"{about}; theta alone beside mesh.file"
+            require(is_complete, "radius.a1", value=None, allowed=allowed)
             return self
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
         require(self.meshed is not None, "cell.phases", value=None, allowed=allowed)
         for key in ("size", "layers"):
-            require_alone(f"mesh.{key}", self.mesh.names(key), "mesh.file")
-        has_map, allowed = self.radius_map is not None, "theta alone beside mesh.file"
-        has_map = has_map or "microstructure" in self.stages
+            require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
+        has_map = self.radius_map is not None or "microstructure" in self.stages
+        allowed = "theta alone beside mesh.file"
         require(not has_map, "radius", value="a map of radii", allowed=allowed)
         tolerance, cure = self.modulus.tolerance, "compare a coarser mesh"
         allowed = "none beside mesh.file, whose error nobody knows"
@@ -195,71 +197,70 @@ class Content(Section):
         return self
 
     @model_validator(mode="after")
-    def _ring(self) -> Self:
-        """Refuses an interphase that reaches to the sides of the cell."""
+    def _check_interphase(self) -> Self:
+        """Refuses an interphase that reaches the sides of the cell; lengths over half a side."""
         thickness = None if self.round is None else self.round.interphase_thickness
         has_map = self.radius_map is not None or self.stated_fraction is not None
         if thickness is None or not has_map or "microstructure" in self.stages:
             return self
-        radius, most = self.round_cell[0].largest_radius, thickness.support.upper
-        fits, key = radius + most < CLOSEST, "cell.interphase_thickness"
+        radius, thickest = self.round_cell[0].largest_radius, thickness.support.upper
+        fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
         allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
-        require(fits, key, value=f"{most:g}", allowed=allowed)
+        require(fits, "cell.interphase_thickness", value=f"{thickest:g}", allowed=allowed)
         return self
 
     @model_validator(mode="after")
-    def _stages(self) -> Self:
-        """Refuses stages without their sections."""
-        fraction = self.round is not None and self.round.fraction is not None
-        is_mapped = "microstructure" in self.stages or fraction
-        has_map = is_mapped or self.picture is not None or self.meshed is not None
-        needs = {
+    def _check_stages(self) -> Self:
+        """Refuses stages without their sections, two sources of the radius, and unfit methods."""
+        has_fraction = self.round is not None and self.round.fraction is not None
+        has_radius = "microstructure" in self.stages or has_fraction
+        is_drawn = self.picture is not None or self.meshed is not None
+        sections = {
             "microstructure": ("microstructure",),
-            "modulus": ("cell",) if has_map else ("radius", "cell"),
+            "modulus": ("cell",) if has_radius or is_drawn else ("radius", "cell"),
             "envelope": ("envelope",),
         }
         for stage in self.stages:
-            for key in needs[stage]:
+            for key in sections[stage]:
                 allowed = f"[{key}], which stage {stage} needs"
                 require(getattr(self, key) is not None, key, value=None, allowed=allowed)
-        sources = {
+        is_source = {
             "radius": self.radius is not None,
-            "cell.fraction": fraction,
+            "cell.fraction": has_fraction,
             "stage microstructure": "microstructure" in self.stages,
         }
-        first, *later = [name for name, is_there in sources.items() if is_there] or [""]
-        require_alone(first, bool(later), ", ".join(later))
-        method = self.modulus.method
-        solved = self.round or self.meshed
-        methods = (method,) if solved is None else solved.methods
+        first, *further = [name for name, is_there in is_source.items() if is_there] or [""]
+        require_alone(first, bool(further), ", ".join(further))
+        method, cell = self.modulus.method, self.round or self.meshed
+        methods = (method,) if cell is None else cell.methods
         allowed = f"{', '.join(methods)} for this cell"
         require(method in methods, "modulus.method", value=method, allowed=allowed)
         return self
 
     @model_validator(mode="after")
-    def _damping(self) -> Self:
-        """Refuses the damping of a material whose loss factors no stage computes."""
+    def _check_material_damping(self) -> Self:
+        """Refuses damping by the material where no stage computes the material's loss factors."""
         ratio = getattr(self.structure_section, "damping_ratio", None)
-        computed = "modulus" in self.stages and bool(self.cell and self.cell.losses)
+        has_losses = "modulus" in self.stages and bool(self.cell and self.cell.losses)
         if isinstance(ratio, MaterialDamping):
             section = "frame" if self.frame else "matrices"
             allowed = "stage modulus and loss factors in [cell], or a number"
-            require(computed, f"{section}.damping_ratio", value="material", allowed=allowed)
+            require(has_losses, f"{section}.damping_ratio", value="material", allowed=allowed)
         return self
 
     @model_validator(mode="after")
-    def _records(self) -> Self:
-        """Refuses a structure that nothing moves, and questions that a suite does not answer."""
-        section, suite = self.structure_section, self.records
+    def _check_excitation(self) -> Self:
+        """Refuses a structure at rest without loads, and what a suite of records cannot answer."""
+        section = self.structure_section
         ground = getattr(section, "accelerogram", None)
-        pushed = suite is not None or ground is not None or bool(self.force)
-        moves = pushed or getattr(section, "starts", True)
+        is_loaded = self.records is not None or ground is not None or bool(self.force)
+        is_moved = is_loaded or getattr(section, "starts", True)
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
         cure = "nothing moves the frame"
-        require(moves, "frame.displacements", value=None, allowed=allowed, cure=cure)
-        if suite is None:
-            fits, allowed = self.fragility is None, "beside [records]"
-            require(fits, "fragility", value="without records", allowed=allowed)
+        require(is_moved, "frame.displacements", value=None, allowed=allowed, cure=cure)
+        if self.records is None:
+            is_absent, allowed = self.fragility is None, "beside [records]"
+            require(is_absent, "fragility", value="without records", allowed=allowed)
             return self
         require_alone("records", ground is not None, "an accelerogram")
         if self.matrices is not None:
@@ -270,8 +271,8 @@ class Content(Section):
         return self
 
     @model_validator(mode="after")
-    def _motion(self) -> Self:
-        """Refuses inputs and outputs that the structure does not have."""
+    def _check_envelope(self) -> Self:
+        """Refuses two structures or none, and inputs, outputs and steps that it does not have."""
         envelope, structure = self.envelope, self.structure
         if envelope is None or "envelope" not in self.stages:
             return self
@@ -280,12 +281,13 @@ class Content(Section):
             value = None if structure is None else f"beside {len(sections) - 1} more"
             raise RefusedError("frame", value, "one of [frame], [matrices] and [pendulum]")
         ratio = getattr(self.structure_section, "damping_ratio", None)
-        by_material = isinstance(ratio, MaterialDamping)
+        computed = "E" if "modulus" in self.stages else "(?!)"  # which matches no name
+        if isinstance(ratio, MaterialDamping):
+            computed = r"E|zeta\d*"
         main_study = Study.model_construct(fuzzy=envelope.fuzzy, duration=envelope.duration)
         studies = {"envelope": main_study} | {f"study[{k}]": x for k, x in enumerate(self.study)}
         for key, study in studies.items():
-            computed = r"E|zeta\d*" if by_material else "E" if "modulus" in self.stages else "(?!)"
-            stated = [x for x in study.fuzzy if not re.fullmatch(computed, x)]
+            stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
             structure.inputs(stated, f"{key}.fuzzy")
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)

@@ -26,7 +26,7 @@ HISTORY = (
 
 
 @dataclass(frozen=True)
-class ForceCourse:
+class ForceHistory:
     """Time history of a force, and the unit of its amplitudes.
 
     Args:
@@ -41,32 +41,40 @@ class ForceCourse:
     size: float = 1.0
 
 
-def _course(value: object, info: ValidationInfo) -> ForceCourse:
-    """Parse a time history such as "harmonic, 1.5 Hz, from 2 s"."""
+def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
+    """Parse a time history such as "harmonic, 1.5 Hz, 90 deg, from 2 s"; see `HISTORY`."""
     kind, *words = (word.strip() for word in str(value).split(","))
     static = [word for word in words if word == "static"]
     starts = [word.removeprefix("from ") for word in words if word.startswith("from ")]
     numbers = [word for word in words if word not in static and not word.startswith("from ")]
-    wanted = (1, 2) if kind == "harmonic" else (0,)
-    fits = len(numbers) in wanted and len(static) + len(starts) <= (kind != "impulse")
+    counts = (1, 2) if kind == "harmonic" else (0,)  # a frequency and perhaps a phase
+    max_options = 0 if kind == "impulse" else 1
+    fits = len(numbers) in counts and len(static) + len(starts) <= max_options
     require(fits and not (static and kind == "harmonic"), "", value=value, allowed=HISTORY)
     try:
         start = quantity.number(starts[0], "s") if starts else 0.0
         if kind == "harmonic":
             phase = quantity.number(numbers[1], "rad") if numbers[1:] else 0.0
             wave = History.harmonic(quantity.number(numbers[0], "1/s"), phase, start)
-            return ForceCourse(wave)
+            return ForceHistory(wave)
     except ValueError as error:
         raise RefusedError("", value, HISTORY, str(error)) from None
     if kind == "impulse":
-        return ForceCourse(None, "N*s")
+        return ForceHistory(None, "N*s")
     if kind == "step":
-        return ForceCourse(History.constant(start, is_static=bool(static)))
-    return _of_file(kind, start, bool(static), info)
+        return ForceHistory(History.constant(start, is_static=bool(static)))
+    return _file_history(kind, start, bool(static), info)
 
 
-def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceCourse:
-    """Time history in a file, scaled to a largest magnitude of 1 where it has a unit."""
+def _file_history(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceHistory:
+    """Time history in a file of the case; samples with a unit are scaled to a magnitude of 1.
+
+    Args:
+        name: Name of the file in the case.
+        start: Time at which the file's history begins, in s.
+        is_static: Whether the first value has acted for ever, so that the structure starts at rest.
+        info: Context of the validation, with the folder of the case.
+    """
     try:
         path = case_file(name, info)
     except RefusedError as error:
@@ -74,11 +82,11 @@ def _of_file(name: str, start: float, is_static: bool, info: ValidationInfo) -> 
     series = read_force_history(path)
     size = float(np.abs(series.samples).max()) if series.has_unit else 1.0
     history = History(series.step, np.asarray(series.samples / size), start, is_static=is_static)
-    return ForceCourse(history, "" if series.has_unit else "N", size)
+    return ForceHistory(history, "" if series.has_unit else "N", size)
 
 
-def _amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
-    """Amplitude in SI, and its SI unit."""
+def _parse_amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
+    """Parse an amplitude: its value in SI, and its SI unit ("N", "N*s" or "" of a factor)."""
     for unit in ("N", "N*s", ""):
         try:
             return quantity.fuzzy(value, unit), unit
@@ -88,7 +96,7 @@ def _amplitude(value: object, _: ValidationInfo) -> tuple[FuzzyNumber, str]:
     raise RefusedError("", value, allowed)
 
 
-Amplitude = Annotated[tuple[FuzzyNumber, str], text(_amplitude)]
+Amplitude = Annotated[tuple[FuzzyNumber, str], text(_parse_amplitude)]
 
 
 class ForceSection(Section):
@@ -98,7 +106,7 @@ class ForceSection(Section):
     unknowns, and their parameters are F1, F2 … in their order.
     """
 
-    history: Annotated[ForceCourse, text(_course)] = Field(
+    history: Annotated[ForceHistory, text(_parse_history)] = Field(
         description="step, harmonic with frequency and phase, impulse, or a file; then its start"
     )
     amplitude: dict[str, Amplitude] = Field(
@@ -112,14 +120,14 @@ class ForceSection(Section):
         return {unknown: _scaled(number, size) for unknown, (number, _) in self.amplitude.items()}
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _check_units(self) -> Self:
         """Refuses amplitudes whose unit is not that of the time history."""
         require(bool(self.amplitude), "force.amplitude", value=None, allowed="one floor or more")
         quantity_name, example = quantity.QUANTITIES[self.history.unit]
         for unknown, (_, unit) in self.amplitude.items():
-            fits, shown = unit == self.history.unit, unit or "a number"
+            is_same, shown = unit == self.history.unit, unit or "a number"
             key = f"force.amplitude.{unknown}"
-            require(fits, key, value=shown, allowed=f'{quantity_name}, as "{example}"')
+            require(is_same, key, value=shown, allowed=f'{quantity_name}, as "{example}"')
         return self
 
 
@@ -132,12 +140,12 @@ def _scaled(number: FuzzyNumber, factor: float) -> FuzzyNumber:
 def with_forces(
     structure: Structure, sections: Sequence[ForceSection], unknowns: Sequence[str]
 ) -> Structure:
-    """The structure with the forces of a case.
+    """The structure with the forces of a case, whose amplitudes become its parameters.
 
     Args:
         structure: Structure without forces.
         sections: Sections on forces.
-        unknowns: Names of the degrees of freedom of a structure from matrices.
+        unknowns: Names of the degrees of freedom of a structure from matrices; a frame has floors.
 
     Raises:
         RefusedError: It takes no forces, or has no such floor.
@@ -173,7 +181,14 @@ NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
 def _with_forces_on_unknowns(
     model: MatrixStructure, forces: NodalForces, names: Sequence[str], unknowns: Sequence[str]
 ) -> MatrixStructure:
-    """The structure with forces on its degrees of freedom; `names` are those of the amplitudes."""
+    """The structure with forces on its degrees of freedom.
+
+    Args:
+        model: The structure from matrices.
+        forces: Degree of freedom, fuzzy amplitude and time history of each force.
+        names: Parameter that the amplitude of each force is, as F1.
+        unknowns: Names of all degrees of freedom, in the order of the matrices.
+    """
     loads: list[Force] = []
     modal: dict[str, float] = {}
     for name, (unknown, number, history) in zip(names, forces, strict=True):

@@ -12,7 +12,8 @@ from pydantic.fields import FieldInfo
 from alphacut.case.content import Content
 from alphacut.case.types import Quantity, Section
 
-Models = list[type[Section]]
+SectionModels = list[type[Section]]
+"""Classes of a section; one that may have several kinds has a class for each."""
 
 
 @cache
@@ -22,14 +23,18 @@ def every_key() -> dict[str, FieldInfo]:
 
 
 @cache
-def sections() -> dict[str, Models]:
+def sections() -> dict[str, SectionModels]:
     """The models of every section by its name; that of an image and of a round cell have one."""
-    models_by_section: dict[str, Models] = {"": [Content]}
+    models_by_section: dict[str, SectionModels] = {"": [Content]}
     return models_by_section | {name: models for name, _, models in _walk("", Content) if models}
 
 
-def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, Models]]:
-    """Full name of each key and section below a model, and the models of a section."""
+def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
+    """Walks all keys and sections below a section's class, depth first.
+
+    Yields:
+        Full name; field of Pydantic; classes if it is a section, else an empty list.
+    """
     for key, info in model.model_fields.items():
         name, parts = f"{prefix}{key}", [info.annotation, *_parts(info.annotation)]
         models = [x for x in parts if isinstance(x, type) and issubclass(x, Section)]

@@ -43,11 +43,15 @@ class Limit:
         """The output of the structure."""
         return output_of(self.peak)
 
-    def si(self, structure: Structure, key: str) -> float:
-        """Limit in the SI unit of its output; a fraction of a fuzzy height is one of the least.
+    def value_in_si(self, structure: Structure, key: str) -> float:
+        """The limit in the SI unit of its output; a fraction is of the storey's least height.
+
+        Args:
+            structure: The structure, with the heights of its storeys.
+            key: Key of the case, for messages.
 
         Raises:
-            RefusedError: The structure has no height of the storey.
+            RefusedError: The limit is a fraction, and the structure has no height of the storey.
         """
         if not self.is_relative:
             return self.value
@@ -61,12 +65,12 @@ def parse_limit(value: object) -> Limit:
     """Limit that a text such as "drift1 <= 40 mm" states.
 
     Raises:
-        RefusedError: The text is no output, a comparison and a quantity, which is positive for a
-            magnitude.
+        RefusedError: It does not consist of an output, a comparison and a quantity, or the limit
+            of a magnitude is not positive.
     """
     match = re.fullmatch(r"((?:max |min |mean )?)(\w+)\s*(<=|>=)\s*(.+)", str(value).strip())
     allowed = "'drift1 <= 40 mm', 'drift1 <= 0.5 %', 'max q3 <= 80 mm' or 'min q3 >= -60 mm'"
-    if match is None or (match[3] == ">=") != (match[1] == "min "):
+    if match is None or (match[3] == ">=") != (match[1] == "min "):  # only least values have >=
         raise RefusedError("", value, allowed)
     side, name, _, text = match.groups()
     is_relative = name.startswith("drift") and text.endswith("%")
@@ -76,9 +80,8 @@ def parse_limit(value: object) -> Limit:
         raise RefusedError("", value, allowed, str(error)) from None
     is_signed = side in ("max ", "min ")
     require(number > 0 or is_signed, "", value=value, allowed=allowed)
-    return Limit(
-        f"{side}{name}", 0.0 - number if side == "min " else number, is_relative, str(value)
-    )
+    bound = 0.0 - number if side == "min " else number  # 0.0 − 0.0 is no negative zero
+    return Limit(f"{side}{name}", bound, is_relative, str(value))
 
 
 def _number(text: str, unit: str) -> float:
@@ -101,45 +104,45 @@ class QuestionSection(Section):
 
     key: ClassVar[str]
     reads_peaks: ClassVar[bool] = False
-    of_magnitudes: ClassVar[bool] = False
+    needs_magnitudes: ClassVar[bool] = False
     limits: Limits = Field(
         description="limits of outputs, 'drift1 <= 0.5 %', 'max q3 <= 80 mm', 'min q3 >= -60 mm'"
     )
 
     @property
-    def named(self) -> dict[str, Limit]:
-        """Limits by the peak that they are of, or by their text where it has several."""
+    def limits_by_name(self) -> dict[str, Limit]:
+        """Limits by name: the peak, such as "max q3", or the text where a peak has several."""
         peaks = [limit.peak for limit in self.limits]
         return {x.peak if peaks.count(x.peak) == 1 else x.text: x for x in self.limits}
 
     def in_si(self, structure: Structure) -> dict[str, float]:
-        """The limits by their names, in SI units.
+        """Value of each limit in the SI unit of its output, by the names of `limits_by_name`.
 
         Raises:
             RefusedError: The structure has no such output, or a limit stands there twice.
         """
-        key = f"{self.key}.limits"
-        values = {name: limit.si(structure, key) for name, limit in self.named.items()}
-        structure.observing(key, tuple(dict.fromkeys(limit.output for limit in self.limits)))
+        key, limits = f"{self.key}.limits", self.limits_by_name
+        values = {name: limit.value_in_si(structure, key) for name, limit in limits.items()}
+        outputs = tuple(dict.fromkeys(limit.output for limit in self.limits))
+        structure.model_with_outputs(key, outputs)  # refuses unknown ones
         texts = ", ".join(limit.text for limit in self.limits)
-        once = len(values) == len(self.limits)
-        require(once, key, value=texts, allowed="each limit once")
+        require(len(values) == len(self.limits), key, value=texts, allowed="each limit once")
         return values
 
-    def shown(self, name: str, structure: Structure) -> dict[str, str]:
-        """Peak and unit of a limit, for people; the name alone of several limits together."""
-        limit = self.named.get(name)
+    def peak_and_unit(self, name: str, structure: Structure) -> dict[str, str]:
+        """Peak ("output") and SI unit of a limit; the name and no unit of several together."""
+        limit = self.limits_by_name.get(name)
         unit = "" if limit is None else structure.unit(limit.output)
         return {"output": name if limit is None else limit.peak, "unit": unit}
 
     def check(self, structure: Structure) -> None:
-        """Refuses what the structure does not have, and limits that the question is not for."""
+        """Refuses outputs that the structure lacks, and limits that this question cannot take."""
         self.in_si(structure)
-        if self.of_magnitudes:
-            alone = all(name == limit.output for name, limit in self.named.items())
+        if self.needs_magnitudes:
+            is_one_each = all(name == x.output for name, x in self.limits_by_name.items())
             texts = ", ".join(limit.text for limit in self.limits)
             allowed = "one limit of the magnitude for each output"
-            require(alone, f"{self.key}.limits", value=texts, allowed=allowed)
+            require(is_one_each, f"{self.key}.limits", value=texts, allowed=allowed)
 
 
 class DecisionSection(QuestionSection):
@@ -153,7 +156,7 @@ class ProbabilitySection(QuestionSection):
     """Fuzzy probability that limits are exceeded; inputs that are not random stay fuzzy."""
 
     key = "probability"
-    of_magnitudes = True
+    needs_magnitudes = True
 
     random: tuple[str, ...] = Field(
         default=(), description="inputs that are random, with the shape of their membership"
@@ -172,7 +175,7 @@ class TolerancesSection(QuestionSection):
     """Largest scale of the supports of the fuzzy inputs at which no limit is exceeded."""
 
     key = "tolerances"
-    of_magnitudes = True
+    needs_magnitudes = True
     reads_peaks = True
 
     most: Annotated[float, Quantity(above=0, most=100)] = Field(
@@ -194,14 +197,14 @@ class FragilitySection(QuestionSection):
     )
 
     def check(self, structure: Structure) -> None:
-        """Refuses structures that do not scale with their record."""
+        """Refuses structures whose motion is not proportional to the record, and unfit limits."""
         super().check(structure)
         linear = structure.linear
-        scales = linear is not None and not linear.loads
-        scales = scales and not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
+        is_free = linear is not None and not linear.loads
+        is_at_rest = not any(np.any(getattr(linear, start, 0)) for start in ("q0", "v0"))
         allowed = "linear structures that start at rest, without forces: they scale with records"
-        require(scales, "fragility", value="of another motion", allowed=allowed)
+        require(is_free and is_at_rest, "fragility", value="of another motion", allowed=allowed)
         for limit in self.limits:
-            positive = limit.value > 0 and not limit.peak.startswith("mean ")
+            fits = limit.value > 0 and not limit.peak.startswith("mean ")
             allowed = "limits of each record that the structure at rest keeps"
-            require(positive, "fragility.limits", value=limit.text, allowed=allowed)
+            require(fits, "fragility.limits", value=limit.text, allowed=allowed)

@@ -62,43 +62,49 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
     """
     path = Path(path)
     text = text_of(path)
-    table = _parsed(path, text)
+    table = _parse_toml(path, text)
     changed = apply_changes(table, changes)
     try:
         content = Content.model_validate(table, context={"folder": path.parent})
     except ValidationError as error:
-        files = {True: "command line", False: str(path)}
-        problems = [replace(x, file=files[_is_below(x.key, changed)]) for x in _problems(error)]
+        problems = [
+            replace(x, file="command line" if _is_below(x.key, changed) else str(path))
+            for x in _problems(error)
+        ]
         raise BadInput([*dict.fromkeys(problems)]) from None
     return Case(path, text, content, tuple(changes))
 
 
-def _parsed(path: Path, text: str) -> dict[str, object]:
-    """The table of a TOML text; the file and line of what is no TOML are told."""
+def _parse_toml(path: Path, text: str) -> dict[str, object]:
+    """The top table of a TOML text.
+
+    Raises:
+        BadInput: The text is not TOML; the problem names the file and the line.
+    """
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
-    except (RecursionError, ValueError) as error:  # of an integer too long, without a line
-        where = re.search(r"\(at line (\d+), column \d+\)", str(error))
-        line, lines = int(where[1]) if where else 0, text.splitlines()
+    except (RecursionError, ValueError) as error:
+        match = re.search(r"\(at line (\d+), column \d+\)", str(error))
+        line = int(match[1]) if match else 0  # an integer of too many digits has no line
+        lines = text.splitlines()
         shown = lines[line - 1].strip() if 0 < line <= len(lines) else ""
         what = f"is not TOML: {str(error).partition(' (at')[0].lower()}"
         raise BadInput(InputProblem(shown or "the file", what, file=str(path), line=line)) from None
 
 
 def _problems(error: ValidationError) -> Iterator[InputProblem]:
-    """The problem of each error that Pydantic reports; what is misspelt is not missing too."""
-    details = [(_key(entry["loc"]), entry) for entry in error.errors(include_url=False)]
-    extra = {
-        key: _suggested_key(key) for key, entry in details if entry["type"] == "extra_forbidden"
-    }
+    """The problem of each error that Pydantic reports; a misspelt key is not missing as well."""
+    details = [(_key(detail["loc"]), detail) for detail in error.errors(include_url=False)]
+    unknown = [key for key, detail in details if detail["type"] == "extra_forbidden"]
+    suggested = {key: _suggested_key(key) for key in unknown}
     for key, detail in details:
-        if key in extra:
+        if key in suggested:
             kind = "section" if isinstance(detail["input"], dict) else "key"
-            close = extra[key].removeprefix(f"{_section(key)}.")
+            close = suggested[key].removeprefix(f"{_section(key)}.")
             names = ", ".join(_names(key))
             cure = f"did you mean {close}?" if close else ""
             yield InputProblem(key, f"is an unknown {kind}", "", "" if close else names, cure)
-        elif key not in extra.values():
+        elif key not in suggested.values():
             yield _problem(key, detail)
 
 
@@ -114,7 +120,7 @@ def _names(key: str) -> list[str]:
 
 
 def _suggested_key(key: str) -> str:
-    """Full name of the known key that comes nearest to one that is not; empty where none does."""
+    """Full name of the known key nearest to an unknown one; empty where none is near."""
     name = key.rpartition(".")[2]
     if close := nearest(name, _names(key)):
         return f"{_section(key)}.{close}".lstrip(".")
@@ -123,11 +129,16 @@ def _suggested_key(key: str) -> str:
 
 
 def _problem(key: str, detail: ErrorDetails) -> InputProblem:
-    """What is wrong with the value of a key, which may be missing, and what is allowed."""
+    """The problem of a key whose value is wrong or missing, with the values allowed.
+
+    Args:
+        key: Full name of the key.
+        detail: The error as Pydantic reports it.
+    """
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
         return replace(InputProblem.from_error(cause), key=cause.key or key)
-    what, value, cure = "", _written(detail["input"]), ""
+    what, value, cure = "", _as_text(detail["input"]), ""
     allowed = str(cause or KINDS.get(detail["type"], detail["msg"]))
     if detail["type"] == "missing":
         about = every_key().get(re.sub(r"\[\d+\]", "", key))
@@ -144,7 +155,7 @@ def _key(location: tuple[int | str, ...]) -> str:
     return "".join(part for part in parts if not part.startswith(".<")).lstrip(".")
 
 
-def _written(value: object) -> str:
+def _as_text(value: object) -> str:
     """A value as it stood in the file, near enough."""
     return f'"{value}"' if isinstance(value, str) else printable(value).replace("'", '"')
 
@@ -155,7 +166,7 @@ def _is_below(key: str, changed: Sequence[str]) -> bool:
 
 
 def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str, ...]:
-    """Puts every change into the table of a case; returns the keys.
+    """Puts every change KEY=VALUE into the table of a case, and returns the keys changed.
 
     Raises:
         RefusedError: A key is unknown, or changed twice.
@@ -164,12 +175,11 @@ def apply_changes(table: dict[str, object], changes: Sequence[str]) -> tuple[str
     keys: list[str] = []
     for change in changes:
         key, _, value = (part.strip() for part in change.partition("="))
-        alike = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
-        cure = next(alike, suggestion(key, full_keys))
+        endings = (f"did you mean {full}?" for full in full_keys if full.endswith(f".{key}"))
+        cure = next(endings, suggestion(key, full_keys))
         allowed = "KEY=VALUE, each full key once, as cell.matrix_modulus='20 GPa'"
-        require(
-            key in full_keys and key not in keys, "--set", value=change, allowed=allowed, cure=cure
-        )
+        is_new = key in full_keys and key not in keys
+        require(is_new, "--set", value=change, allowed=allowed, cure=cure)
         _put(table, key, _value(value))
         keys.append(key)
     return tuple(keys)
@@ -184,7 +194,7 @@ def _put(table: object, key: str, value: object) -> None:
 
 
 def _value(text: str) -> object:
-    """Value of a change: TOML where it is TOML, names with commas as an array, else text."""
+    """Value that a text states: as TOML if it is TOML, words with commas as an array, else text."""
     try:
         return tomllib.loads(f"x = {text}")["x"]
     except (RecursionError, ValueError):

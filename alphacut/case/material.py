@@ -82,27 +82,31 @@ class RadiusMapSection(ThetaSection):
         return max(radius.extremes()[1] for radius in maps)
 
     @model_validator(mode="after")
-    def _inside(self) -> Self:
-        """Refuses maps that leave (0, 1) at a corner of the supports, linear in a1 … a4."""
+    def _check_range(self) -> Self:
+        """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ.
+
+        The corners of the supports suffice, as the map is linear in a1 … a4.
+        """
         for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
             values = dict(zip(self.numbers, corner, strict=True))
             try:
-                self.at(values)
+                self.at(values)  # refuses such a map
             except RefusedError as error:
                 raise RefusedError("radius", values, error.allowed, error.cure) from None
         return self
 
 
 def _outline(particles: str) -> Ellipse | None:
-    """Outline of a particle that is not round."""
+    """The ellipse of a text such as "ellipses(2, 30)"; None of cylinders and spheres."""
     if particles in ("cylinders", "spheres"):
         return None
     match = ELLIPSES.match(particles)
+    numbers = match.groups() if match else ()
     try:
-        aspect, turn = map(float, match.groups() if match else ())
-    except ValueError:
+        aspect, degrees = map(float, numbers)
+    except ValueError:  # not two, or no numbers
         raise RefusedError("cell.particles", particles, SHAPES) from None
-    return Ellipse(aspect, turn)
+    return Ellipse(aspect, degrees)
 
 
 class RoundCell(Section):
@@ -209,25 +213,29 @@ class RoundCell(Section):
         return self.has_series and self.particles == "cylinders"
 
     @model_validator(mode="after")
-    def _one_material(self) -> Self:
-        """Refuses a shape or a material that is none, or a material that is none of spheres."""
-        _outline(self.particles)
-        ratio, isotropic = self.inclusion_poisson is not None, self.stiffness is None
-        value = "there" if ratio else "missing"
+    def _check_phases(self) -> Self:
+        """Refuses unknown shapes, a Poisson's ratio too few or too many, and touching particles."""
+        _outline(self.particles)  # refuses unknown shapes
+        has_ratio, is_isotropic = self.inclusion_poisson is not None, self.stiffness is None
+        value = "there" if has_ratio else "missing"
         allowed = "a number beside Young's modulus, none beside a stiffness"
-        require(isotropic == ratio, "cell.inclusion_poisson", value=value, allowed=allowed)
-        solid, allowed = isotropic or self.particles != "spheres", "Young's modulus of spheres"
-        require(solid, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
+        require(is_isotropic == has_ratio, "cell.inclusion_poisson", value=value, allowed=allowed)
+        fits, allowed = is_isotropic or self.particles != "spheres", "Young's modulus of spheres"
+        require(fits, "cell.inclusion_modulus", value="a plane stiffness", allowed=allowed)
         if self.fraction is not None:
-            touching = float(self.shape.shares(1 / reach(self.outline or circle)))
-            most = self.fraction.support.upper
+            touching_radius = 1 / reach(self.outline or circle)
+            touching = float(self.shape.shares(touching_radius))
+            greatest = self.fraction.support.upper
             allowed = f"values below {touching:.6g}, where particles touch"
-            require(most < touching, "cell.fraction", value=f"{most:g}", allowed=allowed)
+            require(greatest < touching, "cell.fraction", value=f"{greatest:g}", allowed=allowed)
         return self
 
     @model_validator(mode="after")
-    def _interphase(self) -> Self:
-        """Refuses a ring that lacks a number, one around other particles, and losses beside it."""
+    def _check_interphase(self) -> Self:
+        """Refuses an interphase with a key missing, around non-circular particles or with losses.
+
+        Without all three keys there is no interphase.
+        """
         names = [f"interphase_{name}" for name in ("thickness", "modulus", "poisson")]
         missing = [name for name in names if getattr(self, name) is None]
         if len(missing) == len(names):
@@ -240,8 +248,8 @@ class RoundCell(Section):
         return self
 
     @model_validator(mode="after")
-    def _losses(self) -> Self:
-        """Refuses losses of one phase alone, and of bulk moduli that are too large."""
+    def _check_losses(self) -> Self:
+        """Refuses loss factors of one phase alone, and too large ones of the bulk moduli."""
         phases = ("matrix", "inclusion")
         keys = [f"{phase}_loss{end}" for phase in phases for end in ("", "_bulk")]
         if all(getattr(self, key) is None for key in keys):
@@ -260,12 +268,23 @@ class RoundCell(Section):
 def _require_bulk_loss(
     key: str, loss: FuzzyNumber, bulk: FuzzyNumber, ratio: FuzzyNumber | None
 ) -> None:
-    """Refuses a loss factor of a bulk modulus at which the shear modulus would gain energy."""
+    """Refuses a loss factor of the bulk modulus K with which the shear modulus G gained energy.
+
+    By 1/E = 1/(9K) + 1/(3G), η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, so that η_G >= 0 needs
+    η_K <= 3 η_E/(1 − 2ν).
+
+    Args:
+        key: Key of the case, for messages.
+        loss: Loss factor η_E of Young's modulus.
+        bulk: Loss factor η_K.
+        ratio: Poisson's ratio ν; None beside a stiffness.
+    """
     if ratio is None:
         raise RefusedError(key, "there", "none beside a stiffness")
-    most, greatest = 3 * loss.support.lower / (1 - 2 * ratio.support.lower), bulk.support.upper
-    allowed = f"up to {most:.4g}, where the shear modulus loses nothing"
-    require(greatest <= most, key, value=f"{greatest:g}", allowed=allowed)
+    bound = 3 * loss.support.lower / (1 - 2 * ratio.support.lower)
+    greatest = bulk.support.upper
+    allowed = f"up to {bound:.4g}, where the shear modulus loses nothing"
+    require(greatest <= bound, key, value=f"{greatest:g}", allowed=allowed)
 
 
 class ImageCell(Section):
@@ -305,20 +324,22 @@ class ImageCell(Section):
         return tuple((loss, None) for loss in factors)
 
     @model_validator(mode="after")
-    def _require_phases(self) -> Self:
-        """Refuses phases that nothing or too much tells apart."""
-        is_one = bool(self.threshold) != bool(self.labels)
+    def _check_phases(self) -> Self:
+        """Refuses thresholds beside labels or neither, and numbers of values that do not fit."""
+        has_one = bool(self.threshold) != bool(self.labels)
         value = "beside cell.labels" if self.threshold else None
-        count = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
-        fits = len(self.modulus) == count and len(self.poisson) in (1, count)
-        values = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
         allowed = "one of cell.threshold and cell.labels"
-        require(is_one, "cell.threshold", value=value, allowed=allowed)
-        require(fits, "cell.modulus", value=values, allowed=f"one for each of {count} phases")
-        loss, allowed = f"{len(self.losses)} loss factors", f"one for each of {count} phases"
-        require(len(self.losses) in (0, count), "cell.loss", value=loss, allowed=allowed)
-        sides, allowed = len(self.pixel), "a side, or a width and a height"
-        require(sides <= 2, "cell.pixel", value=sides, allowed=allowed)
+        require(has_one, "cell.threshold", value=value, allowed=allowed)
+        n_phases = len(self.threshold) + 1 if self.threshold else len(self.labels or ())
+        allowed = f"one for each of {n_phases} phases"
+        fits = len(self.modulus) == n_phases and len(self.poisson) in (1, n_phases)
+        values = f"{len(self.modulus)} moduli and {len(self.poisson)} Poisson's ratios"
+        require(fits, "cell.modulus", value=values, allowed=allowed)
+        n_losses = len(self.losses)
+        fits = n_losses in (0, n_phases)
+        require(fits, "cell.loss", value=f"{n_losses} loss factors", allowed=allowed)
+        n_sides, allowed = len(self.pixel), "a side, or a width and a height"
+        require(n_sides <= 2, "cell.pixel", value=n_sides, allowed=allowed)
         return self
 
 

@@ -101,9 +101,11 @@ class MatricesSection(Section):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The structure, with a Young's modulus in Pa in place of its own parameter E.
+        """The structure from the matrices.
 
-        Of a damping by the material, the terms of the stiffness that hold E lose as it does.
+        Args:
+            modulus: Young's modulus in Pa, in place of parameter E; None: that of the case.
+            loss: Loss factor of this modulus, for damping by the material; None: a stand-in.
 
         Raises:
             RefusedError: The matrices make no structure.
@@ -135,6 +137,7 @@ class MatricesSection(Section):
         return numbers or {"scale": Crisp(1.0)}
 
     def _model(self, numbers: Mapping[str, FuzzyNumber]) -> MatrixStructure:
+        """The structure at the modal values of its parameters."""
         rows: dict[str, Array] = {
             Output(name, row.unit): self._row(name, row) for name, row in self.outputs.items()
         }
@@ -153,17 +156,23 @@ class MatricesSection(Section):
     def _material_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Damping ratio of all modes, or of each where some stiffness is of another material."""
-        of_material = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
-        require(
-            any(of_material),
-            "damping_ratio",
-            value="material",
-            allowed="a term of the stiffness with E",
-        )
-        if all(of_material):
+        """Damping ratios by the material whose Young's modulus is parameter E.
+
+        Args:
+            damping: Damping by the material.
+            model: The structure at modal values.
+            loss: Loss factor of E.
+
+        Returns:
+            "zeta" of all modes where every term of the stiffness has the factor E, else "zeta1",
+            "zeta2" … of each mode, by the share of its strain energy in the terms with E.
+        """
+        has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
+        allowed = "a term of the stiffness with E"
+        require(any(has_modulus), "damping_ratio", value="material", allowed=allowed)
+        if all(has_modulus):
             return {RATIO: damping.ratio(loss)}
-        shares = modal_energy_shares(model, np.flatnonzero(of_material))
+        shares = modal_energy_shares(model, np.flatnonzero(has_modulus))
         return {f"{RATIO}{k}": damping.ratio(loss, x) for k, x in enumerate(shares, start=1)}
 
     def _terms(
@@ -177,7 +186,7 @@ class MatricesSection(Section):
         return self._vector(f"outputs.{name}.row", row.row or {})
 
     def _vector(self, key: str, entries: Mapping[str, float]) -> Array:
-        """A vector over the unknowns from its entries by name."""
+        """A vector over the unknowns from its entries by unknown; `key` is for messages."""
         indices = {name: index for index, name in enumerate(self.unknowns)}
         vector = np.zeros(len(indices))
         for name, value in entries.items():
@@ -198,20 +207,20 @@ class MatricesSection(Section):
         return False
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
-        """Refuses rows that are given twice or not at all, and a record without a direction."""
+    def _check_rows(self) -> Self:
+        """Refuses outputs without exactly one row, and a record without a direction."""
         for name, output in self.outputs.items():
-            given = (output.row is None) != (output.file is None)
-            require(given, f"matrices.outputs.{name}", value=None, allowed="one of row and file")
+            has_one = (output.row is None) != (output.file is None)
+            require(has_one, f"matrices.outputs.{name}", value=None, allowed="one of row and file")
         require(bool(self.outputs), "matrices.outputs", value=None, allowed="one output or more")
         if self.accelerogram is not None or self.direction:
             self.require_pattern()
-        self.structure()
+        self.structure()  # refuses matrices that do not fit together
         return self
 
     def require_pattern(self) -> None:
-        """Refuses a structure that the ground does not move."""
+        """Refuses a direction in which the ground moves no unknown."""
         directions = sorted({name.rpartition(".")[2] for name in self.unknowns})
         allowed = f"one of {', '.join(directions[:8])}, or a table by unknown"
-        moved = bool(self._pattern().any())
-        require(moved, "matrices.direction", value=self.direction or None, allowed=allowed)
+        is_moved = bool(self._pattern().any())
+        require(is_moved, "matrices.direction", value=self.direction or None, allowed=allowed)

@@ -24,7 +24,7 @@ class PhaseSection(Section):
     loss: Loss | None = Field(default=None, description="loss factor tan δ of the stiffness")
 
     @model_validator(mode="after")
-    def _require_ratio(self) -> Self:
+    def _check_ratio(self) -> Self:
         """Refuses a Poisson's ratio beside a stiffness, and Young's modulus without one."""
         isotropic = isinstance(self.modulus, FuzzyNumber)
         value = "without poisson" if self.poisson is None else "with poisson"
@@ -48,7 +48,10 @@ class MeshedCell(Section):
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """Young's moduli by input, NAME_modulus; a scale that is 1 where no phase has any."""
+        """Young's moduli by input, as steel_modulus; {"scale": 1} where all phases are anisotropic.
+
+        A campaign needs one input at least.
+        """
         moduli = {
             f"{name}_modulus": phase.modulus
             for name, phase in self.phases.items()
@@ -63,7 +66,7 @@ class MeshedCell(Section):
         return tuple((loss, None) for loss in losses if loss is not None)
 
     @model_validator(mode="after")
-    def _require_losses(self) -> Self:
+    def _check_losses(self) -> Self:
         """Refuses losses of some phases alone."""
         missing = [name for name, phase in self.phases.items() if phase.loss is None]
         complete = len(missing) in (0, len(self.phases))

@@ -49,7 +49,7 @@ class Tolerance:
     unit: str = "m"
 
 
-def _tolerance(value: object, info: ValidationInfo) -> Tolerance:
+def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
     """Parse a tolerance such as "0.2 mm" or "0.1 %"."""
     for unit in ("m", "N", ""):
         try:
@@ -92,7 +92,7 @@ class EnvelopeSection(Section):
     integrator: Literal["midpoint", "rk4", "exact"] | None = Field(
         default=None, description="time stepping; by the method if left out"
     )
-    tolerance: Annotated[Tolerance, text(_tolerance)] | None = Field(
+    tolerance: Annotated[Tolerance, text(_parse_tolerance)] | None = Field(
         default=None,
         description="error that is allowed: of displacements, of forces, or over each peak",
     )
@@ -104,9 +104,9 @@ class EnvelopeSection(Section):
     step: Time = Field(description="time step")
 
     def require_steps(self, key: str, duration: float) -> None:
-        """Refuses a duration that is no whole number of steps, or of too many."""
+        """Refuses a duration in s that is no whole number of steps, or more than `MOST_STEPS`."""
         steps = duration / self.step
-        is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps
+        is_multiple = round(steps) >= 1 and abs(round(steps) - steps) <= 1e-9 * steps  # round-off
         if not is_multiple or steps > MOST_STEPS:
             allowed = f"whole multiples of envelope.step, up to {MOST_STEPS:,} steps"
             raise RefusedError(key, f"{duration:g} s", allowed)

@@ -39,9 +39,9 @@ class PackingSection(Section):
     )
 
     def source(self, spheres: bool) -> Simulated:
-        """Packings of discs or spheres."""
+        """The random packings to be computed: of spheres, or else of discs."""
         if self.file is None:
-            ends = self.smallest_radius or 0.0, self.largest_radius or 0.0
+            ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # by then both are there
             radii: RadiusLaw = LogNormalRadii(*ends)
         else:
             radii = MeasuredRadii.read(self.file)
@@ -57,12 +57,12 @@ class PackingSection(Section):
         return Simulated(packing, self.packings)
 
     @model_validator(mode="after")
-    def _one_law(self) -> Self:
-        """Refuses radii of two laws, or of none."""
+    def _check_radii(self) -> Self:
+        """Refuses a file of radii beside their ends, and one end alone or none without a file."""
         ends = (self.smallest_radius, self.largest_radius)
-        law = None not in ends if self.file is None else ends == (None, None)
-        allowed = "a file, or both ends of the radii"
-        require(law, "microstructure.packing.file", value="beside or without ends", allowed=allowed)
+        fits = None not in ends if self.file is None else ends == (None, None)
+        key, allowed = "microstructure.packing.file", "a file, or both ends of the radii"
+        require(fits, key, value="beside or without ends", allowed=allowed)
         return self
 
 
@@ -107,19 +107,15 @@ class MicrostructureSection(Section):
         return [x for x in (self.packing, self.circles, self.image) if x is not None]
 
     @model_validator(mode="after")
-    def _one_source(self) -> Self:
-        """Refuses several sources, or none."""
+    def _check_source(self) -> Self:
+        """Refuses several sources of the particles, or none."""
         allowed, count = "one of packing, circles and image", len(self.sources)
-        require(
-            count == 1,
-            "microstructure",
-            value=f"with {count} of them" if count else None,
-            allowed=allowed,
-        )
+        value = f"with {count} of them" if count else None
+        require(count == 1, "microstructure", value=value, allowed=allowed)
         return self
 
     def study(self, *, spheres: bool) -> MicrostructureStudy:
-        """The way from the particles to the radius map.
+        """The study that computes the radius map from these particles.
 
         Args:
             spheres: Whether packed particles are spheres.

@@ -40,26 +40,25 @@ class NamedRecording:
     recording: Recording
 
 
-def _files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
-    """Recordings of the files that one pattern names; a bad one is named before any is used."""
+def _read_files(value: object, info: ValidationInfo) -> tuple[NamedRecording, ...]:
+    """Recordings of all files that a pattern matches, such as "records/*.AT2" or "a.v2#1".
+
+    The text after # is the channel of each file. The folder of the case is the root.
+    """
     folder: Path = (info.context or {}).get("folder", Path())
     pattern, _, channel = str(value).partition("#")
     allowed = f"files or patterns such as records/*.AT2, from the folder {folder.absolute()}"
-    relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
-    require(relative, "", value=value, allowed=allowed)
+    is_relative = isinstance(value, str) and not pattern.startswith("/") and pattern.strip() != ""
+    require(is_relative, "", value=value, allowed=allowed)
     paths = sorted(path for path in folder.glob(pattern) if path.is_file())
-    require(
-        0 < len(paths) <= MAX_RECORDS,
-        "",
-        value=value,
-        allowed=f"{allowed}; 1 to {MAX_RECORDS} files",
-    )
+    allowed = f"{allowed}; 1 to {MAX_RECORDS} files"
+    require(0 < len(paths) <= MAX_RECORDS, "", value=value, allowed=allowed)
     names = [ENDING.sub("_", path.stem) + (f"_{channel}" if channel else "") for path in paths]
     recordings = [read_recording(path, channel) for path in paths]
     return tuple(NamedRecording(*pair) for pair in zip(names, recordings, strict=True))
 
 
-def _scale(value: object, _: ValidationInfo) -> Scale:
+def _parse_scale(value: object, _: ValidationInfo) -> Scale:
     """Parse a scale such as 1.2 or "PGA = 0.3 g"."""
     allowed = 'a factor above 0 as 1.2, or "PGA = 0.3 g", or "Sa(T1) = 0.5 g"'
     measure, equals, size = (part.strip() for part in str(value).partition("="))
@@ -70,14 +69,13 @@ def _scale(value: object, _: ValidationInfo) -> Scale:
             scale = Scale(quantity.number(size, "m/s^2"), measure)
     except ValueError as error:
         raise RefusedError("", value, allowed, str(error)) from None
-    require(
-        scale.value > 0 and scale.measure in ("", "PGA", "Sa(T1)"), "", value=value, allowed=allowed
-    )
+    fits = scale.value > 0 and scale.measure in ("", "PGA", "Sa(T1)")
+    require(fits, "", value=value, allowed=allowed)
     return scale
 
 
-def _trim(value: object, _: ValidationInfo) -> Trim:
-    """Parse the times to keep, such as ["2 s", "30 s"]."""
+def _parse_trim(value: object, _: ValidationInfo) -> Trim:
+    """Parse the part of a record to keep: "arias", or times such as ["2 s", "30 s"], as floats."""
     allowed = '"arias" for 5 to 95 % of the Arias intensity, or two times as ["2 s", "30 s"]'
     if value == "arias":
         return "arias"
@@ -89,7 +87,7 @@ def _trim(value: object, _: ValidationInfo) -> Trim:
     return first, last
 
 
-Files = Annotated[tuple[NamedRecording, ...], text(_files)]
+Files = Annotated[tuple[NamedRecording, ...], text(_read_files)]
 
 
 class RecordsSection(Section):
@@ -103,10 +101,10 @@ class RecordsSection(Section):
         description="files or patterns, as `records/*.AT2`; FILE#CHANNEL of several"
     )
     baseline: Baseline = Field(default="none", description="mean or straight line to subtract")
-    trim: Annotated[Trim, text(_trim)] | None = Field(
+    trim: Annotated[Trim, text(_parse_trim)] | None = Field(
         default=None, description='times to keep, as ["2 s", "30 s"], or "arias"'
     )
-    scale: Annotated[Scale, text(_scale)] = Field(
+    scale: Annotated[Scale, text(_parse_scale)] = Field(
         default=Scale(), description='factor, "PGA = 0.3 g" or "Sa(T1) = 0.5 g"'
     )
 
@@ -116,14 +114,10 @@ class RecordsSection(Section):
         return tuple(named for group in self.files for named in group)
 
     @model_validator(mode="after")
-    def _unlike(self) -> Self:
-        """Refuses files of one name, under which their results would be stored."""
+    def _check_names(self) -> Self:
+        """Refuses two files of the same name, which is that of their results."""
         names = [named.name for named in self.recordings]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        require(
-            not twice,
-            "records.files",
-            value=", ".join(twice),
-            allowed="each file once, by its name",
-        )
+        repeated = ", ".join(sorted({name for name in names if names.count(name) > 1}))
+        allowed = "each file once, by its name"
+        require(not repeated, "records.files", value=repeated, allowed=allowed)
         return self

@@ -72,14 +72,10 @@ class MaterialDamping:
         if loss.support.width == 0 and self.joints.support.width == 0:
             return Crisp(_ratio_of_loss(loss.modal * energy_share) + self.joints.modal)
         alpha = sorted({*loss.cuts.alpha, *self.joints.cuts.alpha})
-        pairs = [(loss.cut(level), self.joints.cut(level)) for level in alpha]
-        lower, upper = (
-            [
-                _ratio_of_loss(loss_cut[end] * energy_share) + joints[end]
-                for loss_cut, joints in pairs
-            ]
-            for end in (0, 1)
-        )
+        cuts = [(loss.cut(level), self.joints.cut(level)) for level in alpha]
+        # ζ rises with both numbers, so that the ends of their cuts give its ends
+        lower = [_ratio_of_loss(energy_share * eta.lower) + joint.lower for eta, joint in cuts]
+        upper = [_ratio_of_loss(energy_share * eta.upper) + joint.upper for eta, joint in cuts]
         return PiecewiseLinear(tuple(alpha), tuple(lower), tuple(upper))
 
 
@@ -88,24 +84,24 @@ def _ratio_of_loss(loss: float) -> float:
     return math.sin(math.atan(loss) / 2)
 
 
-def _damping_ratio(value: object) -> FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...]:
-    """Parse a damping ratio, that of the material, or one for each mode."""
+def _parse_damping_ratio(value: object) -> FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...]:
+    """Parse damping ratios: "2 %" of all modes, ["2 %", "5 %"] of each, or "material + 1 %"."""
     if isinstance(value, list) and any(isinstance(entry, str) for entry in value):
         ratios = map(RATIO.read, value)
         return tuple(ratio for ratio in ratios if isinstance(ratio, FuzzyNumber))
-    words = value.partition("+") if isinstance(value, str) else ("", "", "")
-    of_material = words[0].strip() == "material"
-    if of_material and not words[1]:
+    word, plus, joints = value.partition("+") if isinstance(value, str) else ("", "", "")
+    by_material = word.strip() == "material"
+    if by_material and not plus:
         return MaterialDamping()
-    ratio = RATIO.read(words[2].strip() if of_material else value)
+    ratio = RATIO.read(joints.strip() if by_material else value)
     assert isinstance(ratio, FuzzyNumber)
-    return MaterialDamping(ratio) if of_material else ratio
+    return MaterialDamping(ratio) if by_material else ratio
 
 
 RATIO = Quantity(least=0, below=1, fuzzy=True)
 DampingRatio = Annotated[
     FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...],
-    PlainValidator(_damping_ratio, json_schema_input_type=float | list[float | str] | str),
+    PlainValidator(_parse_damping_ratio, json_schema_input_type=float | list[float | str] | str),
 ]
 
 
@@ -139,10 +135,14 @@ class Structure:
         return units.get(output) or Output(output).unit
 
     def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
-        """Fuzzy parameters of a name: ``m`` all masses of a frame, others themselves.
+        """Fuzzy parameters that a name stands for: "m" for all masses of a frame, "m1" for itself.
+
+        Args:
+            name: Name of a parameter, or of a group of a frame's parameters.
+            key: Key of the case, for messages.
 
         Raises:
-            RefusedError: The name stands for nothing, or for nothing fuzzy.
+            RefusedError: The name stands for no parameter, or for crisp ones alone.
         """
         allowed, cure = "inputs that are fuzzy", f"{name} is one number"
         try:
@@ -170,10 +170,14 @@ class Structure:
         """The model if it is linear, else None."""
         return None if isinstance(self.model, LagrangianSystem) else self.model
 
-    def observing(
+    def model_with_outputs(
         self, key: str, outputs: tuple[str, ...]
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
-        """The model; of a linear structure with these outputs alone.
+        """The model, which observes these outputs alone if it is linear.
+
+        Args:
+            key: Key of the case, for messages.
+            outputs: Names of the outputs.
 
         Raises:
             RefusedError: It has no such output.
@@ -207,9 +211,11 @@ def read_accelerogram(value: object, info: ValidationInfo) -> Accelerogram:
 def ratios_of(
     ratio: FuzzyNumber | MaterialDamping | tuple[FuzzyNumber, ...] | None, loss: FuzzyNumber | None
 ) -> dict[str, FuzzyNumber]:
-    """Damping ratios by the names of their parameters: none, of all modes, or one of each.
+    """Damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
 
-    That of the material comes from its loss factor, which has a stand-in.
+    Args:
+        ratio: One of all modes, one of each, by the material, or none.
+        loss: Loss factor of the material; None: a stand-in.
     """
     if ratio is None:
         return {}
@@ -294,7 +300,11 @@ class Frame(Section):
     def structure(
         self, modulus: FuzzyNumber | None = None, loss: FuzzyNumber | None = None
     ) -> Structure:
-        """The frame with a Young's modulus in Pa, its own by default, and the loss factor of it.
+        """The frame with its fuzzy parameters.
+
+        Args:
+            modulus: Young's modulus in Pa; None: that of the section, or else a stand-in.
+            loss: Loss factor of its material, for damping by the material; None: a stand-in.
 
         Raises:
             RefusedError: Its values make no frame.
@@ -336,7 +346,7 @@ class Frame(Section):
         return tuple(x.modal for x in self.per_floor(values))
 
     def _numbers(self, modulus: FuzzyNumber | None) -> dict[str, FuzzyNumber]:
-        """Fuzzy inputs by parameter without damping ratios; the frame does not take all of them."""
+        """Every parameter that a frame may have but damping ratios, crisp or fuzzy, by name."""
         numbers: dict[str, FuzzyNumber] = {
             "E": modulus or STAND_IN,
             "rayleigh_mass": self.rayleigh_mass,
@@ -350,19 +360,18 @@ class Frame(Section):
         return numbers
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
-        """Refuses a frame without damping, or that is none."""
-        lossless = isinstance(self.damping_ratio, MaterialDamping) and self.stiffness is not None
+    def _check_damping(self) -> Self:
+        """Refuses a frame that states no damping or contradictory ones, or is no frame."""
+        is_material = isinstance(self.damping_ratio, MaterialDamping)
+        has_columns, value = self.stiffness is None, "material, beside stiffness"
         allowed = "columns of the material, or [matrices] where some storeys are of another"
-        require(
-            not lossless, "frame.damping_ratio", value="material, beside stiffness", allowed=allowed
-        )
-        placed = self.names("dampers") == (self.damper_placement is not None)
+        require(has_columns or not is_material, "frame.damping_ratio", value=value, allowed=allowed)
+        is_placed = self.has_key("dampers") == (self.damper_placement is not None)
         allowed = "both dampers and damper_placement"
-        require(placed, "frame.damper_placement", value=None, allowed=allowed)
-        is_damped, allowed = any(map(self.names, DAMPING)), " or ".join(DAMPING)
+        require(is_placed, "frame.damper_placement", value=None, allowed=allowed)
+        is_damped, allowed = any(map(self.has_key, DAMPING)), " or ".join(DAMPING)
         require(is_damped, "frame.dampers", value=None, allowed=allowed, cure='"0 %" for none')
-        self.structure()
+        self.structure()  # refuses values that make no frame
         return self
 
 

@@ -35,7 +35,7 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
 
-    def names(self, key: str) -> bool:
+    def has_key(self, key: str) -> bool:
         """True if the file gives the key, so that no default stands in."""
         return key in self.model_fields_set
 
@@ -73,7 +73,7 @@ class Quantity:
         return f'{words}, as "{example}"' if self.si else words
 
     def read(self, value: object) -> object:
-        """The value in SI.
+        """The quantity that a value of the case states, such as "80 GPa ± 5 %", in SI.
 
         Raises:
             RefusedError: It is no such quantity, or out of range.
@@ -82,10 +82,10 @@ class Quantity:
         try:
             number = self._parsed(value)
             ends = [*number.support] if isinstance(number, FuzzyNumber) else [number]
-            inside = all(self.holds(end) for end in ends)
+            fits = all(self.holds(end) for end in ends)
         except ValueError as error:
-            inside, cure = False, str(error)
-        require(inside, "", value=value, allowed=self.allowed, cure=cure)
+            fits, cure = False, str(error)
+        require(fits, "", value=value, allowed=self.allowed, cure=cure)
         return number
 
     def holds(self, value: float) -> bool:
@@ -109,11 +109,15 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """The JSON Schema: text with a unit, or a number."""
-        bare: list[dict[str, Any]] = [{"type": "integer" if self.is_integer else "number"}]
-        bare += [{"type": "array", "items": {"type": "number"}}] * self.fuzzy
+        """The JSON Schema: text with a unit; where there is none a number, an array or text."""
         text = {"type": "string", "examples": [QUANTITIES[self.si][1]]}
-        kinds = [text] if self.si else [*bare, text] if not self.is_integer else bare
+        kinds: list[dict[str, Any]] = []
+        if not self.si:
+            kinds.append({"type": "integer" if self.is_integer else "number"})
+        if not self.si and self.fuzzy:
+            kinds.append({"type": "array", "items": {"type": "number"}})
+        if not self.is_integer:
+            kinds.append(text)
         return {"anyOf": kinds, "description": self.allowed}
 
 
@@ -155,7 +159,7 @@ NotEmpty = BeforeValidator(_not_empty)
 
 
 def rising(values: tuple[float, ...]) -> tuple[float, ...]:
-    """Numbers in rising order.
+    """The numbers as they are, if they rise strictly.
 
     Raises:
         RefusedError: They do not rise, or there are none.
@@ -166,7 +170,7 @@ def rising(values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def case_file(value: object, info: ValidationInfo) -> Path:
-    """A file that the case names, looked for from the case's folder.
+    """Path of a file that the case names, relative to the folder of the case.
 
     Raises:
         RefusedError: There is no such file.
@@ -178,7 +182,7 @@ def case_file(value: object, info: ValidationInfo) -> Path:
 
 
 def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
-    """Names, each once.
+    """The names as they are, if no two are the same.
 
     Raises:
         RefusedError: One stands there twice.

@@ -110,11 +110,11 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
             row_key = f"{prefix}{key}" + (f"[{number}]" if len(sections) > 1 else "")
             if isinstance(subsection, Section):
                 yield from rows_of(f"{row_key}.", subsection)
-            elif isinstance(subsection, FuzzyNumber) and unit and section.names(key):
+            elif isinstance(subsection, FuzzyNumber) and unit and section.has_key(key):
                 yield row_key, _numbers(subsection, unit.si), KINDS.get(type(subsection), "fuzzy")
             elif key == "columns" and getattr(section, "stiffness", None) is None:
                 yield row_key, _numbers(subsection, ""), "default"
-            elif isinstance(subsection, float) and unit and unit.si and section.names(key):
+            elif isinstance(subsection, float) and unit and unit.si and section.has_key(key):
                 yield row_key, engineering(subsection, unit.si), "number"
 
 

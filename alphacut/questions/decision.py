@@ -69,11 +69,13 @@ class DecisionQuestion(Question):
         """Degrees and margins of every limit, from the peaks of the limited outputs."""
         assert motion.peaks is not None
         limits = self.section.in_si(motion.structure)
-        peaks = motion.peaks.named({name: x.peak for name, x in self.section.named.items()})
+        peaks = motion.peaks.named(
+            {name: x.peak for name, x in self.section.limits_by_name.items()}
+        )
         answers = passing(peaks, limits)
         documents = {
             name: _document(name, answer, limits.get(name, 1.0), peaks)
-            | self.section.shown(name, motion.structure)
+            | self.section.peak_and_unit(name, motion.structure)
             for name, answer in answers.items()
         }
         return {"alpha": motion.alpha, "step": motion.step, "limits": documents}

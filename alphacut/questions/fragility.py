@@ -42,7 +42,7 @@ class FragilityQuestion(Question):
         )
         assert motion.suite is not None
         limits = self.section.in_si(motion.structure)
-        names = {name: limit.peak for name, limit in self.section.named.items()}
+        names = {name: limit.peak for name, limit in self.section.limits_by_name.items()}
         peaks = [x.named(names) for x in motion.suite.peaks.values()]
         measures = [sizes[self.section.measure] for sizes in motion.suite.measures.values()]
         critical = {
@@ -69,7 +69,7 @@ class FragilityQuestion(Question):
         }
 
     def _shown(self, name: str, structure: Structure) -> Document:
-        shown = self.section.shown(name, structure)
+        shown = self.section.peak_and_unit(name, structure)
         return {"output": shown["output"], "output_unit": shown["unit"]}
 
     def _document(self, critical: CriticalMeasures) -> Document:

@@ -79,7 +79,7 @@ class ProbabilityQuestion(Question):
         fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
         crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
         answers = probabilities(
-            structure.observing("probability.limits", tuple(limits)),
+            structure.model_with_outputs("probability.limits", tuple(limits)),
             fuzzy or dict([next(iter(crisp.items()))]),
             {name: shaped_like(number) for name, number in random.items()},
             limits,
@@ -98,7 +98,9 @@ class ProbabilityQuestion(Question):
             "alpha": motion.alpha,
             "events": {
                 name: _document(
-                    answer, limits.get(name, 1.0), self.section.shown(name, structure)["unit"]
+                    answer,
+                    limits.get(name, 1.0),
+                    self.section.peak_and_unit(name, structure)["unit"],
                 )
                 for name, answer in answers.items()
             },

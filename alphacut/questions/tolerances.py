@@ -59,7 +59,7 @@ class TolerancesQuestion(Question):
         assert motion.peaks is not None
         limits = self.section.in_si(motion.structure)
         scale = tolerances(
-            motion.structure.observing("tolerances.limits", tuple(limits)),
+            motion.structure.model_with_outputs("tolerances.limits", tuple(limits)),
             motion.inputs,
             limits,
             duration=motion.duration,

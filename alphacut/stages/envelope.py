@@ -115,7 +115,7 @@ class EnvelopeTask:
             work: Where parts of a proof and progress go.
             nodes: Nodes in each step.
         """
-        model = structure.observing("limits", outputs_of(self.limited))
+        model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
         method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
         motion = self._motion(structure) | {"step": self.section.step / nodes}
