@@ -40,7 +40,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The class that needs DOLFINx, imported when it is named."""
+    """Return an exported name whose import needs DOLFINx, imported at its first use (PEP 562)."""
     if name == "PrismModel":
         from alphacut.rve.prism.model import PrismModel
 

@@ -24,36 +24,38 @@ AVERAGES = {AXES: "eq. 16", ISOTROPIC: "the isotropic average of the plane stiff
 
 
 def require_average(average: str) -> None:
-    """Refuses the name of an average that there is not.
+    """Refuse an average that is not one of `AVERAGES`.
 
     Raises:
-        RefusedError: It is none of `AVERAGES`.
+        RefusedError: The name is unknown.
     """
     if average not in AVERAGES:
         raise RefusedError("average", average, " or ".join(AVERAGES))
 
 
 def shear_modulus(moduli: Array, average: str) -> Array:
-    """Shear modulus G_T of an average, shape (…), in the unit of the moduli.
+    """In-plane shear modulus G_T of a plane stiffness, shape (…), in the unit of the moduli.
 
     Args:
         moduli: C11 + C12, C11 − C12 and C33, shape (…, 3).
-        average: One of `AVERAGES`.
+        average: "axes" for C33 alone, "isotropic" for Hill's mean over all directions.
     """
-    axes, diagonals = moduli[..., 2], moduli[..., 1] / 2
+    along_axes, along_diagonals = moduli[..., 2], moduli[..., 1] / 2
     if average == AXES:
-        return np.asarray(axes)
-    voigt, reuss = (axes + diagonals) / 2, 2 / (1 / axes + 1 / diagonals)
+        return np.asarray(along_axes)
+    voigt = (along_axes + along_diagonals) / 2
+    reuss = 2 / (1 / along_axes + 1 / along_diagonals)
     return np.asarray((voigt + reuss) / 2)
 
 
 def plane_constants(moduli: Array, average: str) -> Array:
-    """E (in the unit of the moduli) and ν of an average, shape (…, 2).
+    """E (in the unit of the moduli) and ν of a plane-strain stiffness, shape (…, 2).
 
     Args:
         moduli: C11 + C12, C11 − C12 and C33, shape (…, 3).
-        average: One of `AVERAGES`.
+        average: Which shear modulus G counts, one of `AVERAGES`.
     """
-    shear = shear_modulus(moduli, average)
-    poisson = (1 - 2 * shear / moduli[..., 0]) / 2  # eq. 16: ν = (1 − A/B)/2 with A = 2 G
-    return np.stack([2 * shear * (1 + poisson), poisson], axis=-1)  # E = A (1 + ν)
+    hydrostatic, shear = moduli[..., 0], shear_modulus(moduli, average)
+    poisson = (1 - 2 * shear / hydrostatic) / 2  # eq. 16 with A = 2 G and B = C11 + C12
+    young = 2 * shear * (1 + poisson)
+    return np.stack([young, poisson], axis=-1)

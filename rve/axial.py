@@ -24,7 +24,7 @@ from alphacut.rve.result import HomogenisedStiffness
 from alphacut.stochastic import gauss_rule
 
 POINTS = 32  # nodes in θ
-EVEN = np.array([1.0, 1.0, 0.0])
+EQUIBIAXIAL = np.array([1.0, 1.0, 0.0])  # plane strain in Voigt order
 
 
 @dataclass(frozen=True)
@@ -33,49 +33,57 @@ class Mixture:
 
     Args:
         moduli: k, l and n of matrix and inclusion, shape (3, 2), in Pa.
-        shares: Their mean shares of area, shape (2,).
+        fractions: Their mean area fractions, shape (2,).
         bounds: Of z̄ by Hashin and Shtrikman, in 1/Pa.
     """
 
     moduli: Array
-    shares: Array
+    fractions: Array
     bounds: tuple[float, float]
 
     @classmethod
     def of_cell(cls, cell: Cell) -> Self:
-        """Of a cell, averaged over θ."""
+        """Moduli, mean area fractions and Hashin–Shtrikman bounds of z̄ of a cell of two phases."""
         rule = gauss_rule(cell.radius.distribution, points=POINTS)
-        inner, c = cell.fraction(rule.nodes), np.array(cell.stiffness)
-        bulk, mean = (c[:, 0, 0] + c[:, 0, 1]) / 2, float(rule.weights @ inner)
-        between = inner * bulk[0] + (1 - inner) * bulk[1]
-        ends = [rule.weights @ ((1 - inner) * inner / (between + shear)) for shear in c[:, 2, 2]]
-        moduli = np.array([bulk, c[:, 0, 1], c[:, 0, 0]])
-        return cls(moduli, np.array([1 - mean, mean]), (float(min(ends)), float(max(ends))))
+        inclusion, stiffness = cell.fraction(rule.nodes), np.array(cell.stiffness)
+        axial, lateral, shear = stiffness[:, 0, 0], stiffness[:, 0, 1], stiffness[:, 2, 2]
+        bulk, matrix = (axial + lateral) / 2, 1 - inclusion
+        # z = f₁ f₂ / (f₂ k₁ + f₁ k₂ + G), bounded with G of either phase
+        swapped = inclusion * bulk[0] + matrix * bulk[1]
+        bounds = [float(rule.weights @ (matrix * inclusion / (swapped + G))) for G in shear]
+        mean = float(rule.weights @ inclusion)
+        moduli = np.array([bulk, lateral, axial])
+        return cls(moduli, np.array([1 - mean, mean]), (min(bounds), max(bounds)))
 
     @property
     def differences(self) -> Array:
         """Δk, Δl and Δn, shape (3,), in Pa."""
         return np.asarray(np.diff(self.moduli, axis=1)[:, 0])
 
-    def between(self, bulk: float, error: float) -> tuple[float, float, float]:
-        """Value of z̄ and its ends, from the in-plane bulk modulus in Pa and its relative error."""
-        (low, high), square = self.bounds, float(self.differences[0] ** 2)
-        width = error * bulk
-        if 2 * width >= square * (high - low) or square == 0:
+    def z_from_bulk(self, bulk: float, relative_error: float) -> tuple[float, float, float]:
+        """z̄ in bulk = ⟨k⟩ − z̄ (k₂ − k₁)², and its lower and upper bound, in 1/Pa.
+
+        Where the error of the bulk modulus (in Pa) hides z̄, the Hashin–Shtrikman bounds alone.
+        """
+        low, high = self.bounds
+        contrast_squared, tolerance = float(self.differences[0] ** 2), relative_error * bulk
+        if 2 * tolerance >= contrast_squared * (high - low) or contrast_squared == 0:
             return (low + high) / 2, low, high
-        places = (self.shares @ self.moduli[0] - bulk + np.array([0, -width, width])) / square
-        value, first, last = np.clip(places, low, high)
-        return float(value), float(first), float(last)
+        drop = self.fractions @ self.moduli[0] - bulk
+        candidates = (drop + np.array([0, -tolerance, tolerance])) / contrast_squared
+        z, lower, upper = np.clip(candidates, low, high)
+        return float(z), float(lower), float(upper)
 
     def bulk(self, z: float) -> float:
         """In-plane bulk modulus in Pa."""
-        return float(self.shares @ self.moduli[0] - z * self.differences[0] ** 2)
+        return float(self.fractions @ self.moduli[0] - z * self.differences[0] ** 2)
 
-    def along(self, z: float) -> tuple[float, float]:
-        """C13 = C23 of an even cell and C33, in Pa."""
-        _, lateral, axial = self.moduli @ self.shares
-        bulk, change, _ = self.differences
-        return float(lateral - z * bulk * change), float(axial - z * change**2)
+    def lateral_and_axial(self, z: float) -> tuple[float, float]:
+        """C13 = C23 of a cell of square symmetry, and C33, from z̄ in 1/Pa; in Pa."""
+        _, lateral, axial = self.moduli @ self.fractions
+        bulk_contrast, lateral_contrast, _ = self.differences
+        coupling = bulk_contrast * lateral_contrast
+        return float(lateral - z * coupling), float(axial - z * lateral_contrast**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,30 +104,40 @@ class AxialStiffness:
 
     @classmethod
     def of_result(cls, result: HomogenisedStiffness) -> Self | None:
-        """Of a result with its cell, of two isotropic phases, and its stiffness; else None."""
+        """C13, C23, C63 and C33 from a computed plane stiffness by Hill's relations.
+
+        None without a cell of two isotropic phases, a plane stiffness and its errors.
+        """
         cell, stiffness, errors = result.cell, result.stiffness, result.stiffness_errors
         if cell is None or stiffness is None or errors is None:
             return None
         isotropic = all(isinstance(phase, Phase) for phase in cell.phases)
         if not isotropic or len(cell.phases) > 2:
             return None
-        mixture, uneven = Mixture.of_cell(cell), stiffness @ EVEN / 2
-        z, *ends = mixture.between(float(uneven @ EVEN / 2), float(result.modulus_errors[0]))
-        z_error = max(abs(end - z) for end in ends)
-        bulk, lateral, _ = mixture.differences
-        even, axial = mixture.along(z)
-        ratio = lateral / bulk if abs(bulk) > 1e-9 * mixture.moduli[0].max() else 0.0
-        uneven = uneven - EVEN * (uneven @ EVEN) / 2
+        mixture, response = Mixture.of_cell(cell), stiffness @ EQUIBIAXIAL / 2
+        bulk = float(response @ EQUIBIAXIAL / 2)
+        z, *z_bounds = mixture.z_from_bulk(bulk, float(result.modulus_errors[0]))
+        z_error = max(abs(bound - z) for bound in z_bounds)
+        dk, dl, _ = mixture.differences
+        mean_lateral, axial = mixture.lateral_and_axial(z)
+        # the part of C (1, 1, 0)/2 that is not of square symmetry enters times Δl/Δk
+        ratio = dl / dk if abs(dk) > 1e-9 * mixture.moduli[0].max() else 0.0
+        anisotropic = response - bulk * EQUIBIAXIAL
+        mean_error = z_error * abs(dk * dl)
         return cls(
-            even * EVEN + ratio * uneven,
-            axial,
-            z_error * abs(bulk * lateral) * EVEN + abs(ratio) * (errors @ EVEN) / 2,
-            z_error * lateral**2,
+            lateral=mean_lateral * EQUIBIAXIAL + ratio * anisotropic,
+            axial=axial,
+            lateral_errors=mean_error * EQUIBIAXIAL + abs(ratio) * (errors @ EQUIBIAXIAL) / 2,
+            axial_error=z_error * dl**2,
         )
 
-    def released(self, stiffness: Array, errors: Array) -> tuple[Array, Array]:
-        """C − c cᵀ/C33, whose fibres bear no stress, and the errors of its entries, (3, 3)."""
-        c, off = self.lateral, np.outer(abs(self.lateral), self.lateral_errors) / self.axial
-        change = np.outer(c, c) / self.axial
-        of_change = off + off.T + abs(change) * self.axial_error / self.axial
-        return stiffness - change, errors + of_change
+    def condense_axial_stress(self, stiffness: Array, errors: Array) -> tuple[Array, Array]:
+        """Stiffness C − c cᵀ/C33 without stress along the fibres, and its entries' errors.
+
+        c = (C13, C23, C63). Arguments and results have the shape (3, 3) and are in Pa.
+        """
+        c = self.lateral
+        reduction = np.outer(c, c) / self.axial
+        by_lateral = np.outer(abs(c), self.lateral_errors) / self.axial
+        by_axial = abs(reduction) * self.axial_error / self.axial
+        return stiffness - reduction, errors + by_lateral + by_lateral.T + by_axial

@@ -31,29 +31,31 @@ def reuss(fractions: Array, stiffness: Sequence[Array]) -> Array:
 
 
 def hashin_shtrikman(fractions: Array, stiffness: Sequence[Array]) -> Array:
-    """Bounds of K and G of phases that are isotropic across their fibres, in plane strain, in Pa.
+    """Hashin–Shtrikman bounds of the in-plane bulk and shear moduli of a fibre composite, in Pa.
 
     Hill (J. Mech. Phys. Solids 12, 199, 1964) and Hashin (ibid. 13, 119, 1965); of any number of
     phases and with the extreme moduli of either Walpole (ibid. 17, 235, 1969). That of K holds for
     hydrostatic strain of any arrangement, that of G for isotropic ones.
 
     Args:
-        fractions: Of area, shape (phases, …).
-        stiffness: Of the phases, (3, 3) each.
+        fractions: Area fractions, shape (phases, …).
+        stiffness: Plane-strain stiffness of each phase, isotropic across the fibres, (3, 3).
 
     Returns:
-        Shape (2 moduli, 2 ends, …).
+        Lower and upper bound of K, lower and upper bound of G: shape (2, 2, …).
     """
     bulk = np.array([float(bulk_modulus(phase)) for phase in stiffness])
     shear = np.array([float(phase[2, 2]) for phase in stiffness])
-    ends = []
-    for end in (np.min, np.max):
-        k, g = end(bulk), end(shear)
-        pairs = ((bulk, g), (shear, g * k / (k + 2 * g)))
-        ends.append(
-            [1 / np.tensordot(1 / (moduli + x), fractions, axes=1) - x for moduli, x in pairs]
-        )
-    return np.swapaxes(np.array(ends), 0, 1)
+
+    def mean_with(moduli: Array, added: float) -> Array:
+        """X of 1/(X + added) = Σ fraction/(modulus + added)."""
+        return np.asarray(1 / np.tensordot(1 / (moduli + added), fractions, axes=1) - added)
+
+    bounds = []
+    for extreme in (np.min, np.max):
+        k, g = extreme(bulk), extreme(shear)
+        bounds.append([mean_with(bulk, g), mean_with(shear, g * k / (k + 2 * g))])
+    return np.swapaxes(np.array(bounds), 0, 1)
 
 
 def bulk_modulus(stiffness: Array) -> Array:
@@ -62,19 +64,21 @@ def bulk_modulus(stiffness: Array) -> Array:
 
 
 def mori_tanaka(fraction: Array, matrix: AnyPhase, inclusion: AnyPhase) -> Array:
-    """Moduli of round aligned fibres by Mori and Tanaka (1973), exact where particles are few.
+    """Plane stiffness of round aligned fibres by Mori and Tanaka (1973), exact for few fibres.
 
     Returns:
         C11 + C12, C11 − C12 and C33 in Pa, shape (…, 3) for area fractions of shape (…).
     """
-    bulk = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
-    shear = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
-    share = np.asarray(fraction)
+    bulks = [float(bulk_modulus(phase.stiffness)) for phase in (matrix, inclusion)]
+    shears = [float(phase.stiffness[2, 2]) for phase in (matrix, inclusion)]
+    f = np.asarray(fraction)
 
-    def mixed(values: list[float], resistance: float) -> Array:
-        contrast = values[1] - values[0]
-        return np.asarray(values[0] + share * contrast / (1 + contrast * (1 - share) * resistance))
+    def effective(moduli: list[float], polarisation: float) -> Array:
+        """Modulus from those of both phases and 1/(matrix modulus + constraint of the matrix)."""
+        contrast = moduli[1] - moduli[0]
+        return np.asarray(moduli[0] + f * contrast / (1 + contrast * (1 - f) * polarisation))
 
-    polar = (bulk[0] + 2 * shear[0]) / (2 * shear[0] * (bulk[0] + shear[0]))
-    in_plane, axial = mixed(bulk, 1 / (bulk[0] + shear[0])), mixed(shear, polar)
-    return np.stack([2 * in_plane, 2 * axial, axial], axis=-1)
+    k, g = bulks[0], shears[0]  # of the matrix
+    bulk = effective(bulks, 1 / (k + g))
+    shear = effective(shears, (k + 2 * g) / (2 * g * (k + g)))
+    return np.stack([2 * bulk, 2 * shear, shear], axis=-1)

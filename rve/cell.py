@@ -17,7 +17,7 @@ from alphacut.stochastic import RadiusMap
 AREA = 4.0  # of the cell, in halves of its side
 STRAIN = 0.01  # eq. 15
 THINNEST = 1e-4  # interphase, in halves of the cell's side
-IN_GPA = (0.01, 1e4)  # E that is no solid's in Pa (soft gels have 1e4) and is one's in GPa or MPa
+NOT_IN_PA = (0.01, 1e4)  # range of E that solids have in GPa or MPa, but softer than gels in Pa
 # eq. 15 as (ε11, ε22, 2 ε12); ε12 is the tensor component
 LOADS = np.array([[STRAIN, STRAIN, 0.0], [0.0, 0.0, 2 * STRAIN]])
 # with the third, the whole planar stiffness follows
@@ -44,6 +44,7 @@ class Phase:
     poisson: float = 0.3
 
     def __post_init__(self) -> None:
+        """Refuse constants of no elastic solid; warn of a modulus that is probably not in Pa."""
         for what, value in (("Young's modulus", self.modulus), ("Poisson's ratio", self.poisson)):
             if not isinstance(value, Real) or isinstance(value, bool):
                 cure = "a fuzzy one is an input of fuzzy.propagate, each sample makes its own phase"
@@ -52,7 +53,8 @@ class Phase:
             raise RefusedError(
                 "Young's modulus", f"{self.modulus:g} Pa", "positive and finite numbers"
             )
-        if IN_GPA[0] <= self.modulus < IN_GPA[1] and self.modulus != 1:  # 1 scales others
+        is_normalised = self.modulus == 1  # a common choice where only ratios of moduli count
+        if NOT_IN_PA[0] <= self.modulus < NOT_IN_PA[1] and not is_normalised:
             soft = f"Young's modulus is {self.modulus:g} Pa, softer than any gel"
             warnings.warn(f"{soft}; a phase takes Pa, 1 GPa is 1e9", stacklevel=3)
         if not -1 < self.poisson < 0.5:
@@ -106,15 +108,16 @@ class VoigtPhase:
     rows: tuple[tuple[float, ...], ...]
 
     def __post_init__(self) -> None:
+        """Refuse a stiffness that is not symmetric positive definite; make it exactly symmetric."""
         matrix = np.asarray(self.rows, float)
-        right = matrix.shape == (3, 3) and np.isfinite(matrix).all()
-        if right:
-            right = abs(matrix - matrix.T).max() <= 1e-9 * abs(matrix).max()
-        if not right or np.linalg.eigvalsh(matrix)[0] <= 0:
+        is_symmetric = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+        if is_symmetric:
+            is_symmetric = abs(matrix - matrix.T).max() <= 1e-9 * abs(matrix).max()
+        if not is_symmetric or np.linalg.eigvalsh(matrix)[0] <= 0:
             allowed = "symmetric positive definite matrices of 3 × 3, in Pa"
             raise RefusedError("stiffness of the phase", matrix.tolist(), allowed)
-        rows = ((matrix + matrix.T) / 2).tolist()
-        object.__setattr__(self, "rows", tuple(map(tuple, rows)))
+        symmetric_rows = ((matrix + matrix.T) / 2).tolist()
+        object.__setattr__(self, "rows", tuple(map(tuple, symmetric_rows)))
 
     @property
     def stiffness(self) -> Array:
@@ -231,22 +234,25 @@ def square_moduli(stiffness: Array) -> Array:
 
 
 def moduli_of_energies(energies: Array, loads: Array) -> Array:
-    """The three moduli from energies of `LOADS` or `THREE_LOADS`, nan where a load is missing.
+    """C11 + C12, C11 − C12 and C33 from the energies of loads, shape (…, 3), in Pa.
 
     Args:
         energies: Mean of σ_a : ε_a for each load a, shape (…, loads), in Pa.
-        loads: Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3).
+        loads: Macroscopic strains (ε11, ε22, 2 ε12) of `LOADS` or `THREE_LOADS`, shape (loads, 3);
+            without the third, C11 − C12 is nan.
     """
     moduli = np.full((*energies.shape[:-1], 3), np.nan)
-    for k, modulus in enumerate((0, 2, 1)[: len(loads)]):
-        moduli[..., modulus] = energies[..., k] / (loads[k] @ loads[k])
+    columns = (0, 2, 1)  # of the moduli that the equibiaxial, shear and deviatoric load give
+    for k, strain in enumerate(loads):
+        moduli[..., columns[k]] = energies[..., k] / (strain @ strain)
     return moduli
 
 
 def axial_moduli(stiffness: Array, *, square: bool) -> Array:
-    """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, axes, 3).
+    """C11 + C12, C11 − C12 and C33 of a plane stiffness (…, 3, 3), shape (…, 1 or 3, 3).
 
-    Those of the square-symmetric part; unless `square`, then those by C11 and by C22 alone.
+    First with the mean of C11 and C22; unless the symmetry is that of the square, then also with
+    C11 alone and with C22 alone.
     """
     moduli = [square_moduli(stiffness)]
     for k in () if square else (0, 1):

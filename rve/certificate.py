@@ -34,15 +34,15 @@ BOUNDS = ("reuss", "voigt", "hashin_shtrikman")
 
 
 def require(checks: Mapping[str, float], *, discretisation: float = ROUND_OFF) -> dict[str, float]:
-    """The checks as they are, if all are within their limits.
+    """Copy of the checks; raises if a violation exceeds its limit.
 
     Args:
         checks: Relative violations by the names of `WHAT`.
-        discretisation: Declared error of the stiffness, the limit of the bounds; that of the others
-            is `ALGEBRAIC`.
+        discretisation: Limit of the violations of bounds, the declared error of the stiffness; that
+            of the others is `ALGEBRAIC`.
 
     Raises:
-        CertificateError: One is not; the message names it with its value and its limit.
+        CertificateError: A violation is too large; the message names it, its value and its limit.
     """
     for name, value in checks.items():
         limit = discretisation if name in BOUNDS else ALGEBRAIC
@@ -54,14 +54,14 @@ def require(checks: Mapping[str, float], *, discretisation: float = ROUND_OFF) -
     return dict(checks)
 
 
-def certified(result: HomogenisedStiffness) -> HomogenisedStiffness:
-    """The result with its checks, which hold within its declared error.
+def with_checks(result: HomogenisedStiffness) -> HomogenisedStiffness:
+    """Copy of a result with the measured violations of symmetry and of the bounds as its checks.
 
     Args:
         result: With its cell and its stiffness.
 
     Raises:
-        CertificateError: Symmetry or a bound is violated.
+        CertificateError: A violation exceeds the declared error of the result.
     """
     curve, cell = result.curve, result.cell
     assert cell is not None
@@ -76,7 +76,10 @@ def certified(result: HomogenisedStiffness) -> HomogenisedStiffness:
 def stress_checks(
     stress: Array, loads: Array, fractions: Array, weights: Array, phases: Sequence[AnyPhase]
 ) -> dict[str, float]:
-    """Symmetry and bounds of the mean stiffness, as the loads see it.
+    """Relative violations of symmetry and of bounds by the mean stiffness over θ.
+
+    The stiffness is known only by the stresses under some loads, so that the Voigt, Reuss and
+    Hashin–Shtrikman bounds are those of energies of these loads.
 
     Args:
         stress: Homogenised (σ11, σ22, σ12) at the nodes of θ for each load, shape (n, 3, loads), in
@@ -85,28 +88,32 @@ def stress_checks(
         fractions: Area fractions of the phases at the nodes, shape (phases, n).
         weights: Weights of the nodes, shape (n,).
         phases: Materials, in the order of their fractions.
+
+    Returns:
+        "symmetry", "reuss", "voigt" and, of isotropic phases, "hashin_shtrikman"; 0 where it holds.
     """
     stiffness = [phase.stiffness for phase in phases]
     energy = loads @ mean(weights, stress)
-    low, high = (
+    reuss_energy, voigt_energy = (
         loads @ mean(weights, bound(fractions, stiffness)) @ loads.T for bound in (reuss, voigt)
     )
-    checks = order_checks(energy, low, high)
+    checks = order_checks(energy, reuss_energy, voigt_energy)
     if all(isinstance(phase, Phase) for phase in phases):
-        least, greatest = hashin_shtrikman(fractions, stiffness)[0] @ weights
-        even = np.linalg.lstsq(loads.T, np.array([1.0, 1.0, 0.0]), rcond=None)[0]
-        bulk = even @ energy @ even / 4
-        checks["hashin_shtrikman"] = float(max(0.0, least - bulk, bulk - greatest) / bulk)
+        low, high = hashin_shtrikman(fractions, stiffness)[0] @ weights
+        # factors of the loads that add up to ε11 = ε22 = 1
+        equibiaxial = np.linalg.lstsq(loads.T, np.array([1.0, 1.0, 0.0]), rcond=None)[0]
+        bulk = equibiaxial @ energy @ equibiaxial / 4
+        checks["hashin_shtrikman"] = float(max(0.0, low - bulk, bulk - high) / bulk)
     return checks
 
 
-def order_checks(energy: Array, low: Array, high: Array) -> dict[str, float]:
-    """Symmetry of a quadratic form, (k, k), and its order between two others."""
+def order_checks(energy: Array, reuss_energy: Array, voigt_energy: Array) -> dict[str, float]:
+    """Relative violations of symmetry and of Reuss ≤ energy ≤ Voigt, matrices of shape (k, k)."""
     scale = float(abs(energy).max())
     return {
         "symmetry": float(abs(energy - energy.T).max()) / scale,
-        "reuss": _below(energy - low) / scale,
-        "voigt": _below(high - energy) / scale,
+        "reuss": _below(energy - reuss_energy) / scale,
+        "voigt": _below(voigt_energy - energy) / scale,
     }
 
 

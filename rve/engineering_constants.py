@@ -33,20 +33,22 @@ class EngineeringConstants:
 
     @classmethod
     def of_stiffness(cls, stiffness: Array, errors: Array) -> EngineeringConstants:
-        """From C, (3, 3), and the declared errors of its entries, in Pa."""
+        """E_x, E_y, ν_xy and G_xy of C, (3, 3), from the declared errors of its entries, in Pa."""
         S = np.linalg.inv(stiffness)
-        off = MARGIN * abs(S) @ errors @ abs(S)  # δS = −S δC S
-        young, poisson = 1 / np.diag(S), -S[0, 1] / S[0, 0]
-        relative = np.diag(off) * young
-        of_ratio = (off[0, 1] + abs(poisson) * off[0, 0]) / S[0, 0]
-        values = np.array([*young[:2], poisson, young[2]])
-        return cls(values, np.array([*(relative * young)[:2], of_ratio, (relative * young)[2]]))
+        S_error = MARGIN * abs(S) @ errors @ abs(S)  # δS = −S δC S
+        moduli, poisson = 1 / np.diag(S), -S[0, 1] / S[0, 0]
+        moduli_error = np.diag(S_error) * moduli * moduli
+        poisson_error = (S_error[0, 1] + abs(poisson) * S_error[0, 0]) / S[0, 0]
+        values = np.array([*moduli[:2], poisson, moduli[2]])
+        return cls(values, np.array([*moduli_error[:2], poisson_error, moduli_error[2]]))
 
 
 def engineering_constants(result: HomogenisedStiffness) -> dict[str, EngineeringConstants]:
-    """Constants by definition: in plane strain, and without stress along fibres where known.
+    """E_x, E_y, ν_xy and G_xy in plane strain, and without stress along the fibres where known.
 
-    The second needs two isotropic phases. Of a result without its whole plane stiffness, none.
+    Returns:
+        Constants by `PLANE_STRAIN` and, of two isotropic phases, `FREE`; empty for a result without
+        its plane stiffness.
     """
     stiffness, errors = result.stiffness, result.stiffness_errors
     if stiffness is None or errors is None or stiffness.shape != (3, 3):
@@ -54,5 +56,6 @@ def engineering_constants(result: HomogenisedStiffness) -> dict[str, Engineering
     constants = {PLANE_STRAIN: EngineeringConstants.of_stiffness(stiffness, errors)}
     axial = AxialStiffness.of_result(result)
     if axial is not None:
-        constants[FREE] = EngineeringConstants.of_stiffness(*axial.released(stiffness, errors))
+        condensed = axial.condense_axial_stress(stiffness, errors)
+        constants[FREE] = EngineeringConstants.of_stiffness(*condensed)
     return constants

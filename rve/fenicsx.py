@@ -20,10 +20,10 @@ from alphacut.rve.interruption import uninterrupted
 
 
 def require_real(scalar: type) -> None:
-    """Refuse a PETSc of complex numbers, whose matrices are not those of elasticity here.
+    """Refuse a PETSc that was built for complex numbers.
 
     Raises:
-        RefusedError: It is one.
+        RefusedError: The scalar type is complex.
     """
     if np.issubdtype(scalar, np.complexfloating):
         cure = "install DOLFINx with real numbers, such as python3-dolfinx-real"
@@ -73,30 +73,33 @@ def at_points(value: Any, points: Array) -> fem.Expression:
 
 
 def mesh_of(comm: MPI.Intracomm, cells: Rows, nodes: int, element: Any) -> dolfinx.mesh.Mesh:
-    """Mesh whose positions are all 0 yet; consecutive cells go to the same rank.
+    """DOLFINx mesh of given cells with all coordinates 0, to be set later.
 
     Args:
-        comm: Communicator.
-        cells: All cells by their nodes, in Basix's order.
+        comm: Communicator; rank r gets the r-th part of the consecutive cells.
+        cells: Nodes of all cells, in Basix's order, shape (cells, nodes of a cell).
         nodes: Number of nodes.
         element: Coordinate element.
     """
-    cells, places = (
-        np.array_split(rows, comm.size)[comm.rank]
-        for rows in (cells, np.zeros((nodes, element.reference_value_shape[0])))
+    coordinates = np.zeros((nodes, element.reference_value_shape[0]))
+    rank_cells, rank_coordinates = (
+        np.array_split(rows, comm.size)[comm.rank] for rows in (cells, coordinates)
     )
 
-    def stay(*_: Any) -> Any:
-        graph = dolfinx.graph.adjacencylist(np.full((len(cells), 1), comm.rank, np.int32))
-        return getattr(graph, "_cpp_object", graph)
+    def keep_on_rank(*_: Any) -> Any:
+        destinations = np.full((len(rank_cells), 1), comm.rank, np.int32)
+        graph = dolfinx.graph.adjacencylist(destinations)
+        return getattr(graph, "_cpp_object", graph)  # DOLFINx 0.9 has no Python class
 
-    options = {"partitioner": stay} if comm.size > 1 else {}
-    return dolfinx.mesh.create_mesh(comm, cells=cells, x=places, e=element, **options)
+    options = {"partitioner": keep_on_rank} if comm.size > 1 else {}
+    return dolfinx.mesh.create_mesh(
+        comm, cells=rank_cells, x=rank_coordinates, e=element, **options
+    )
 
 
 @contextmanager
 def log_on_standard_error() -> Iterator[None]:
-    """Let PETSc log the block, and print the log to standard error: what ``-log_view`` asks for."""
+    """Context in which PETSc logs its events; prints the log to standard error at its end."""
     PETSc.Log.begin()
     yield
     viewer = PETSc.Viewer().createASCII("stderr", comm=PETSc.COMM_WORLD)
@@ -118,7 +121,7 @@ def option_is_used(name: str) -> bool:
 
 
 def cholesky(matrix: PETSc.Mat, prefix: str) -> PETSc.KSP:
-    """A direct solver by the fastest library at hand; options under the prefix come before it."""
+    """Cholesky solver of a matrix by CHOLMOD, or MUMPS without it; PETSc options override that."""
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(prefix)

@@ -10,7 +10,6 @@ G_T and K_T are those of the result's average, G_L is the shear modulus along th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,48 +43,52 @@ class FibreConstants:
 
 
 def fibre_constants(result: HomogenisedStiffness) -> FibreConstants:
-    """Constants of a result that knows its cell, of round particles and isotropic phases.
+    """E_T, E_L, ν_LT, G_T, G_L and K_T of a result of round fibres, with declared errors.
+
+    Errors are the largest changes over the corners of the intervals of z̄, G_T and G_L.
 
     Raises:
-        RefusedError: It does not, or they are not.
+        RefusedError: The result has no cell, or not of round particles and two isotropic phases.
     """
     cell = result.cell
     if cell is None or not cell.square or cell.interphase is not None:
         raise RefusedError("cell", cell, "a result of round particles and two isotropic phases")
-    mixture, bulk, shear = Mixture.of_cell(cell), result.moduli[0] / 2, result.shear
-    across = float(result.error_of(result.shear_of)) / shear
-    along, error = _mean_longitudinal_shear(cell)
-    z, *ends = mixture.between(bulk, result.modulus_errors[0])
-    values = _constants(mixture, z, bulk, shear, along)
+    mixture, bulk = Mixture.of_cell(cell), result.moduli[0] / 2
+    G_T, (G_L, G_L_error) = result.shear, _mean_longitudinal_shear(cell)
+    G_T_error = float(result.error_of(result.shear_of)) / G_T
+    z, *z_bounds = mixture.z_from_bulk(bulk, result.modulus_errors[0])
+    values = _constants(mixture, z, bulk, G_T, G_L)
     corners = [
-        _constants(
-            mixture, end, mixture.bulk(end), shear * (1 + across) ** a, along * (1 + error) ** b
-        )
-        for end, a, b in product(ends, (-1, 1), (-1, 1))
+        _constants(mixture, z_bound, mixture.bulk(z_bound), transverse, longitudinal)
+        for z_bound in z_bounds
+        for transverse in (G_T / (1 + G_T_error), G_T * (1 + G_T_error))
+        for longitudinal in (G_L / (1 + G_L_error), G_L * (1 + G_L_error))
     ]
     errors = np.abs(np.array(corners) - values).max(axis=0) + _ROUND_OFF * np.abs(values)
-    named = (dict(zip(CONSTANTS, map(float, row), strict=True)) for row in (values, errors))
-    return FibreConstants(*named)
+    return FibreConstants(
+        dict(zip(CONSTANTS, map(float, values), strict=True)),
+        dict(zip(CONSTANTS, map(float, errors), strict=True)),
+    )
 
 
-def _constants(mixture: Mixture, z: float, bulk: float, shear: float, along: float) -> Array:
-    """Constants in the order of `CONSTANTS`, from z, K_T, G_T and G_L."""
-    lateral, axial = mixture.along(z)
-    ratio, young = lateral / (2 * bulk), axial - lateral**2 / bulk
-    across = 1 / (1 / (4 * shear) + 1 / (4 * bulk) + ratio**2 / young)
-    return np.array([across, young, ratio, shear, along, bulk])
+def _constants(mixture: Mixture, z: float, K_T: float, G_T: float, G_L: float) -> Array:
+    """E_T, E_L, ν_LT, G_T, G_L and K_T, shape (6,), from Hill's z̄ and the other moduli."""
+    lateral, axial = mixture.lateral_and_axial(z)
+    nu_LT, E_L = lateral / (2 * K_T), axial - lateral**2 / K_T
+    E_T = 1 / (1 / (4 * G_T) + 1 / (4 * K_T) + nu_LT**2 / E_L)
+    return np.array([E_T, E_L, nu_LT, G_T, G_L, K_T])
 
 
 def _mean_longitudinal_shear(cell: Cell) -> tuple[float, float]:
-    """Mean G_L under f_Θ in Pa, and its declared relative error."""
+    """Mean shear modulus G_L along the fibres over θ in Pa, and its declared relative error."""
     matrix, inclusion = cell.matrix, cell.inclusion
     assert isinstance(matrix, Phase)
     assert isinstance(inclusion, Phase)
 
     def mean(rule: ThetaRule) -> tuple[float, float]:
-        values, errors = longitudinal_shear(cell.radius(rule.nodes), matrix, inclusion)
+        values, relative_errors = longitudinal_shear(cell.radius(rule.nodes), matrix, inclusion)
         total = float(rule.weights @ values)
-        return total, float(rule.weights @ (values * errors)) / total
+        return total, float(rule.weights @ (values * relative_errors)) / total
 
     value, error = mean(gauss_rule(cell.radius.distribution, points=_FINE))
     coarser, _ = mean(gauss_rule(cell.radius.distribution, points=_COARSER))

@@ -13,15 +13,15 @@ STOP_SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasat
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C, and what stops as it does, back to the end of the block.
+    """Context that delays Ctrl-C to its end, and restores the signal handlers there.
 
-    PETSc loses what Python raises below it; basix and DOLFINx, while they are imported, abort, and
-    MPI takes signals for itself.
+    PETSc loses exceptions that Python raises below it; basix and DOLFINx abort while they are
+    imported, and MPI replaces handlers. Does nothing outside the main thread.
     """
     handler_before, received = signal.getsignal(signal.SIGINT), list[int]()
     stop_handlers = {number: signal.getsignal(number) for number in STOP_SIGNALS}
-    main = threading.current_thread() is threading.main_thread()
-    if not main or handler_before in (None, signal.SIG_DFL):
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    if not in_main_thread or handler_before in (None, signal.SIG_DFL):
         yield
         return
     signal.signal(signal.SIGINT, lambda number, _: received.append(number))

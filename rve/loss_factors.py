@@ -35,16 +35,16 @@ class LossFactors:
 
 
 def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
-    """Matrix (2, 2) from losses of Young's and of the bulk modulus to those of K and of G.
+    """Matrix (2, 2) from loss factors (η_E, η_K) of a phase to (η_K, η_G).
 
-    1/E = 1/(9 K) + 1/(3 G) loses the mean of both by energy.
+    1/E = 1/(9 K) + 1/(3 G) gives η_E/E = η_K/(9 K) + η_G/(3 G).
 
     Args:
         phase: The material.
-        has_bulk: Whether the bulk modulus has a loss of its own; else all moduli have that of E.
+        has_bulk: Whether η_K is given; else both factors are η_E.
 
     Raises:
-        RefusedError: It has one in a phase that is not isotropic.
+        RefusedError: η_K is given for a phase that is not isotropic.
     """
     if not has_bulk:
         return np.array([[1.0, 0.0], [1.0, 0.0]])
@@ -55,14 +55,14 @@ def bulk_and_shear_losses(phase: AnyPhase | None, has_bulk: bool) -> Array:
 
 
 def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
-    """Loss factors of E, G and K of a result that knows the energies of its phases.
+    """Effective loss factors of E, G and K with declared errors.
 
     They are of first order; where a phase has more than `MAX_FIRST_ORDER`, those of the plane
-    series are of complex moduli.
+    series are computed with complex moduli.
 
     Args:
-        result: Of any model.
-        losses: Of K and G of each phase, shape (phases, 2).
+        result: Of any model, with the energies of its phases.
+        losses: Loss factors of K and G of each phase, shape (phases, 2).
 
     Raises:
         RefusedError: The model was not asked for the energies.
@@ -70,12 +70,13 @@ def loss_factors(result: HomogenisedStiffness, losses: Array) -> LossFactors:
     if result.energies is None:
         raise RefusedError("energies", None, "a model with energies=True")
     values, errors = first_order(result.energies, losses, result.constants_of)
-    second_order = np.ptp(losses) ** 2 * values
+    second_order = np.ptp(losses) ** 2 * values  # zero where all losses are equal
     if losses.max() > MAX_FIRST_ORDER and _is_plane_series(result):
         values, second_order = _by_complex_moduli(result, losses), np.zeros(3)
     errors = errors + second_order + ROUND_OFF * abs(values)
     return LossFactors(
-        *(dict(zip(CONSTANTS, map(float, x), strict=True)) for x in (values, errors))
+        dict(zip(CONSTANTS, map(float, values), strict=True)),
+        dict(zip(CONSTANTS, map(float, errors), strict=True)),
     )
 
 
@@ -84,13 +85,14 @@ def _is_plane_series(result: HomogenisedStiffness) -> bool:
 
 
 def _by_complex_moduli(result: HomogenisedStiffness, losses: Array) -> Array:
-    """Loss factors of E, G, K of the series at complex moduli of the phases, shape (3,)."""
+    """Loss factors Im/Re of E, G, K by the series with complex K and G of the phases, (3,)."""
     cell, curve = result.cell, result.curve
     assert cell is not None
-    real = [phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)]
-    moduli = np.array(real) * (1 + 1j * losses)
+    elastic = [phase.bulk_and_shear for phase in cell.phases if isinstance(phase, Phase)]
+    bulk, shear = (np.array(elastic) * (1 + 1j * losses)).T  # complex, (phases,) each
     radii = cell.radius(curve.theta)
-    mean = curve.weights @ complex_moduli(radii, *moduli.T, harmonics=result.unknowns)[:, 0]
+    moduli = complex_moduli(radii, bulk, shear, harmonics=result.unknowns)[:, 0]
+    mean = curve.weights @ moduli
     young, poisson = result.constants_of(mean)
     constants = np.array([young, young / (2 * (1 + poisson)), mean[0]])
     return np.asarray(constants.imag / constants.real)

@@ -79,31 +79,37 @@ def extents(outline: Outline) -> tuple[float, float, float]:
     return wide, high, float(s.min())
 
 
-def require_fit(outline: Outline, radius: float, most: float = 1.0) -> None:
-    """Refuse a particle that reaches to `most` of half the cell's side.
+def require_fit(outline: Outline, radius: float, limit: float = 1.0) -> None:
+    """Refuse a particle with a coordinate of `limit` or more, in halves of the cell's side.
+
+    Args:
+        outline: Distance of the edge from the centre over the radius, at angles.
+        radius: In halves of the cell's side.
+        limit: 1 is the cell's edge.
 
     Raises:
-        RefusedError: It does, or its outline is no positive distance.
+        RefusedError: The particle is too large, or its outline is no positive periodic function.
     """
-    s = outline(_ANGLES)
-    if not (s > 0).all() or abs(s[0] - s[-1]) > 1e-9 * s[0]:
-        raise RefusedError("outline", s.min(), "positive distances of period 2π")
-    if not radius > 0 or radius * reach(outline) >= most:
-        allowed = f"values in (0, {most / reach(outline):.4g}), in halves of the cell's side"
+    distances = outline(_ANGLES)
+    is_periodic = abs(distances[0] - distances[-1]) <= 1e-9 * distances[0]
+    if not (distances > 0).all() or not is_periodic:
+        raise RefusedError("outline", distances.min(), "positive distances of period 2π")
+    if not radius > 0 or radius * reach(outline) >= limit:
+        allowed = f"values in (0, {limit / reach(outline):.4g}), in halves of the cell's side"
         raise RefusedError("radius", f"{radius:g}", allowed)
 
 
 def bend_radii(outline: Outline) -> tuple[Array, Array]:
-    """Points x(φ) of an outline of ρ = 1, (n, 2), and bend radii |x'|²/|x''| there, (n,).
+    """Points x(φ) of an outline of mean radius 1, (n, 2), and bend radii |x'|²/|x''|, (n,).
 
-    This is the radius of curvature (large where flat) where φ runs evenly along the outline, and
-    less elsewhere. Nodes are even in φ; on edges short against it they are nearly even in arc
-    length too.
+    Derivatives are in the polar angle φ. The bend radius is that of curvature where φ runs evenly
+    along the outline, and less elsewhere.
     """
-    angles: Array = np.asarray(np.arange(_BENDS) * (2 * np.pi / _BENDS), float)
+    step = 2 * np.pi / _BENDS
+    angles: Array = np.asarray(np.arange(_BENDS) * step, float)
     points = outline(angles)[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     before, after = np.roll(points, 1, axis=0), np.roll(points, -1, axis=0)
-    step = 2 * np.pi / _BENDS
     first = (after - before) / (2 * step)
     second = (after - 2 * points + before) / step**2
-    return points, np.asarray((first**2).sum(axis=1) / np.maximum(np.hypot(*second.T), 1e-12))
+    second_norm = np.maximum(np.hypot(*second.T), 1e-12)  # never 0, also where x'' vanishes
+    return points, np.asarray((first**2).sum(axis=1) / second_norm)

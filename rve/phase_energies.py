@@ -27,35 +27,44 @@ class PhaseEnergies:
     values: Array
     errors: Array
 
-    def shares(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
-        """∂ln c/∂ln X for c = E, G, K, shape (phases, 2, 3), and their declared errors.
+    def energy_fractions(self, constants_of: Callable[[Array], Array]) -> tuple[Array, Array]:
+        """Fractions ∂ln c/∂ln X of each phase's K and G in the energy of c = E, G, K.
 
         Args:
-            constants_of: E and ν from the three moduli.
+            constants_of: E and ν from C11 + C12, C11 − C12 and C33.
+
+        Returns:
+            The fractions, shape (phases, 2, 3), and their declared errors.
         """
         moduli = self.values.sum(axis=(0, 1))
 
         def logarithmic_slopes(change: Array) -> Array:
-            moved = moduli + 1j * STEP * change
-            young, poisson = constants_of(moved)
-            constants = np.array([young, young / (2 * (1 + poisson)), moved[0]])
+            """Relative change of E, G, K by a change of the three moduli, by a complex step."""
+            stepped = moduli + 1j * STEP * change
+            young, poisson = constants_of(stepped)
+            constants = np.array([young, young / (2 * (1 + poisson)), stepped[0]])
             return np.asarray(constants.imag / (STEP * constants.real))
 
-        shares = np.apply_along_axis(logarithmic_slopes, -1, self.values)
+        fractions = np.apply_along_axis(logarithmic_slopes, -1, self.values)
         unknown = np.isnan(moduli)
         slopes = abs(np.array([logarithmic_slopes(unit) for unit in np.eye(3)]))
         errors, parts = (np.where(unknown, 0, abs(x)) for x in (self.errors, self.values))
         # the slopes themselves are off by as much as the moduli are
         moduli_error = (errors.sum(axis=(0, 1)) / np.where(unknown, 1, moduli)).max()
-        return shares, np.asarray((errors + moduli_error * parts) @ slopes)
+        return fractions, np.asarray((errors + moduli_error * parts) @ slopes)
 
 
 def first_order(
     energies: PhaseEnergies, losses: Array, constants_of: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
-    """Loss factors of E, G, K to first order, and what they are off by the energies, (3,) each."""
-    shares, errors = energies.shares(constants_of)
-    # equal losses are those of the cell whatever the shares: they add up to 1
-    unequal = abs(losses - (losses.max() + losses.min()) / 2)
-    values, error = (np.tensordot(*pair) for pair in ((losses, shares), (unequal, errors)))
-    return values, error
+    """Loss factors of E, G, K to first order, and their errors by those of energies, (3,) each.
+
+    Args:
+        energies: Parts of the phases in the strain energy.
+        losses: Loss factors of K and G of each phase, shape (phases, 2).
+        constants_of: E and ν from C11 + C12, C11 − C12 and C33.
+    """
+    fractions, errors = energies.energy_fractions(constants_of)
+    # only differences of losses count in the error, since the fractions add up to 1
+    differences = abs(losses - (losses.max() + losses.min()) / 2)
+    return np.tensordot(losses, fractions), np.tensordot(differences, errors)

@@ -127,7 +127,7 @@ def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Ar
     def constants_of(moduli: Array) -> Array:
         return plane_constants(moduli, average)
 
-    shares, _ = energies.shares(constants_of)
+    shares, _ = energies.energy_fractions(constants_of)
     equal = np.array([bulk_and_shear_losses(None, False)] * len(shares))
     corners = cuts.corners(shares, equal)
     bounds = np.einsum("lecpx,pxc->lec", corners, shares)

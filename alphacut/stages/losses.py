@@ -67,7 +67,7 @@ class LossCuts:
 def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:
     """Bounds of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
     assert result.energies is not None
-    shares, _ = result.energies.shares(result.constants_of)
+    shares, _ = result.energies.energy_fractions(result.constants_of)
     # phases of a mesh, whose result knows no cell, have no bulk losses of their own
     phases = (None,) * len(cuts.has_bulk) if result.cell is None else result.cell.phases
     pairs = zip(phases, cuts.has_bulk, strict=True)

@@ -50,32 +50,38 @@ class StiffnessBounds:
         return low - slack, high + slack
 
     def young(self, average: str = AXES) -> Ends:
-        """Bounds of Young's modulus of an average, E = 3 G − G²/K, in Pa.
+        """Lower and upper bound of Young's modulus E = 3 G − G²/K of an average, in Pa.
 
-        E rises with K, and with G as far as G = 3/2 K.
+        E rises with K; it rises with G up to its maximum at G = 3/2 K and falls beyond.
         """
-        (softest, stiffest), (least, most) = self.shear(average), self.bulk
-        turn = float(np.clip(1.5 * most, softest, stiffest))
+        (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
         low = min(
-            _young(shear, least) - _young_rounding(shear, least) for shear in (softest, stiffest)
+            _young(shear, min_bulk) - _young_rounding(shear, min_bulk)
+            for shear in (min_shear, max_shear)
         )
-        return low, _young(turn, most) + _young_rounding(turn, most)
+        stiffest = float(np.clip(1.5 * max_bulk, min_shear, max_shear))  # G of the largest E
+        return low, _young(stiffest, max_bulk) + _young_rounding(stiffest, max_bulk)
 
     def poisson(self, average: str = AXES) -> Ends:
-        """Bounds of Poisson's ratio of an average, ν = (1 − G/K)/2."""
-        (softest, stiffest), (least, most) = self.shear(average), self.bulk
-        low, high = stiffest / least, softest / most
-        return (1 - low) / 2 - UNIT * (1 + low), (1 - high) / 2 + UNIT * (1 + high)
+        """Lower and upper bound of Poisson's ratio ν = (1 − G/K)/2 of an average."""
+        (min_shear, max_shear), (min_bulk, max_bulk) = self.shear(average), self.bulk
+        max_ratio, min_ratio = max_shear / min_bulk, min_shear / max_bulk
+        low = (1 - max_ratio) / 2 - UNIT * (1 + max_ratio)
+        return low, (1 - min_ratio) / 2 + UNIT * (1 + min_ratio)
 
     def constants(self) -> Array:
-        """Bounds of E_x, E_y (Pa), ν_xy and G_xy (Pa) in plane strain, shape (4, 2)."""
+        """Bounds of E_x, E_y (Pa), ν_xy and G_xy (Pa) in plane strain, shape (4, 2).
+
+        From bounds low ≤ S ≤ high of the compliance; `UNIT` is the rounding unit.
+        """
         low, high = inverse_below(self.upper), inverse_above(self.lower)
         slack = 4 * UNIT
         moduli = [(1 / high[k, k] * (1 - slack), 1 / low[k, k] * (1 + slack)) for k in range(3)]
-        # low ≤ S ≤ high bounds S12 about the middle by √(d11 d22)/2, d = high − low
-        middle = (low[0, 1] + high[0, 1]) / 2
-        reach = np.sqrt((high - low)[0, 0] * (high - low)[1, 1]) / 2 + slack * abs(high).max()
-        ratios = np.outer([-middle - reach, -middle + reach], [1 / high[0, 0], 1 / low[0, 0]])
+        # S12 differs from the middle of its bounds by at most √(d11 d22)/2 with d = high − low
+        middle, difference = (low[0, 1] + high[0, 1]) / 2, high - low
+        half_width = np.sqrt(difference[0, 0] * difference[1, 1]) / 2 + slack * abs(high).max()
+        cross_terms = [-middle - half_width, -middle + half_width]
+        ratios = np.outer(cross_terms, [1 / high[0, 0], 1 / low[0, 0]])  # ν = −S12/S11
         margin = slack * abs(ratios).max()
         poisson = (ratios.min() - margin, ratios.max() + margin)
         return np.array([*moduli[:2], poisson, moduli[2]])
@@ -99,7 +105,9 @@ def _young_rounding(shear: float, bulk: float) -> float:
 
 
 def inverse_below(matrix: Array) -> Array:
-    """Matrix below the inverse of every symmetric matrix up to the one passed, shape (…, 3, 3).
+    """Lower bound of the inverses of all symmetric matrices ≤ `matrix`, shape (…, 3, 3).
+
+    ≤ is the Loewner order.
 
     Raises:
         FailedError: The matrix is singular to rounding.
@@ -109,7 +117,9 @@ def inverse_below(matrix: Array) -> Array:
 
 
 def inverse_above(matrix: Array) -> Array:
-    """Matrix above the inverse of every symmetric matrix from the one passed on, as above.
+    """Upper bound of the inverses of all symmetric matrices ≥ `matrix`, shape (…, 3, 3).
+
+    ≥ is the Loewner order.
 
     Raises:
         FailedError: The matrix is singular to rounding.
@@ -119,7 +129,7 @@ def inverse_above(matrix: Array) -> Array:
 
 
 def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Computed inverse and a bound of the norm of its error.
+    """Computed symmetric inverse (…, n, n), and a bound of the norm of its error, (…, 1, 1).
 
     With X the computed inverse and R = I − X·matrix, the true one differs from X by at most
     ‖R‖‖X‖/(1 − ‖R‖), rounding of R included.
@@ -129,11 +139,12 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
     """
     inverse = np.linalg.inv(matrix)
     inverse = (inverse + np.swapaxes(inverse, -1, -2)) / 2
-    gap = residual_above(inverse, matrix).sum(axis=-1).max(axis=-1)
-    if not np.all(gap < 0.5):
+    residual_norm = residual_above(inverse, matrix).sum(axis=-1).max(axis=-1)
+    if not np.all(residual_norm < 0.5):
         what = "a bound of the compliance is singular to rounding"
         raise FailedError(what, "lower the contrast of the phases")
-    error = SAFETY * gap / (1 - gap) * np.abs(inverse).sum(axis=-1).max(axis=-1)
+    inverse_norm = np.abs(inverse).sum(axis=-1).max(axis=-1)
+    error = SAFETY * residual_norm / (1 - residual_norm) * inverse_norm
     return inverse, np.asarray(error[..., None, None])
 
 

@@ -73,65 +73,81 @@ class ImageModel:
     def cuts(
         self, images: Sequence[ModuliImages], crisp: tuple[ModuliImages, ImageSolution]
     ) -> list[ImageCut]:
-        """One cut for each pair of images, in their order; equal neighbours are solved once.
+        """Bounds of stiffness, E, ν and engineering constants at each α-level, nested.
 
         Args:
-            images: Least and greatest moduli, for rising α; the last ones are solved first.
-            crisp: A pair and its solution by the same model, the start.
+            images: Least and greatest moduli of each level, for rising α.
+            crisp: A pair of images and its solution by the same model, the first guess.
+
+        Returns:
+            One cut for each level, in the order of the images.
         """
-        before, solution = crisp
-        solutions = []
+        last_pair, solution = crisp
+        bounds = []  # for falling α, from the narrowest cut to the widest
         for pair in reversed(images):
-            if not pair.same(before):
-                before, solution = pair, self.solve(pair, solution)
-            solutions.append(solution)
-        moduli, ratios = (
-            nested([ends(solved.bounds, self.average) for solved in solutions])
-            for ends in (StiffnessBounds.young, StiffnessBounds.poisson)
-        )
-        ends = np.array([solved.bounds.constants() for solved in solutions])
-        constants = [np.minimum.accumulate(ends[..., 0]), np.maximum.accumulate(ends[..., 1])]
-        rows = zip(solutions, moduli, ratios, np.stack(constants, axis=-1), strict=True)
-        return [ImageCut(s.bounds, e, nu, c) for s, e, nu, c in rows][::-1]
+            if not pair.equals(last_pair):
+                last_pair, solution = pair, self.solve(pair, solution)
+            bounds.append(solution.bounds)
+        moduli = nested([level.young(self.average) for level in bounds])
+        ratios = nested([level.poisson(self.average) for level in bounds])
+        intervals = np.array([level.constants() for level in bounds])  # (levels, constants, 2)
+        lower = np.minimum.accumulate(intervals[..., 0])
+        upper = np.maximum.accumulate(intervals[..., 1])
+        constants = np.stack([lower, upper], axis=-1)
+        cuts = list(map(ImageCut, bounds, moduli, ratios, constants))
+        return cuts[::-1]
 
     def require_consistent(self, images: Sequence[ModuliImages], cuts: Sequence[ImageCut]) -> None:
-        """Refuse cuts that contradict bounds of images inside them, at another accuracy.
+        """Refuse cuts that contradict independent bounds of an image inside them.
 
-        These lie half way between the least and the greatest moduli of the narrowest and of the
-        widest cut, and are solved anew, from no start, with fields that lack `COARSER` times the
-        energy.
+        Two images with moduli in the middle of the narrowest and of the widest cut are solved
+        anew, with `COARSER` times the energy error and without a first guess.
+
+        Args:
+            images: Least and greatest moduli of each level, for rising α.
+            cuts: Proved bounds of each level.
 
         Raises:
-            FailedError: The proved interval of such an image lies outside the cut.
+            FailedError: The proved interval of such an image lies outside a cut that contains it.
         """
         solver = replace(self.solver, accuracy=min(COARSER * self.solver.accuracy, 0.1))
-        judge, points = replace(self, solver=solver), [images[-1].half_way, images[0].half_way]
-        for k, point in enumerate(points[: 1 if points[0].same(points[1]) else 2]):
-            bounds = judge.solve(point).bounds
-            for cut in cuts if k == 0 else cuts[:1]:  # the narrowest one lies in all
-                for name, end, (low, high) in (
-                    ("E", cut.modulus, bounds.young(self.average)),
-                    ("ν", cut.poisson, bounds.poisson(self.average)),
-                ):
-                    if not (low <= end[1] and end[0] <= high):
-                        what = f"{name} of an image inside a cut is {low:.9g} … {high:.9g}"
-                        what += f", the cut {end[0]:.9g} … {end[1]:.9g}"
-                        cure = "keep the case and report it"
-                        raise FailedError(f"the proof is wrong: {what}", cure)
+        coarse_model = replace(self, solver=solver)
+        narrowest, widest = images[-1].geometric_mean, images[0].geometric_mean
+        tests = [(narrowest, cuts)]  # it lies in every cut
+        if not narrowest.equals(widest):
+            tests.append((widest, cuts[:1]))
+        for image, containing_cuts in tests:
+            bounds = coarse_model.solve(image).bounds
+            young, poisson = bounds.young(self.average), bounds.poisson(self.average)
+            for cut in containing_cuts:
+                _require_overlap("E", young, cut.modulus)
+                _require_overlap("ν", poisson, cut.poisson)
+
+
+def _require_overlap(name: str, inside: Ends, cut: Ends) -> None:
+    """Refuse the interval of an image inside a cut if it has no point in common with the cut's.
+
+    Raises:
+        FailedError: The intervals are disjoint, so that one of the two proofs is wrong.
+    """
+    if not (inside[0] <= cut[1] and cut[0] <= inside[1]):
+        what = f"{name} of an image inside a cut is {inside[0]:.9g} … {inside[1]:.9g}"
+        what += f", the cut {cut[0]:.9g} … {cut[1]:.9g}"
+        raise FailedError(f"the proof is wrong: {what}", "keep the case and report it")
 
 
 def nested(intervals: Sequence[Ends]) -> list[Ends]:
-    """Intervals in the order of falling α, each widened to hold those before it."""
+    """Intervals in the order of falling α, each widened to contain those before it."""
     lows = np.minimum.accumulate([low for low, _ in intervals])
     highs = np.maximum.accumulate([high for _, high in intervals])
     return [(float(low), float(high)) for low, high in zip(lows, highs, strict=True)]
 
 
 def usual_division(images: ModuliImages) -> int:
-    """Parts of a pixel where nobody names them.
+    """Default number of elements along each side of a pixel, 1 or 2.
 
     Two where both moduli of an image stay within a factor `MILD`, so that few iterations are
     needed, and the image has up to `LARGE` pixels; else one.
     """
-    ratio = max(float(pair[1].max() / pair[0].min()) for pair in (images.bulk, images.shear))
-    return 2 if ratio <= MILD and images.bulk[0].size <= LARGE else 1
+    contrast = max(float(upper.max() / lower.min()) for lower, upper in (images.bulk, images.shear))
+    return 2 if contrast <= MILD and images.bulk[0].size <= LARGE else 1

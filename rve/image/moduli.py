@@ -10,7 +10,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 
 LEAST, GREATEST = 1e-60, 1e60  # Pa; products of four moduli must be numbers
-SOFTEST = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a fixed E
+NU_AT_LEAST_BULK = -0.25  # Poisson's ratio of the least plane-strain bulk modulus at a fixed E
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class PlaneModuli:
     shear: float
 
     def __post_init__(self) -> None:
+        """Refuse moduli outside (`LEAST`, `GREATEST`)."""
         for name, value in (("plane-strain bulk", self.bulk), ("shear", self.shear)):
             if not LEAST < value < GREATEST:
                 allowed = f"values in ({LEAST:g}, {GREATEST:g}) Pa"
@@ -64,12 +65,14 @@ class ModuliInterval:
 
     @classmethod
     def of_young(cls, modulus: tuple[float, float], poisson: tuple[float, float]) -> ModuliInterval:
-        """Enclosure of all E and ν in intervals; with ν the shear modulus falls."""
-        (soft, stiff), (low, high) = modulus, poisson
-        least = min(max(low, SOFTEST), high)  # where E / (2 (1 + ν) (1 − 2 ν)) is least in ν
-        bulks = [PlaneModuli.of_young(stiff, nu).bulk for nu in poisson]
-        lower = PlaneModuli(
-            PlaneModuli.of_young(soft, least).bulk, PlaneModuli.of_young(soft, high).shear
-        )
-        upper = PlaneModuli(max(bulks), PlaneModuli.of_young(stiff, low).shear)
-        return cls(lower, upper)
+        """Least and greatest plane bulk and shear modulus over intervals of E (Pa) and of ν.
+
+        The bulk modulus E/(2 (1 + ν) (1 − 2 ν)) is convex in ν; the shear modulus decreases.
+        """
+        (young_low, young_high), (nu_low, nu_high) = modulus, poisson
+        nu_softest = min(max(nu_low, NU_AT_LEAST_BULK), nu_high)
+        least_bulk = PlaneModuli.of_young(young_low, nu_softest).bulk
+        least_shear = PlaneModuli.of_young(young_low, nu_high).shear
+        greatest_bulk = max(PlaneModuli.of_young(young_high, nu).bulk for nu in poisson)
+        greatest_shear = PlaneModuli.of_young(young_high, nu_low).shear
+        return cls(PlaneModuli(least_bulk, least_shear), PlaneModuli(greatest_bulk, greatest_shear))

@@ -17,44 +17,54 @@ from alphacut.rve.phase_energies import PhaseEnergies
 def phase_energies(
     solution: ImageSolution, images: ModuliImages, phase: Rows, *, count: int, aspect: float = 1.0
 ) -> PhaseEnergies:
-    """Parts of K and G of each phase in the three moduli, of which nothing is proved.
+    """Estimated parts of K and G of each phase in C11 + C12, C11 − C12 and C33.
 
-    Strains and stresses are two approximations: the mean of both, whose distance is the error. The
-    parts of either add up to the work of its loads to rounding.
+    They are the mean of the values by displacements and by stresses, whose distance is the declared
+    error; nothing is proved.
 
     Args:
-        solution: Of one image.
-        images: Its moduli; the least are the greatest.
+        solution: Fields of one image.
+        images: Its moduli, the least equal to the greatest.
         phase: Number of the phase of each pixel, shape (rows, columns).
         count: Number of phases.
         aspect: Height of a pixel over its width.
     """
-    by_strain = energy_parts(displacement_element(aspect), solution.upper, images, phase, count)
-    by_stress = energy_parts(airy_element(aspect), solution.lower, images, phase, count)
-    # the compliance S = C⁻¹ has ∂S = −S ∂C S
-    stiffness = np.linalg.inv(by_stress.sum(axis=(0, 1)))
-    moduli = [square_moduli(x) for x in (by_strain, stiffness @ by_stress @ stiffness)]
-    return PhaseEnergies((moduli[0] + moduli[1]) / 2, abs(moduli[0] - moduli[1]))
+    strain_energies = energy_parts(
+        displacement_element(aspect), solution.upper, images, phase, count
+    )
+    stress_energies = energy_parts(airy_element(aspect), solution.lower, images, phase, count)
+    # parts of the compliance S = C⁻¹ become parts of C by ∂S = −S ∂C S
+    stiffness = np.linalg.inv(stress_energies.sum(axis=(0, 1)))
+    by_strain = square_moduli(strain_energies)
+    by_stress = square_moduli(stiffness @ stress_energies @ stiffness)
+    return PhaseEnergies((by_strain + by_stress) / 2, abs(by_strain - by_stress))
 
 
 def energy_parts(
     element: Element, side: SideSolution, images: ModuliImages, phase: Rows, count: int
 ) -> Array:
-    """Energies of unit strains or stresses by K and G of each phase, shape (count, 2, 3, 3)."""
-    bulk, shear = images.bulk[0], images.shear[0]
-    division = np.ones((side.fields.shape[-2] // len(phase),) * 2)
+    """Energies of the unit loads in the K and the G of each phase, shape (count, 2, 3, 3).
+
+    Args:
+        element: Of displacements or of stresses.
+        side: Fields of this element.
+        images: Moduli of the pixels, the least equal to the greatest.
+        phase: Number of the phase of each pixel, shape (rows, columns).
+        count: Number of phases.
+    """
+    bulk, shear = images.bulk[0], images.shear[0]  # bulk is K + G/3, the modulus of the trace
+    divisions = side.fields.shape[-2] // len(phase)
     trace, deviator = coefficients(element, bulk, shear)
-    of_shear = shear / (3 * bulk)  # of K + G/3, the modulus of the trace
-    traces, deviators = element.parts
-    weights = [
-        (rows, np.kron(weight * (phase == k), division))
-        for k in range(count)
+    shear_fraction = shear / (3 * bulk)  # G/3 over K + G/3
+    trace_rows, deviator_rows = element.parts
+    weights = []
+    for k in range(count):
         for rows, weight in (
-            (traces, trace * (1 - of_shear)),
-            (traces, trace * of_shear),
-            (deviators, deviator),
-        )
-    ]
+            (trace_rows, trace * (1 - shear_fraction)),
+            (trace_rows, trace * shear_fraction),
+            (deviator_rows, deviator),
+        ):
+            weights.append((rows, np.kron(weight * (phase == k), np.ones((divisions, divisions)))))
     values = energies(element, side.fields, element.mean_modes(UNIT_LOADS), weights).value
-    by_bulk, mixed, by_deviator = np.moveaxis(values.reshape(count, 3, 3, 3), 1, 0)
-    return np.stack([by_bulk, mixed + by_deviator], axis=1)
+    by_bulk, trace_by_shear, by_deviator = np.moveaxis(values.reshape(count, 3, 3, 3), 1, 0)
+    return np.stack([by_bulk, trace_by_shear + by_deviator], axis=1)

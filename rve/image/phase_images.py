@@ -29,41 +29,48 @@ class ModuliImages:
     shear: tuple[Array, Array]
 
     @property
-    def half_way(self) -> ModuliImages:
-        """One image between both: the geometric means of the moduli."""
+    def geometric_mean(self) -> ModuliImages:
+        """Image of the geometric means of the least and the greatest moduli."""
         bulk, shear = (np.sqrt(low * high) for low, high in (self.bulk, self.shear))
         return ModuliImages((bulk, bulk), (shear, shear))
 
-    def same(self, images: ModuliImages) -> bool:
+    def equals(self, images: ModuliImages) -> bool:
         """True if both are the same moduli everywhere."""
         pairs = zip((*self.bulk, *self.shear), (*images.bulk, *images.shear), strict=True)
         return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def threshold_ranges(grey: Array, thresholds: Sequence[tuple[float, float]]) -> tuple[Rows, Rows]:
-    """Least and greatest number of each pixel's phase.
+    """Least and greatest number of the phase that each pixel may be of, (rows, columns) each.
 
     Args:
         grey: Grey values, shape (rows, columns).
         thresholds: Least and greatest value of each threshold, rising; a pixel is of phase k if k
             thresholds are ≤ its grey value.
     """
-    first, last = (
-        np.searchsorted(np.array([t[end] for t in thresholds]), grey, side="right")
-        for end in (1, 0)
-    )
+    least, greatest = np.array(thresholds).reshape(-1, 2).T
+    first = np.searchsorted(greatest, grey, side="right")
+    last = np.searchsorted(least, grey, side="right")
     return first, last
 
 
 def moduli_images(first: Rows, last: Rows, phases: Sequence[ModuliInterval]) -> ModuliImages:
-    """Least and greatest moduli of pixels of the phases `first` … `last`."""
-    pairs = np.unique(first * len(phases) + last)
-    tables = np.zeros((4, len(phases), len(phases)))
-    for a, b in (divmod(int(pair), len(phases)) for pair in pairs):
-        bulks = [(p.lower.bulk, p.upper.bulk) for p in phases[a : b + 1]]
-        shears = [(p.lower.shear, p.upper.shear) for p in phases[a : b + 1]]
-        least = np.min([bulks, shears], axis=1)[:, 0]
-        greatest = np.max([bulks, shears], axis=1)[:, 1]
-        tables[:, a, b] = least[0], greatest[0], least[1], greatest[1]
+    """Least and greatest moduli of each pixel over the phases `first` … `last` it may be of.
+
+    Args:
+        first: Least number of each pixel's phase, shape (rows, columns).
+        last: Greatest number, same shape.
+        phases: Moduli of each phase.
+    """
+    tables = np.zeros((4, len(phases), len(phases)))  # by first and last
+    for code in np.unique(first * len(phases) + last):
+        a, b = divmod(int(code), len(phases))
+        candidates = phases[a : b + 1]
+        tables[:, a, b] = (
+            min(phase.lower.bulk for phase in candidates),
+            max(phase.upper.bulk for phase in candidates),
+            min(phase.lower.shear for phase in candidates),
+            max(phase.upper.shear for phase in candidates),
+        )
     images = [table[first, last] for table in tables]
-    return ModuliImages((images[0], images[1]), (images[2], images[3]))
+    return ModuliImages(bulk=(images[0], images[1]), shear=(images[2], images[3]))

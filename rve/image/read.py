@@ -16,7 +16,7 @@ BYTES_PER_PIXEL = 2500  # of both sides together, measured at 1024 × 1024
 
 
 def read_grey(path: Path, *, square: bool = True) -> Array:
-    """Grey values of an image, shape (rows, columns), row 0 at the bottom.
+    """Read the grey values of an image file, shape (rows, columns), row 0 at the bottom.
 
     Args:
         path: A file ``.png``, ``.tif`` … or ``.npy``.
@@ -47,7 +47,12 @@ def _array(path: Path) -> Array:
 
 
 def _picture(path: Path, square: bool) -> Array:
-    """Pixels of one page of grey values, read where they fit into memory."""
+    """Read the pixels of an image file with one page of grey values, top row first.
+
+    Raises:
+        RefusedError: It has colours or several pages, pixels that are not square although `square`
+            is set, or more pixels than memory.
+    """
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # the memory is checked here, before the pixels are read
@@ -56,45 +61,46 @@ def _picture(path: Path, square: bool) -> Array:
         if mode not in PLANE_MODES or frames > 1:
             what = f"of mode {mode} with {frames} pages"
             raise RefusedError(path.name, what, "one page of grey values", "save the one meant")
-        across, up = picture.info.get("dpi", (1, 1))
-        if square and abs(float(across) / float(up) - 1) > 0.01:
-            what = f"of pixels {float(across):g} by {float(up):g} per inch"
+        dpi_x, dpi_y = map(float, picture.info.get("dpi", (1, 1)))
+        if square and abs(dpi_x / dpi_y - 1) > 0.01:
+            what = f"of pixels {dpi_x:g} by {dpi_y:g} per inch"
             raise RefusedError(path.name, what, "square ones", "give cell.pixel = [width, height]")
         require_memory(picture.height, picture.width)
         return np.asarray(picture)
 
 
 def require_memory(rows: int, columns: int) -> None:
-    """Refuses an image whose solution cannot fit into this machine's memory.
+    """Refuse an image whose solution needs more memory than this machine has.
 
     Raises:
         RefusedError: It says how much is needed, and how large a piece would fit.
     """
-    have = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     needed = BYTES_PER_PIXEL * rows * columns
-    if needed > have:
-        side = int((have / BYTES_PER_PIXEL) ** 0.5)
+    if needed > available:
+        side = int((available / BYTES_PER_PIXEL) ** 0.5)
         what = f"{rows} × {columns} pixels, about {needed / 1e9:.0f} GB"
-        allowed = f"up to {have / 1e9:.0f} GB of memory"
+        allowed = f"up to {available / 1e9:.0f} GB of memory"
         raise RefusedError("image", what, allowed, f"crop a piece of {side} × {side} pixels")
 
 
 def require_phases(grey: Array, thresholds: tuple[tuple[float, float], ...]) -> None:
-    """Refuses thresholds that leave a phase without a pixel, whatever their value in the interval.
+    """Refuse thresholds that may leave a phase without a pixel.
 
     Args:
         grey: Grey values, shape (rows, columns).
-        thresholds: Least and greatest value of each.
+        thresholds: Least and greatest value of each fuzzy threshold, rising.
 
     Raises:
-        RefusedError: A threshold lies outside the grey values, or a phase is empty.
+        RefusedError: A threshold lies outside the grey values, or a phase between two thresholds
+            may be empty.
     """
     low, high = float(grey.min()), float(grey.max())
     for least, greatest in thresholds:
         if not (low < least and greatest <= high):
             span = f"{least:g}" if least == greatest else f"[{least:g}, {greatest:g}]"
             raise RefusedError("threshold", span, f"grey values of the image, {low:g} to {high:g}")
-    for (_, before), (after, _) in pairwise(thresholds):
-        if not ((grey >= before) & (grey < after)).any():
-            what = f"{before:g} and {after:g}"
+    for (_, lower), (upper, _) in pairwise(thresholds):  # of the pixels surely between both
+        if not ((grey >= lower) & (grey < upper)).any():
+            what = f"{lower:g} and {upper:g}"
             raise RefusedError("threshold", what, "rising values with pixels between them")

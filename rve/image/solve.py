@@ -9,7 +9,7 @@ from threading import Event
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.bounds import StiffnessBounds, inverse_below
 from alphacut.rve.image.fields.conjugate_gradient import ConjugateGradient
-from alphacut.rve.image.fields.element import airy_element, displacement_element
+from alphacut.rve.image.fields.element import Element, airy_element, displacement_element
 from alphacut.rve.image.fields.side import SideSolution, solve_side
 from alphacut.rve.image.phase_images import ModuliImages
 
@@ -37,10 +37,15 @@ def solve_image(
     solver: ConjugateGradient | None = None,
     division: int = 1,
 ) -> ImageSolution:
-    """Proved bounds of the effective stiffness of the periodic image, as by `solve_between`.
+    """Proved bounds of the effective stiffness of a periodic image, with their fields.
 
-    The plane-strain bulk modulus K + G/3 and the shear modulus of each pixel have the shape (rows,
-    columns) and are in Pa; row 0 is at the bottom, y rises with rows.
+    Args:
+        bulk: Plane-strain bulk modulus K + G/3 of each pixel, shape (rows, columns), in Pa; row 0
+            is at the bottom.
+        shear: Shear modulus G, same shape, in Pa.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+        division: Elements along each side of a pixel.
     """
     images = ModuliImages((bulk, bulk), (shear, shear))
     return solve_between(images, aspect=aspect, solver=solver, division=division)
@@ -54,37 +59,47 @@ def solve_between(
     division: int = 1,
     start: ImageSolution | None = None,
 ) -> ImageSolution:
-    """Proved bounds of the stiffness of every image between two, one side on a thread each.
+    """Proved bounds of the stiffness of all images with moduli between the least and greatest.
 
-    The aspect is the height of a pixel over its width, the division the number of parts along each
-    side of a pixel. `start` is a result of as many parts, whose fields are the first guess.
+    The lower bound is that of stresses with the least moduli, the upper one that of displacements
+    with the greatest; each is computed on a thread.
+
+    Args:
+        images: Least and greatest moduli of each pixel.
+        aspect: Height of a pixel over its width.
+        solver: Stopping rule.
+        division: Elements along each side of a pixel.
+        start: Solution of the same division, whose fields are the first guess.
     """
-    rule, stopped = solver or ConjugateGradient(), Event()
+    rule, is_stopped = solver or ConjugateGradient(), Event()
 
-    def watch() -> None:
-        if stopped.is_set():
+    def raise_if_stopped() -> None:
+        """Called before each iteration; ends this thread where the other one has ended."""
+        if is_stopped.is_set():
             raise InterruptedError("the other side's solution was stopped")
         try:
             rule.watch()
         except BaseException:
-            stopped.set()
+            is_stopped.set()
             raise
 
-    def solved(end: int) -> SideSolution:
-        guess = None if start is None else (start.lower, start.upper)[end].fields
+    def solve(element: Element, end: int, guess: SideSolution | None) -> SideSolution:
+        """Fields of least energy with the least (end 0) or greatest (end 1) moduli."""
         return solve_side(
-            (airy_element, displacement_element)[end](aspect),
+            element,
             images.bulk[end],
             images.shear[end],
-            solver=replace(rule, watch=watch),
+            solver=replace(rule, watch=raise_if_stopped),
             division=division,
-            start=guess,
+            start=None if guess is None else guess.fields,
         )
 
+    stresses, displacements = airy_element(aspect), displacement_element(aspect)
+    guesses = (None, None) if start is None else (start.lower, start.upper)
     with ThreadPoolExecutor(2) as pool:
         try:
-            lower, upper = pool.map(solved, (0, 1))
+            lower, upper = pool.map(solve, (stresses, displacements), (0, 1), guesses)
         finally:  # Ctrl-C and errors are not to wait for the other side
-            stopped.set()
+            is_stopped.set()
     bounds = StiffnessBounds(inverse_below(lower.energy.upper), upper.energy.upper)
     return ImageSolution(bounds, upper, lower)

@@ -13,7 +13,7 @@ from typing import ClassVar
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.cell import Cell, Phase
-from alphacut.rve.certificate import certified
+from alphacut.rve.certificate import with_checks
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.energies import mean_energies
 from alphacut.rve.series.means import Mean, settled_means
@@ -90,7 +90,7 @@ class SeriesModel:
 
     def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedStiffness:
         """The certified result of one inclusion."""
-        return certified(
+        return with_checks(
             HomogenisedStiffness(
                 curve=mean.curve,
                 method=self.name,

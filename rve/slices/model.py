@@ -26,7 +26,7 @@ from alphacut.rve.cell import (
     square_moduli,
     thickness_of,
 )
-from alphacut.rve.certificate import certified
+from alphacut.rve.certificate import with_checks
 from alphacut.rve.outline import Outline, circle, is_round
 from alphacut.rve.phase_energies import PhaseEnergies
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
@@ -147,7 +147,7 @@ class SlicesModel:
                 },
                 cell=cell,
             )
-            results.append(certified(result))
+            results.append(with_checks(result))
         if not self.energies:
             return results
         pairs = [energies_with_errors(plane.energies, self.order) for plane in slices]

@@ -53,11 +53,11 @@ def volume_fraction(radius: Array) -> Array:
     return np.asarray(VOLUME_OF_UNIT_SPHERE * np.asarray(radius) ** 3)
 
 
-def certified_spheres(result: HomogenisedSpheres) -> HomogenisedSpheres:
-    """Result with its checks: symmetry, Voigt, Reuss, Hashin–Shtrikman.
+def spheres_with_checks(result: HomogenisedSpheres) -> HomogenisedSpheres:
+    """Copy of a result with the relative violations of symmetry and bounds as its checks.
 
     Raises:
-        CertificateError: One is violated by more than the declared error.
+        CertificateError: A violation exceeds the declared error of the result.
     """
     cell = result.cell
     assert cell is not None
@@ -65,14 +65,14 @@ def certified_spheres(result: HomogenisedSpheres) -> HomogenisedSpheres:
     assert isinstance(matrix, Phase)
     assert isinstance(inclusion, Phase)
     fraction = volume_fraction(cell.radius(result.curve.theta))
-    pair = space_stiffness(matrix), space_stiffness(inclusion)
+    stiffness = space_stiffness(matrix), space_stiffness(inclusion)
     weights, bulk = result.curve.weights, result.moduli[0]
     fractions = np.stack([1 - fraction, fraction])
-    low, high = (mean(weights, bound(fractions, pair)) for bound in (reuss, voigt))
-    least, greatest = hashin_shtrikman(fraction, matrix, inclusion)[0] @ weights
-    checks = {
-        **order_checks(np.asarray(result.stiffness), low, high),
-        "hashin_shtrikman": float(max(0.0, least - bulk, bulk - greatest) / bulk),
-    }
+    reuss_mean, voigt_mean = (
+        mean(weights, bound(fractions, stiffness)) for bound in (reuss, voigt)
+    )
+    low, high = hashin_shtrikman(fraction, matrix, inclusion)[0] @ weights
+    checks = order_checks(np.asarray(result.stiffness), reuss_mean, voigt_mean)
+    checks["hashin_shtrikman"] = float(max(0.0, low - bulk, bulk - high) / bulk)
     checks = require(checks, discretisation=ROUND_OFF + result.largest_error)
     return replace(result, checks=checks)

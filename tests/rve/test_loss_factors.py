@@ -28,7 +28,9 @@ def solved(model, matrix=MATRIX, particle=PARTICLE):
 def test_the_shares_of_the_paper_s_cell_are_those_of_differences_of_its_modulus():
     result = SeriesModel(energies=True).solve(RADIUS, MATRIX, [Phase(80e9, 0.3)])[0]
     of_phases = [
-        result.averaged(x).energies.shares(result.averaged(x).constants_of)[0][..., 0].sum(1)
+        result.averaged(x)
+        .energies.energy_fractions(result.averaged(x).constants_of)[0][..., 0]
+        .sum(1)
         for x in ("axes", "isotropic")
     ]
     assert np.allclose(of_phases, [[0.90141, 0.09859], [0.87617, 0.12383]], atol=1e-5)

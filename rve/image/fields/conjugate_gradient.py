@@ -73,34 +73,38 @@ class ConjugateGradient:
     watch: Callable[[], None] = field(default=lambda: None, compare=False, repr=False, kw_only=True)
 
     def solve(self, system: System) -> tuple[Array, int]:
-        """Fields that lack no more than the accuracy says, and the iterations.
+        """Solve for all loads by preconditioned conjugate gradients.
+
+        Returns:
+            Fields whose energy error is within the accuracy, and the number of iterations.
 
         Raises:
             FailedError: `LIMIT` iterations are not enough.
         """
-        fields, residual = system.begin()
-        direction = system.preconditioner.apply(residual)
-        product = inner(residual, direction)
-        reach = np.full(product.shape, 1 / system.least)  # energy lacking over product, at most
+        x, r = system.begin()
+        p = system.preconditioner.apply(r)
+        gamma = inner(r, p)  # residual · preconditioned residual
+        # energy error ≤ error_factor · gamma, by the lower bound of the spectrum
+        error_factor = np.full(gamma.shape, 1 / system.least)
         allowed = self.accuracy * system.scale
         for number in range(LIMIT):
             self.watch()
-            if np.all(reach * product <= allowed):
-                LOG.debug("fields on %s points: %d iterations", fields.shape[2:], number)
-                return fields, number
-            image = system.operator.apply(direction)
-            length = _ratio(product, inner(direction, image))
-            fields += _per_load(length) * direction
-            residual -= _per_load(length) * image
-            image = system.preconditioner.apply(residual)
-            product, before = inner(residual, image), product
-            change = _ratio(product, before)
-            reach = _radau(reach - length, change, system.least)
-            direction *= _per_load(change)
-            direction += image
-        lacking = float((reach * product / system.scale).max())
+            if np.all(error_factor * gamma <= allowed):
+                LOG.debug("fields on %s points: %d iterations", x.shape[2:], number)
+                return x, number
+            Ap = system.operator.apply(p)
+            alpha = _ratio(gamma, inner(p, Ap))
+            x += _per_load(alpha) * p
+            r -= _per_load(alpha) * Ap
+            z = system.preconditioner.apply(r)
+            last_gamma, gamma = gamma, inner(r, z)
+            beta = _ratio(gamma, last_gamma)
+            error_factor = _radau(error_factor - alpha, beta, system.least)
+            p *= _per_load(beta)
+            p += z
+        energy_error = float((error_factor * gamma / system.scale).max())
         raise FailedError(
-            f"the image's fields lack up to {lacking:.1e} of the energy after {LIMIT}"
+            f"the image's fields lack up to {energy_error:.1e} of the energy after {LIMIT}"
             f" iterations, {self.accuracy:.1e} is allowed",
             "lower the contrast of the phases or allow more",
         )
@@ -113,12 +117,15 @@ def inner(first: Array, second: Array) -> Array:
     return np.asarray(np.einsum("bn,bn->b", *pairs))
 
 
-def _radau(excess: Array, change: Array, least: float) -> Array:
-    """Next energy lacking over product, at most, from the last less the length of the step.
+def _radau(excess: Array, beta: Array, least: float) -> Array:
+    """Next factor of the energy error's bound by the Gauss–Radau rule (Meurant, Tichý 2013).
 
-    Without rounding the excess is positive, and the result up to 1/least.
+    Args:
+        excess: Last factor minus the step length α, positive but for rounding.
+        beta: Ratio of the last two residual products.
+        least: Lower bound of the spectrum; 1/least is the factor without the rule.
     """
-    sharper = _ratio(excess, least * excess + change)
+    sharper = _ratio(excess, least * excess + beta)
     return np.where(excess > 0, sharper, 1 / least)
 
 

@@ -67,43 +67,53 @@ class Element:
 
 @cache
 def displacement_element(aspect: float = 1.0) -> Element:
-    """Q2 displacement on a pixel `aspect` times as high as wide."""
+    """Q2 displacement element on a pixel whose height is `aspect` times its width."""
     basis = ((1, -3, 2), (0, 4, -4), (0, -1, 2))  # at 0, 1/2, 1
-    value, slope, _ = _tables(basis)
-    places = list(product(range(2), range(3), range(3)))  # component, y, x
-    along_x, along_y = np.kron(value, slope), np.kron(slope, value) / aspect
-    modes, constants = _stacked(
-        np.hstack([along_x, along_y]), np.hstack([along_x, -along_y]), np.hstack([along_y, along_x])
+    value, slope, _ = _derivative_modes(basis)
+    nodes = list(product(range(2), range(3), range(3)))  # component, y, x
+    d_dx, d_dy = np.kron(value, slope), np.kron(slope, value) / aspect
+    modes, constants = _stack_modes(
+        trace=np.hstack([d_dx, d_dy]),
+        difference=np.hstack([d_dx, -d_dy]),
+        twice_shear=np.hstack([d_dy, d_dx]),
     )
     return Element(
         unknowns=8,
-        local=tuple((4 * c + 2 * (y % 2) + x % 2, y // 2, x // 2) for c, y, x in places),
+        local=tuple((4 * c + 2 * (y % 2) + x % 2, y // 2, x // 2) for c, y, x in nodes),
         modes=modes,
         bulk_rows=constants[1],
         constants=constants,
         twice_shear=1.0,
-        anchors=tuple((9 * c,) for c, _, _ in places),
+        anchors=tuple((9 * c,) for c, _, _ in nodes),  # the lower left node moves rigidly
         stress=False,
     )
 
 
 @cache
 def airy_element(aspect: float = 1.0) -> Element:
-    """Bicubic Airy function on a pixel `aspect` times as high as wide; slopes are per pixel."""
+    """Bicubic stress element of an Airy function φ on a pixel of height `aspect` times its width.
+
+    Unknowns are φ and its slopes per pixel at the corners.
+    """
     # value and slope at 0, value and slope at 1
     basis = ((1, 0, -3, 2), (0, 1, -2, 1), (0, 0, 3, -2), (0, 0, -1, 1))
-    value, slope, bend = _tables(basis)
-    nodes = list(product(range(2), repeat=4))  # y, slope in y, x, slope in x
-    first, second = np.kron(bend, value) / aspect**2, np.kron(value, bend)
-    mixed = np.asarray(-2 * np.kron(slope, slope) / aspect)
-    modes, constants = _stacked(first + second, first - second, mixed)
-    origin, slope_y, slope_x = nodes.index((0, 0, 0, 0)), nodes.index((0, 1, 0, 0)), 1
+    value, slope, curvature = _derivative_modes(basis)
+    nodes = list(product(range(2), repeat=4))  # y, whether slope in y, x, whether slope in x
+    stress_11, stress_22 = np.kron(curvature, value) / aspect**2, np.kron(value, curvature)
+    modes, constants = _stack_modes(
+        trace=stress_11 + stress_22,
+        difference=stress_11 - stress_22,
+        twice_shear=np.asarray(-2 * np.kron(slope, slope) / aspect),
+    )
+    origin, slope_y, slope_x = (nodes.index(n) for n in ((0, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 
-    def anchors(y: int, dy: int, x: int, dx: int) -> tuple[int, ...]:
-        """Value and slopes at the origin, of which a linear function is made."""
+    def anchors(y: int, dy: int, x: int, dx: int) -> list[int]:
+        """Unknowns at the origin that make up the linear function, free of stress, at a node."""
+        if dy and dx:
+            return []
         if dy or dx:
-            return (slope_y,) * (dy > dx) + (slope_x,) * (dx > dy)
-        return (origin,) + (slope_y,) * y + (slope_x,) * x
+            return [slope_y if dy else slope_x]
+        return [origin] + [slope_y] * y + [slope_x] * x
 
     return Element(
         unknowns=4,
@@ -112,24 +122,30 @@ def airy_element(aspect: float = 1.0) -> Element:
         bulk_rows=constants[1],
         constants=constants,
         twice_shear=2.0,
-        anchors=tuple(anchors(*node) for node in nodes),
+        anchors=tuple(tuple(anchors(*node)) for node in nodes),
         stress=True,
     )
 
 
-def _tables(basis: Basis) -> list[Array]:
-    """Orthonormal modes of derivatives 0, 1, 2 of basis functions, each (modes, functions).
+def _derivative_modes(basis: Basis) -> list[Array]:
+    """Coefficients of basis functions and their derivatives in orthonormal Legendre polynomials.
 
-    The integrals are rational and exact; each entry is rounded twice, and what is zero is zero.
+    The integrals are exact fractions, so that zeros are exact.
+
+    Args:
+        basis: Polynomial coefficients of each function on [0, 1].
+
+    Returns:
+        For the derivatives of order 0, 1 and 2, a matrix of shape (polynomials, functions).
     """
-    functions, tables = list(basis), []
+    functions, matrices = list(basis), []
     count = len(basis[0])
+    norms = np.sqrt(2 * np.arange(float(count)) + 1)
     for _ in range(3):
         exact = [[_integral(polynomial, f) for f in functions] for polynomial in LEGENDRE[:count]]
-        scale = np.sqrt(2 * np.arange(float(count)) + 1)
-        tables.append(np.array(exact, dtype=float) * scale[:, None])
+        matrices.append(np.array(exact, dtype=float) * norms[:, None])
         functions = [tuple(n * c for n, c in enumerate(f))[1:] for f in functions]
-    return tables
+    return matrices
 
 
 def _integral(first: tuple[int, ...], second: tuple[int, ...]) -> Fraction:
@@ -138,8 +154,11 @@ def _integral(first: tuple[int, ...], second: tuple[int, ...]) -> Fraction:
     return sum((Fraction(a * b, i + j + 1) for (i, a), (j, b) in pairs), Fraction(0))
 
 
-def _stacked(*parts: Array) -> tuple[Array, tuple[int, int, int]]:
-    """Modes of trace, difference and shear without rows that vanish, and the first row of each."""
+def _stack_modes(
+    trace: Array, difference: Array, twice_shear: Array
+) -> tuple[Array, tuple[int, int, int]]:
+    """Stack modes of trace, difference and shear without zero rows; and the first row of each."""
+    parts = trace, difference, twice_shear
     nonzero_rows = [part[np.abs(part).max(axis=1) > 0] for part in parts]
     first, second = len(nonzero_rows[0]), len(nonzero_rows[0]) + len(nonzero_rows[1])
     return np.ascontiguousarray(np.vstack(nonzero_rows)), (0, first, second)

@@ -15,7 +15,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.image.fields.element import Element
-from alphacut.rve.image.fields.grid import blocks, gathered
+from alphacut.rve.image.fields.grid import blocks, gather
 
 UNIT = 2.0**-53  # rounding unit
 SAFETY = 1.01  # for the rounding of the error bound itself and for terms of second order
@@ -63,78 +63,86 @@ class Energies:
 def energies(
     element: Element, fields: Array, mean_modes: Array, weights: Sequence[Weighted]
 ) -> Energies:
-    """Mean products of the modes of fields plus uniform ones.
+    """Mean energy products of all pairs of fields, with a bound of their rounding errors.
 
     Args:
         element: Unknowns and modes of a pixel.
-        fields: Shape (fields, unknowns, rows, columns).
-        mean_modes: Modes of the uniform fields, shape (mode rows, fields).
-        weights: What modes count in each pixel, shape (rows, columns), not negative; right to
-            `COEFFICIENT` units.
+        fields: Periodic fluctuations, shape (fields, unknowns, rows, columns).
+        mean_modes: Modes of the uniform field to add to each, shape (modes, fields).
+        weights: Pairs of rows of modes and their coefficient in each pixel, shape (rows, columns),
+            not negative, with a rounding error of up to `COEFFICIENT` units.
     """
     count, pixels = len(fields), fields.shape[-2] * fields.shape[-1]
     piece = max(PIECE, count**2)  # so that there are not more sums than products
     sums: list[list[Array]] = [[] for _ in weights]
-    error = np.zeros((len(weights), count))
-    for lines, modes, rounding in modes_of(element, fields, mean_modes):
-        for k, (rows, weight) in enumerate(weights):
-            sums[k].append(_summed(modes[rows], weight[lines], piece))
-            error[k] += np.einsum("rfyx,yx->f", rounding[rows] ** 2, weight[lines])
+    error_squared = np.zeros((len(weights), count))
+    for pixel_rows, modes, rounding in modes_of(element, fields, mean_modes):
+        for k, (mode_rows, weight) in enumerate(weights):
+            sums[k].append(_piecewise_products(modes[mode_rows], weight[pixel_rows], piece))
+            error_squared[k] += np.einsum(
+                "rfyx,yx->f", rounding[mode_rows] ** 2, weight[pixel_rows]
+            )
     value = np.empty((len(weights), count, count))
     for k, parts in enumerate(sums):
         entries = np.concatenate(parts).reshape(-1, count**2).T
         value[k] = np.reshape([math.fsum(terms) for terms in entries], (count, count)) / pixels
-    summed = SAFETY * (piece + COEFFICIENT + 4) * UNIT
-    return Energies(value, np.sqrt(SAFETY * error / pixels), summed)
+    relative_rounding = SAFETY * (piece + COEFFICIENT + 4) * UNIT
+    return Energies(value, np.sqrt(SAFETY * error_squared / pixels), relative_rounding)
 
 
-def _summed(modes: Array, weight: Array, piece: int) -> Array:
-    """Products of the modes, (rows, fields, lines, columns), summed piece by piece.
+def _piecewise_products(modes: Array, weight: Array, piece: int) -> Array:
+    """Weighted products of all pairs of fields, summed over pieces of their entries.
+
+    Args:
+        modes: Shape (modes, fields, rows, columns).
+        weight: Of each pixel, shape (rows, columns).
+        piece: Number of products in a sum.
 
     Returns:
-        Shape (pieces, fields, fields).
+        Symmetric matrices, shape (pieces, fields, fields).
     """
     count = modes.shape[1]
-    flat = np.swapaxes(modes, 0, 1).reshape(count, -1)
-    weighted = np.swapaxes(modes * weight, 0, 1).reshape(count, -1)
-    missing = -flat.shape[1] % piece
-    first, second = (
-        np.swapaxes(np.pad(x, ((0, 0), (0, missing))).reshape(count, -1, piece), 0, 1)
-        for x in (flat, weighted)
-    )
-    products = first @ np.swapaxes(second, 1, 2)
+
+    def cut(values: Array) -> Array:
+        """Values by piece, padded with zeros: shape (pieces, fields, piece)."""
+        flat = np.swapaxes(values, 0, 1).reshape(count, -1)
+        padded = np.pad(flat, ((0, 0), (0, -flat.shape[1] % piece)))
+        return np.swapaxes(padded.reshape(count, -1, piece), 0, 1)
+
+    products = cut(modes) @ np.swapaxes(cut(modes * weight), 1, 2)
     return np.asarray((products + np.swapaxes(products, 1, 2)) / 2)
 
 
 def modes_of(
     element: Element, fields: Array, mean_modes: Array
 ) -> Iterator[tuple[slice, Array, Array]]:
-    """Modes and bounds of their rounding errors, block by block.
+    """Modes of fields plus uniform fields, with bounds of their rounding errors, in blocks.
 
     Yields:
-        Rows, modes of shape (mode rows, fields, rows, columns) and the bound of each, same shape.
+        Rows of pixels, the modes of shape (modes, fields, rows, columns), and a bound of the
+        rounding error of each, same shape.
     """
     absolute, count = np.abs(element.modes), len(element.local)
-    for lines in blocks(fields.shape):
-        local, doubt = _anchored(element, gathered(element, fields, lines))
+    for rows in blocks(fields.shape):
+        local, local_error = _subtract_anchors(element, gather(element, fields, rows))
         shape = (-1, *local.shape[1:])
         modes = (element.modes @ local.reshape(count, -1)).reshape(shape)
         # the product of matrices; entries of the matrix are right to 10 units
-        doubt += (count + 12) * UNIT * np.abs(local)
-        rounding = (absolute @ doubt.reshape(count, -1)).reshape(shape)
+        local_error += (count + 12) * UNIT * np.abs(local)
+        rounding = (absolute @ local_error.reshape(count, -1)).reshape(shape)
         modes += mean_modes[..., None, None]
         rounding += UNIT * np.abs(modes)
-        yield lines, modes, rounding
+        yield rows, modes, rounding
 
 
-def _anchored(element: Element, raw: Array) -> tuple[Array, Array]:
-    """Local unknowns minus their anchors, and the bound of the rounding."""
-    local, doubt = raw.copy(), np.zeros_like(raw)
+def _subtract_anchors(element: Element, raw: Array) -> tuple[Array, Array]:
+    """Local unknowns minus their anchors, and a bound of the rounding error, shaped like `raw`."""
+    local, error = raw.copy(), np.zeros_like(raw)
     for k, anchors in enumerate(element.anchors):
         for anchor in anchors:
             local[k] -= raw[anchor]
-            doubt[k] += UNIT * np.abs(local[k])
-    return local, doubt
+            error[k] += UNIT * np.abs(local[k])
+    return local, error
 
 
 def _outer(first: Array, second: Array) -> Array:

@@ -32,31 +32,34 @@ class Operator:
     deviator: Array
 
     def apply(self, fields: Array) -> Array:
-        """Product with fields, shape (loads, unknowns, rows, columns), of the same shape."""
+        """Nodal forces of fields, both of shape (loads, unknowns, rows, columns)."""
         result = np.zeros_like(fields)
-        modes = [self.element.modes[part] for part in self.element.parts]
-        matrix = np.hstack([m.T @ m for m in modes])
+        trace_modes, deviator_modes = (self.element.modes[rows] for rows in self.element.parts)
+        matrix = np.hstack([trace_modes.T @ trace_modes, deviator_modes.T @ deviator_modes])
         for rows in blocks(fields.shape):
-            local = gathered(self.element, fields, rows)
-            weighted = np.stack([c[rows] * local for c in (self.trace, self.deviator)])
+            local = gather(self.element, fields, rows)
+            weighted = np.stack([self.trace[rows] * local, self.deviator[rows] * local])
             forces = matrix @ weighted.reshape(matrix.shape[1], -1)
             scatter(self.element, forces.reshape(local.shape), result, rows)
         return result
 
     def load(self, mean_modes: Array) -> Array:
-        """Right-hand sides of uniform fields: minus their nodal forces, shaped like fields.
+        """Right-hand sides: minus the nodal forces of uniform fields.
 
         Args:
             mean_modes: Modes of each uniform field, from `Element.mean_modes`, (modes, loads).
+
+        Returns:
+            Shape (loads, unknowns, rows, columns).
         """
         result = np.zeros((mean_modes.shape[1], self.element.unknowns, *self.trace.shape))
-        forces = [-self.element.modes[p].T @ mean_modes[p] for p in self.element.parts]
+        trace_force, deviator_force = (
+            -(self.element.modes[part].T @ mean_modes[part])[..., None, None]
+            for part in self.element.parts
+        )
         for rows in blocks(result.shape):
-            local = sum(
-                force[..., None, None] * c[rows]
-                for force, c in zip(forces, (self.trace, self.deviator), strict=True)
-            )
-            scatter(self.element, np.asarray(local), result, rows)
+            local = trace_force * self.trace[rows] + deviator_force * self.deviator[rows]
+            scatter(self.element, local, result, rows)
         return result
 
 
@@ -68,19 +71,26 @@ def blocks(shape: tuple[int, ...]) -> Iterator[slice]:
         yield slice(row, min(rows, row + count))
 
 
-def gathered(element: Element, fields: Array, rows: slice) -> Array:
-    """Element unknowns of the pixels of some rows, shape (n, loads, rows, columns)."""
-    lines = np.arange(rows.start, rows.stop)
-    local = np.empty((len(element.local), len(fields), lines.size, fields.shape[-1]))
-    for k, (kind, up, right) in enumerate(element.local):
-        source = fields[:, kind, (lines + up) % fields.shape[-2]]
+def gather(element: Element, fields: Array, rows: slice) -> Array:
+    """Local unknowns of the pixels of some rows, shape (local unknowns, loads, rows, columns).
+
+    Args:
+        element: Tells where each local unknown is stored: its number, and how many pixels above and
+            to the right.
+        fields: Shape (loads, unknowns, rows, columns), periodic.
+        rows: Rows of pixels.
+    """
+    row_numbers = np.arange(rows.start, rows.stop)
+    local = np.empty((len(element.local), len(fields), row_numbers.size, fields.shape[-1]))
+    for k, (unknown, up, right) in enumerate(element.local):
+        source = fields[:, unknown, (row_numbers + up) % fields.shape[-2]]
         local[k] = np.roll(source, -right, axis=-1) if right else source
     return local
 
 
 def scatter(element: Element, forces: Array, result: Array, rows: slice) -> None:
     """Add element forces, (n, loads, rows, columns), of the pixels of some rows to `result`."""
-    lines = np.arange(rows.start, rows.stop)
-    for k, (kind, up, right) in enumerate(element.local):
+    row_numbers = np.arange(rows.start, rows.stop)
+    for k, (unknown, up, right) in enumerate(element.local):
         force = np.roll(forces[k], right, axis=-1) if right else forces[k]
-        result[:, kind, (lines + up) % result.shape[-2]] += force
+        result[:, unknown, (row_numbers + up) % result.shape[-2]] += force

@@ -35,24 +35,25 @@ class Reference:
     deviator: float
 
     @classmethod
-    def between(cls, trace: Array, deviator: Array, *, stress: bool) -> Reference:
-        """The material in the middle of those of an image, so that the spectrum is narrow.
+    def of_image(cls, trace: Array, deviator: Array, *, stress: bool) -> Reference:
+        """Constant material at the geometric mean of an image's extremes, for a narrow spectrum.
 
         Args:
-            trace: Coefficients of the pixels, shape (rows, columns).
-            deviator: Same shape.
-            stress: Only the sum of the coefficients counts; the least material's shares then let
-                the sum decide in `least` too.
+            trace: Coefficients of the trace in the pixels, shape (rows, columns).
+            deviator: Coefficients of the deviator, same shape.
+            stress: Whether fields are stresses, of which only the sum of both coefficients counts;
+                the deviator then has the same part in it as in the softest material.
         """
-        bulk, shear = float(trace.min()), float(deviator.min())
-        largest = float(np.sqrt((bulk + shear) * (trace.max() + deviator.max())))
-        middle = float(np.sqrt(shear * deviator.max()))
+        min_trace, min_deviator = float(trace.min()), float(deviator.min())
+        min_sum, max_sum = min_trace + min_deviator, trace.max() + deviator.max()
+        mean_sum = float(np.sqrt(min_sum * max_sum))
+        mean_deviator = float(np.sqrt(min_deviator * deviator.max()))
         if stress:
-            middle = largest * shear / (bulk + shear)
-        return cls(largest - middle, middle)
+            mean_deviator = mean_sum * min_deviator / min_sum
+        return cls(mean_sum - mean_deviator, mean_deviator)
 
-    def least(self, trace: Array, deviator: Array) -> float:
-        """Energy of fluctuations of an image over that in this material, at least."""
+    def lowest_energy_ratio(self, trace: Array, deviator: Array) -> float:
+        """Lower bound of the energy of fluctuations in an image over that in this material."""
         bulk, shear = float(trace.min()), float(deviator.min())
         ratios = shear / self.deviator, (bulk + shear) / (self.trace + self.deviator)
         return min(ratios) * (1 - ROUNDING)
@@ -74,15 +75,18 @@ class FourierPreconditioner:
     def of_material(
         cls, element: Element, constant: Reference, shape: tuple[int, int]
     ) -> FourierPreconditioner:
-        """The preconditioner for a constant material; uniform fields cause nothing."""
+        """Inverse operator of a constant material on a grid of `shape` = (rows, columns).
+
+        The block of wave number 0 is singular by rigid fields and gets its pseudo-inverse.
+        """
         ky, kx = 2 * np.pi * np.fft.fftfreq(shape[0]), 2 * np.pi * np.fft.rfftfreq(shape[1])
-        blocks = symbol(element, constant, ky, kx)
-        uniform = np.linalg.pinv(blocks[0, 0], rcond=1e-10, hermitian=True)
+        blocks = fourier_blocks(element, constant, ky, kx)
+        pseudo_inverse = np.linalg.pinv(blocks[0, 0], rcond=1e-10, hermitian=True)
         blocks[0, 0] = np.eye(element.unknowns)
         inverse = np.linalg.inv(blocks)
-        inverse[0, 0] = uniform
-        inverse += np.conj(np.swapaxes(inverse, -1, -2))
-        return cls(np.ascontiguousarray(np.moveaxis(inverse / 2, (-2, -1), (0, 1))), shape)
+        inverse[0, 0] = pseudo_inverse
+        hermitian = (inverse + np.conj(np.swapaxes(inverse, -1, -2))) / 2
+        return cls(np.ascontiguousarray(np.moveaxis(hermitian, (-2, -1), (0, 1))), shape)
 
     def apply(self, fields: Array) -> Array:
         """The inverse on fields of shape (loads, unknowns, rows, columns)."""
@@ -90,13 +94,18 @@ class FourierPreconditioner:
         return np.asarray(fft.irfft2(spectrum, s=self.shape, overwrite_x=True))
 
 
-def symbol(element: Element, constant: Reference, ky: Array, kx: Array) -> Complex:
-    """Hermitian blocks of the operator, shape (len(ky), len(kx), unknowns, unknowns)."""
+def fourier_blocks(element: Element, constant: Reference, ky: Array, kx: Array) -> Complex:
+    """Fourier symbol of the operator of a constant material at wave numbers ky, kx per pixel.
+
+    Returns:
+        Hermitian blocks, shape (len(ky), len(kx), unknowns, unknowns).
+    """
     trace, deviator = (element.modes[part].T @ element.modes[part] for part in element.parts)
     matrix = constant.trace * trace + constant.deviator * deviator
-    kind, up, right = np.array(element.local).T
-    table = np.zeros((3, 3, element.unknowns, element.unknowns))  # by the distance in pixels
-    rise, run = up - up[:, None] + 1, right - right[:, None] + 1
-    np.add.at(table, (rise, run, kind[:, None], kind), matrix)
+    unknown, up, right = np.array(element.local).T
+    # coupling of unknowns a and b of pixels whose distance in rows and columns is −1, 0 or 1
+    coupling = np.zeros((3, 3, element.unknowns, element.unknowns))
+    row_step, column_step = up - up[:, None] + 1, right - right[:, None] + 1
+    np.add.at(coupling, (row_step, column_step, unknown[:, None], unknown), matrix)
     waves_y, waves_x = (np.exp(1j * np.outer(k, (-1, 0, 1))) for k in (ky, kx))
-    return np.asarray(np.einsum("yr,xs,rsab->yxab", waves_y, waves_x, table, optimize=True))
+    return np.asarray(np.einsum("yr,xs,rsab->yxab", waves_y, waves_x, coupling, optimize=True))

@@ -65,42 +65,57 @@ def solve_side(
     """
     pixel_coefficients, parts = coefficients(element, bulk, shear), np.ones((division, division))
     trace, deviator = (np.asarray(np.kron(x, parts)) for x in pixel_coefficients)
-    begin = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
-    fields, iterations = _fields(element, trace, deviator, solver, begin)
-    fields = np.asarray(np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1), float)
+    guess = None if start is None else np.tensordot(SOLVED_LOADS, start, axes=1)
+    fields, iterations = _solve_loads(element, trace, deviator, solver, guess)
+    unit_fields = np.asarray(np.tensordot(np.linalg.inv(SOLVED_LOADS), fields, axes=1), float)
     weights = list(zip(element.parts, (trace, deviator), strict=True))
-    result = energies(element, fields, element.mean_modes(UNIT_LOADS), weights)
-    return SideSolution(fields, result, iterations)
+    energy = energies(element, unit_fields, element.mean_modes(UNIT_LOADS), weights)
+    return SideSolution(unit_fields, energy, iterations)
 
 
-def _fields(
+def _solve_loads(
     element: Element, trace: Array, deviator: Array, solver: ConjugateGradient, start: Array | None
 ) -> tuple[Array, int]:
-    """Fields of the solved loads and the most iterations; large images load by load."""
+    """Fields of `SOLVED_LOADS`, (3, unknowns, rows, columns), and the largest iteration count.
+
+    Args:
+        element: Unknowns and modes of a pixel.
+        trace: Coefficient of the trace in each pixel, shape (rows, columns).
+        deviator: Coefficient of the deviator, same shape.
+        solver: Stopping rule.
+        start: First guess, shaped like the fields.
+    """
     modes = element.mean_modes(SOLVED_LOADS)
-    constant = Reference.between(trace, deviator, stress=element.stress)
-    preconditioner = FourierPreconditioner.of_material(
-        element, constant, (len(trace), len(trace[0]))
-    )
+    constant = Reference.of_image(trace, deviator, stress=element.stress)
+    rows, columns = trace.shape
+    preconditioner = FourierPreconditioner.of_material(element, constant, (rows, columns))
     operator = Operator(element, trace, deviator)
-    scale, least = least_energy(element, trace, deviator, modes), constant.least(trace, deviator)
-    together = len(SOLVED_LOADS) if trace.size <= SMALL else 1
-    solved = []
-    for first in range(0, len(SOLVED_LOADS), together):
-        part = slice(first, first + together)
+    scale = least_energy(element, trace, deviator, modes)
+    least = constant.lowest_energy_ratio(trace, deviator)
+    n_together = len(SOLVED_LOADS) if trace.size <= SMALL else 1  # to save memory
+    fields, iterations = [], []
+    for first in range(0, len(SOLVED_LOADS), n_together):
+        part = slice(first, first + n_together)
         guess = None if start is None else start[part]
         load = operator.load(modes[:, part])
-        solved.append(
-            solver.solve(System(operator, preconditioner, load, scale[part], least, guess))
-        )
-    return np.concatenate([fields for fields, _ in solved]), max(steps for _, steps in solved)
+        system = System(operator, preconditioner, load, scale[part], least, guess)
+        solution, number = solver.solve(system)
+        fields.append(solution)
+        iterations.append(number)
+    return np.concatenate(fields), max(iterations)
 
 
 def least_energy(element: Element, trace: Array, deviator: Array, modes: Array) -> Array:
-    """Total energy that no field of these means is below, shape (loads,)."""
-    return np.asarray(
-        sum(
-            c.size / np.mean(1 / c) * np.sum(modes[part] ** 2, axis=0)
-            for c, part in zip((trace, deviator), element.parts, strict=True)
-        )
-    )
+    """Lower bound of the total energy of any fields with given means, shape (loads,).
+
+    That of uniform strain or stress modes in the harmonic mean of each coefficient.
+
+    Args:
+        element: Rows of the trace and of the deviator.
+        trace: Coefficient of the trace in each pixel, shape (rows, columns).
+        deviator: Coefficient of the deviator, same shape.
+        modes: Modes of the uniform fields of these means, shape (modes, loads).
+    """
+    trace_squares, deviator_squares = (np.sum(modes[rows] ** 2, axis=0) for rows in element.parts)
+    trace_energy = trace.size / np.mean(1 / trace) * trace_squares
+    return np.asarray(trace_energy + deviator.size / np.mean(1 / deviator) * deviator_squares)

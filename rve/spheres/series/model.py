@@ -11,7 +11,7 @@ from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.series.means import Mean
 from alphacut.rve.series.model import SeriesModel
 from alphacut.rve.series.truncation import CellModuli
-from alphacut.rve.spheres.result import HomogenisedSpheres, certified_spheres
+from alphacut.rve.spheres.result import HomogenisedSpheres, spheres_with_checks
 from alphacut.rve.spheres.series.energies import mean_energies
 from alphacut.rve.spheres.series.stiffness import cubic_stiffness, unknowns
 
@@ -29,7 +29,7 @@ class SphereSeriesModel(SeriesModel):
 
     def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedSpheres:
         """The certified result of one inclusion."""
-        return certified_spheres(
+        return spheres_with_checks(
             HomogenisedSpheres(
                 curve=mean.curve,
                 method=self.name,

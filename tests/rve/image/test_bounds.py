@@ -323,11 +323,11 @@ def test_no_system_lacks_more_energy_than_its_accuracy(element, seed):
 
 def system_of(element, trace, deviator):
     """The system of three loads on periodic fields."""
-    constant = Reference.between(trace, deviator, stress=element.stress)
+    constant = Reference.of_image(trace, deviator, stress=element.stress)
     inverse = FourierPreconditioner.of_material(element, constant, trace.shape)
     operator, modes = Operator(element, trace, deviator), element.mean_modes(SOLVED_LOADS)
     scale = least_energy(element, trace, deviator, modes)
-    least = constant.least(trace, deviator)
+    least = constant.lowest_energy_ratio(trace, deviator)
     return System(operator, inverse, operator.load(modes), scale, least)
 
 

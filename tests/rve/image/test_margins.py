@@ -17,7 +17,7 @@ from alphacut.rve.image.fields.energy import (
     PIECE,
     UNIT,
     Energies,
-    _anchored,
+    _subtract_anchors,
     energies,
     modes_of,
 )
@@ -73,7 +73,7 @@ def test_the_difference_from_an_anchor(element):
     )
     raw = np.zeros((len(element.local), 1, 1, 1))
     raw[k], raw[anchor] = 1.0, -LOST
-    local, doubt = _anchored(element, raw)
+    local, doubt = _subtract_anchors(element, raw)
     error = abs(Fraction(float(local[k, 0, 0, 0])) - 1 - Fraction(LOST))
     assert tight(Fraction(float(doubt[k, 0, 0, 0])), error)
 

@@ -7,7 +7,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase
 from alphacut.rve.certificate import CertificateError
 from alphacut.rve.spheres.cubic import cubic_moduli, cubic_voigt, hill_average
-from alphacut.rve.spheres.result import certified_spheres
+from alphacut.rve.spheres.result import spheres_with_checks
 from alphacut.rve.spheres.series.model import SphereSeriesModel
 from alphacut.rve.spheres.space_bounds import (
     hashin_shtrikman,
@@ -75,7 +75,7 @@ def test_a_wrong_stiffness_has_no_certificate(factors, words):
     moduli = cubic_moduli(result.curve.stiffness) * factors
     wrong = replace(result.curve, stiffness=cubic_voigt(*moduli.T))
     with pytest.raises(CertificateError, match=words):
-        certified_spheres(replace(result, curve=wrong))
+        spheres_with_checks(replace(result, curve=wrong))
 
 
 @pytest.mark.parametrize("options", [{"points": 1}, {"accuracy": 1e-12}, {"accuracy": np.nan}])
