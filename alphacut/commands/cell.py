@@ -29,12 +29,12 @@ KEYS = {
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of the command."""
+    """Adds the options of `alphacut cell`; those of `KEYS` are short for ``--set KEY=VALUE``."""
     add_common(parser)
     for option, (key, about) in KEYS.items():
-        change = f"{key}={{}}".format
+        as_change = f"{key}={{}}".format
         parser.add_argument(
-            option, dest="set", action="append", type=change, metavar="VALUE", help=about
+            option, dest="set", action="append", type=as_change, metavar="VALUE", help=about
         )
     parser.add_argument(
         "--cross-check",
@@ -47,7 +47,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Solves and reports."""
+    """Solves the cell at the modal values, checks and writes its result; returns exit status 0."""
     content = read_case(options).content
     radius, phases = content.round_cell if content.meshed is None else content.meshed_cell
     elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 def difference(
     first: HomogenisedStiffness, second: HomogenisedStiffness, tolerance: float
 ) -> float:
-    """Relative difference of E from that of a second method.
+    """Relative difference of E between the results of two methods.
 
     Raises:
         FailedError: It is above the tolerance.
@@ -90,7 +90,7 @@ def difference(
 
 
 def export(content: Content, path: Path) -> Document:
-    """Writes the mesh with displacements and stresses; returns counts."""
+    """Writes the mesh with displacements and stresses; returns the file and its number of nodes."""
     from alphacut.export.cell_files import write_cell
     from alphacut.rve.prism.fields import cell_fields, mesh_fields
     from alphacut.rve.prism.model import PrismModel
@@ -109,38 +109,35 @@ def export(content: Content, path: Path) -> Document:
 def summary(result: HomogenisedStiffness, document: Document) -> str:
     """The result as a table, each number with its declared error."""
     errors, stress = document["declared_error"], document["stress_GPa"]
-    off = ["not declared"] * 4
+    error_texts = ["not declared"] * 4
     if errors is not None:
         values = (errors["E_GPa"], errors["nu"], *errors["stress_GPa"].values())
-        off = [f"{value:.1e}" for value in values]
-    rows = [
-        ("E, GPa", f"{document['E_GPa']:#.8g}", off[0]),
-        ("ν", f"{document['nu']:.6f}", off[1]),
-        ("mean σ11, GPa", f"{stress['s11']:#.9g}", off[2]),
-        ("mean σ12, GPa", f"{stress['s12']:#.9g}", off[3]),
-    ]
+        error_texts = [f"{value:.1e}" for value in values]
+    names = ("E, GPa", "ν", "mean σ11, GPa", "mean σ12, GPa")
+    value_texts = (f"{document['E_GPa']:#.8g}", f"{document['nu']:.6f}")
+    value_texts += (f"{stress['s11']:#.9g}", f"{stress['s12']:#.9g}")
+    rows = [*zip(names, value_texts, error_texts, strict=True)]
     for key, number in document["fibres"].items():
         rows.append((fibre_label(key), *_value_and_error(number)))
-    rows += [*plane_rows(document)]
+    rows += plane_rows(document)
     if bounds := document["references"].get("hashin_shtrikman_E_GPa"):
         rows.append((f"{ISOTROPIC}, GPa", f"{bounds[0]:.4f} … {bounds[1]:.4f}", ""))
     if "difference" in document:
         rows.append(("difference of both methods", f"{document['difference']:.1e}", ""))
     iterations = ", ".join(map(str, result.iterations))
-    words = f", {result.solver}, iterations {iterations}" if iterations else ""
-    return text_table((result.convention, "value", "± error"), rows) + (
-        f"{result.method}, {result.unknowns} unknowns{words}\n"
-    )
+    solver = f", {result.solver}, iterations {iterations}" if iterations else ""
+    table = text_table((result.convention, "value", "± error"), rows)
+    return f"{table}{result.method}, {result.unknowns} unknowns{solver}\n"
 
 
 def plane_rows(document: Document) -> Iterator[tuple[str, str, str]]:
-    """Entries of the plane stiffness, and the constants along x and y of both definitions."""
+    """Rows (name, value, error) of the plane stiffness C_ij and of the constants along x and y."""
     stiffness, errors = document["stiffness_GPa"], document["stiffness_error_GPa"]
     if not document["plane"]:
         return
     for i, j in zip(*np.triu_indices(3), strict=True):
-        off = "not declared" if errors is None else f"{errors[i, j]:.1e}"
-        yield f"C{VOIGT[i]}{VOIGT[j]}, GPa", f"{stiffness[i, j]:.6g}", off
+        error = "not declared" if errors is None else f"{errors[i, j]:.1e}"
+        yield f"C{PLANE_INDICES[i]}{PLANE_INDICES[j]}, GPa", f"{stiffness[i, j]:.6g}", error
     for definition, constants in document["plane"].items():
         for key, number in constants.items():
             yield f"{fibre_label(key)} ({definition})", *_value_and_error(number)
@@ -152,6 +149,6 @@ def _value_and_error(number: Document) -> tuple[str, str]:
     return f"{number['value']:.6g}", "not declared" if error is None else f"{error:.1e}"
 
 
-VOIGT = "126"  # 11, 22 and 12
+PLANE_INDICES = "126"  # of Voigt: 11, 22 and 12
 ABOUT = "effective modulus and stresses of the cell at the modal values"
 COMMANDS = dict.fromkeys(("cell", "solve"), Command(ABOUT, arguments, run))

@@ -21,17 +21,17 @@ from alphacut.report.results import GRAVITY
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
 from alphacut.stages.readiness import cut_record_warnings, require_runnable
-from alphacut.stages.suite import SuiteRecord, suite, warnings
+from alphacut.stages.suite import SuiteRecord, suite, suite_warnings
 
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Checks and reports."""
+    """Checks a case, and shows how it was read and its first period; returns exit status 0."""
     content = read_case(options).content
     require_runnable(content)
-    rows, linear = list(rows_of("", content)), structure(content)
+    rows, linear = list(rows_of("", content)), nominal_structure(content)
     period = 2 * pi / float(frequencies(linear)[0]) if linear else None
     document = {
         "case": options.case,
@@ -46,40 +46,34 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         peak = engineering(record.extremes[0], "m/s^2")
         in_g = f"{record.extremes[0] / GRAVITY:.3g} g"
         text += f"record: {len(record.samples)} samples of {record.step:g} s, peak {peak}, {in_g}\n"
-        text += "".join(
-            f"{words}\n" for words in cut_record_warnings(content, Structure(linear, {}))
-        )
+        warnings = cut_record_warnings(content, Structure(linear, {}))
+        text += "".join(f"{warning}\n" for warning in warnings)
     if content.records is not None and content.envelope is not None and linear:
-        moved = Structure(linear, {})
-        text += records_text(content.records, suite(content.records, content.envelope, moved))
+        records = suite(content.records, content.envelope, Structure(linear, {}))
+        text += records_text(content.records, records)
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0
 
 
 def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str:
-    """What the files of a suite hold, and what is made of them."""
+    """Table of a suite's records, as their files hold them and as they are used; then warnings."""
     rows = []
     for named, record in zip(section.recordings, records, strict=True):
-        read, measures = named.recording, record.measures
-        of_file = (
-            named.name,
-            read.file_format,
-            read.unit,
-            f"{read.step:g} s",
-            f"{len(read.samples)}",
-        )
-        raw = (f"{read.offset_share:.2%}", f"{read.peak / GRAVITY:.3g} g")
+        raw, measures = named.recording, record.measures
+        file_cells = (named.name, raw.file_format, raw.unit, f"{raw.step:g} s")
+        sample_cells = (f"{len(raw.samples)}", f"{raw.offset_share:.2%}")
+        peak = f"{raw.peak / GRAVITY:.3g} g"
         used = tuple(f"{measures[name] / GRAVITY:.3g} g" for name in ("PGA", "Sa(T1)"))
-        rows.append((*of_file, *raw, *used, f"{record.duration:.4g} s"))
+        rows.append((*file_cells, *sample_cells, peak, *used, f"{record.duration:.4g} s"))
     head = ("record", "format", "unit", "step", "samples", "mean/peak", "peak", "PGA used")
     text = text_table((*head, "Sa(T1) used", "motion"), rows)
-    return text + "".join(f"warning: {words}\n" for words in warnings(records))
+    return text + "".join(f"warning: {sentence}\n" for sentence in suite_warnings(records))
 
 
-def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
-    """The linear structure at the modal values; None where none vibrates.
+def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
+    """The linear structure of the case at the modal values; None where there is none.
 
-    A modulus that is yet to be computed is that of the series at the modal values.
+    A modulus that stage modulus will compute is that of the series; None also without a formula.
     """
     if "envelope" not in content.stages or content.structure_section is None:
         return None
@@ -91,14 +85,14 @@ def structure(content: Content) -> StoreyFrame | MatrixStructure | None:
             return None
         if content.radius_map is None and content.round.fraction is None:
             return None
-        quick = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
-        model = model_of(content.round, content.mesh, quick)
+        section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
+        model = model_of(content.round, content.mesh, section)
         number = Crisp(solve(*content.round_cell, model).modulus)
     return content.structure_of(number).frame
 
 
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:
-    """Key, value and kind of every quantity of a section, and of those below it."""
+    """Rows (key, value, kind) of every quantity of a section, and of the sections below it."""
     for key, info in type(section).model_fields.items():
         content, unit = getattr(section, key), quantity_of(info)
         if isinstance(content, dict):
@@ -112,7 +106,7 @@ def rows_of(prefix: str, section: Section) -> Iterator[Row]:
                 yield from rows_of(f"{row_key}.", subsection)
             elif isinstance(subsection, FuzzyNumber) and unit and section.has_key(key):
                 yield row_key, _numbers(subsection, unit.si), KINDS.get(type(subsection), "fuzzy")
-            elif key == "columns" and getattr(section, "stiffness", None) is None:
+            elif key == "columns" and getattr(section, "stiffness", None) is None:  # a default
                 yield row_key, _numbers(subsection, ""), "default"
             elif isinstance(subsection, float) and unit and unit.si and section.has_key(key):
                 yield row_key, engineering(subsection, unit.si), "number"

@@ -53,35 +53,38 @@ class Parser(argparse.ArgumentParser):
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Options of PETSc (``-rve_ksp_rtol 1e-10``, ``-log_view``) and those of the program."""
-    ours: list[str] = []
+    """Separates the options of PETSc, as ``-rve_ksp_rtol 1e-10`` or ``-log_view``, from all others.
+
+    Returns:
+        The words that are not PETSc's; values of its options by their names without ``-rve_``.
+    """
+    words: list[str] = []
     petsc: dict[str, str] = {}
-    words = list(arguments)
-    while words:
-        word = words.pop(0)
+    remaining = list(arguments)
+    while remaining:
+        word = remaining.pop(0)
         if word == PETSC_LOG:
             petsc[word] = ""
             continue
         if not word.startswith(PETSC_PREFIX):
-            ours.append(word)
+            words.append(word)
             continue
-        has_value = bool(words) and not re.match(r"--?[A-Za-z_]", words[0])
-        has_value = has_value and not words[0].endswith(".toml")
-        petsc[word.removeprefix(PETSC_PREFIX)] = words.pop(0) if has_value else ""
-    return ours, petsc
+        has_value = bool(remaining) and not re.match(r"--?[A-Za-z_]", remaining[0])
+        has_value = has_value and not remaining[0].endswith(".toml")
+        petsc[word.removeprefix(PETSC_PREFIX)] = remaining.pop(0) if has_value else ""
+    return words, petsc
 
 
-def require_petsc(petsc: Mapping[str, str], used: bool) -> None:
+def require_petsc(petsc: Mapping[str, str], has_prisms: bool) -> None:
     """Refuses PETSc options, named without their prefix, where no prisms are solved."""
     name = next(iter(petsc), "")
     option = name if name == PETSC_LOG else PETSC_PREFIX + name
-    require(
-        used or not petsc, option, value="PETSc's", allowed="options of a cell with method prism"
-    )
+    allowed = "options of a cell with method prism"
+    require(has_prisms or not petsc, option, value="PETSc's", allowed=allowed)
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Adds the case and the options that every command on it takes."""
+    """Adds the arguments of every command on a case: CASE, ``--set``, ``--json``, ``--quiet``."""
     parser.add_argument("case", metavar="CASE", help="case file, for example cases/paper.toml")
     parser.add_argument(
         "--set",
@@ -112,11 +115,11 @@ def add_run(parser: argparse.ArgumentParser, default_place: str = "nothing is ke
 
 
 def read_case(options: argparse.Namespace) -> Case:
-    """The case, changed as the options say.
+    """The case file that the options name, with the changes of ``--set``.
 
     Raises:
         BadInput: The case has problems.
-        RefusedError: It solves no prisms, and there are options of PETSc.
+        RefusedError: There are options of PETSc, and the case solves no prisms.
     """
     case = load(options.case, options.set)
     content = case.content
@@ -129,7 +132,7 @@ def read_case(options: argparse.Namespace) -> Case:
 def open_results(
     options: argparse.Namespace, folder: str = ""
 ) -> Iterator[tuple[Case, StageStore]]:
-    """The case, and the store of its results, which no other run writes into meanwhile.
+    """Yields the case and the store of its results, whose folder is locked during the block.
 
     Args:
         options: Of the command.

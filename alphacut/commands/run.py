@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes, draws, reports."""
+    """Computes all stages of a case, draws figures and shows tables; returns exit status 0."""
     folder = options.out or f"results/{Path(options.case).stem}"
     with open_results(options, folder) as (case, store):
         document = compute_run(case, store, options.petsc, figures=not options.no_figures)
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
 def compute_run(
     case: Case, store: StageStore, petsc: Mapping[str, str], *, figures: bool
 ) -> Document:
-    """The numbers and figures of a case; summary.json is written last."""
+    """Computes all stages of a case, and returns their numbers, written last as summary.json."""
     start = time.perf_counter()
     with pool(store.workers) as executor:
         results = Pipeline(Results(case.content), store, petsc, figures, executor).run()
@@ -91,7 +91,7 @@ def add_page(parser: argparse.ArgumentParser) -> None:
 
 
 def report(options: argparse.Namespace, out: TextIO) -> int:
-    """Writes the page, and the tables where they are requested; compares two runs."""
+    """Writes the page of a run and the tables requested, or compares two; returns exit status 0."""
     if len(options.folder) > 1:
         return compare(options, out)
     folder = ResultsFolder.opened(Path(options.folder[0]))
@@ -113,7 +113,7 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def compare(options: argparse.Namespace, out: TextIO) -> int:
-    """Shows two runs side by side, and writes the table where it is requested."""
+    """Shows two runs side by side, and writes the files requested; returns exit status 0."""
     folders = options.folder
     require(len(folders) == 2, "FOLDER", value=f"{len(folders)} folders", allowed="one or two")
     first, second = (read_summary(ResultsFolder.opened(Path(name))) for name in folders)

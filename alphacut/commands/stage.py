@@ -32,7 +32,7 @@ ONLY = "Plane strain alone: the other definition is for one particle of two isot
 
 
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes the map, writes it and prints the section [radius]."""
+    """Computes the radius map of particles, and prints its section [radius]; exit status 0."""
     with open_results(options) as (case, store):
         numbers = Pipeline(Results(case.content), store).particles().document
     text = fragment(numbers)
@@ -41,19 +41,19 @@ def microstructure(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def modulus(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes the modulus of a round cell or of an image."""
+    """Computes the fuzzy modulus of the cell, and prints its tables; returns exit status 0."""
     with open_results(options) as (case, store):
         results = Results(case.content)
         Pipeline(results, store, options.petsc).material()
-    document, words = results.document(), {"modulus": summary, "image": image}
-    for name in document.keys() & words.keys():
-        text = text_table(*tables(document)[name]) + words[name](document[name])
+    document, texts = results.document(), {"modulus": modulus_text, "image": image_text}
+    for name in document.keys() & texts.keys():
+        text = text_table(*tables(document)[name]) + texts[name](document[name])
         write_answer(options, document[name], out, text)
     return 0
 
 
-def image(document: Document) -> str:
-    """The phases, and what widens the bounds."""
+def image_text(document: Document) -> str:
+    """Lines on an image: its constants, area fractions, and what widens the bounds of E."""
     shares = (f"{name}: {share:.1%} of the area\n" for name, share in document["fractions"].items())
     return (
         plane_text(document["plane"], document["cuts"]["alpha"], Nature.GUARANTEED)
@@ -64,8 +64,8 @@ def image(document: Document) -> str:
     )
 
 
-def summary(document: Document) -> str:
-    """Constants on two levels, references, and what the α-cuts cost."""
+def modulus_text(document: Document) -> str:
+    """Lines on a modulus: constants on the lowest and highest level, references, and the cost."""
     alpha, plane = document["alpha"], document["plane"]
     return (
         cuts_text("of fibres", document["fibres"], alpha, Nature(document["nature"]))
@@ -93,7 +93,7 @@ def cuts_text(title: str, cuts: Document, alpha: Sequence[float], nature: Nature
 
 
 def plane_text(cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
-    """Constants along x and y, a table for each definition."""
+    """Constants along x and y: a table in plane strain, and one with free extension."""
     free = {x.replace("_free", ""): bounds for x, bounds in cuts.items() if "_free" in x}
     plane_strain = {x: bounds for x, bounds in cuts.items() if "_free" not in x}
     text = cuts_text(PLANE_STRAIN, plane_strain, alpha, nature)
@@ -101,14 +101,14 @@ def plane_text(cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
 
 
 def loss_text(losses: Document | None) -> str:
-    """Loss factors on two levels, with their errors; empty where there are none."""
+    """Table of loss factors on the lowest and highest level; empty where there are none."""
     if losses is None:
         return ""
     rows = []
     for name in CONSTANTS:
-        bounds = (cut(losses[name], level, Nature.ATTAINED) for level in (0, -1))
+        cuts = (cut(losses[name], level, Nature.ATTAINED) for level in (0, -1))
         error = f"{losses['error'][name]:.1e}" if losses["error"] else "not declared"
-        rows.append((f"loss factor of {name}", *bounds, error))
+        rows.append((f"loss factor of {name}", *cuts, error))
     return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)
 
 
@@ -119,7 +119,7 @@ def add_envelope(parser: argparse.ArgumentParser) -> None:
 
 
 def envelope(options: argparse.Namespace, out: TextIO) -> int:
-    """Computes the envelope of [envelope]."""
+    """Computes the envelope of section [envelope] alone, and prints it; returns exit status 0."""
     data = read_dataset(Path(options.modulus), "--modulus") if options.modulus else None
     with open_results(options) as (case, store):
         pipeline = Pipeline(Results(case.content), store)
@@ -130,7 +130,7 @@ def envelope(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def identify(options: argparse.Namespace, out: TextIO) -> int:
-    """Identifies and reports; status 0 also where the measurement refutes the frame."""
+    """Identifies inputs from measured modes; exit status 0 even if these refute the frame."""
     content = read_case(options).content
     if content.identify is None or content.frame is None or content.envelope is None:
         raise RefusedError("identify", None, "sections [identify], [frame] and [envelope]")

@@ -35,7 +35,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def verify(options: argparse.Namespace, out: TextIO) -> int:
-    """Tests all stored envelopes that have proved bounds, and writes motions of their inputs."""
+    """Tests all proved envelopes in a folder by exact motions, and writes motions at their peaks.
+
+    Envelopes that are not proved are listed as such. Returns exit status 0.
+    """
     path = Path(options.folder)
     folder = ResultsFolder.opened(path)
     document: Document = {}
@@ -59,10 +62,13 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
 
 
 def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> Document:
-    """What a stored envelope was tested with; motions of the inputs it names go to a CSV file.
+    """Tests a stored envelope, and writes inputs and motions at its peaks to two CSV files.
+
+    Returns:
+        The nature of the envelope, the number of motions tested, and the names of the files.
 
     Raises:
-        ContradictionError: A motion contradicts it; contradiction.csv holds it.
+        ContradictionError: A motion lies outside the envelope; contradiction.csv holds it.
     """
     points, motions = stored_motions(data)
     trial = Trial(envelope_of(data), np.moveaxis(data["cut"].values, -1, 0))
@@ -71,19 +77,16 @@ def verify_envelope(data: xarray.Dataset, name: str, folder: ResultsFolder) -> D
     except ContradictionError as error:
         put_text(folder, "contradiction.csv", columns_text(error.table))
         raise
-    # + 0.0 leaves no zero negative
-    places = {point.tobytes(): k for k, point in enumerate(points + 0.0)}
-    wanted = (point.tobytes() for point in trial.named() + 0.0)
-    named = [places[point] for point in wanted if point in places]
-    files: dict[str, dict[str, Array]] = {
-        f"{name}_motions.csv": motions_table(trial, [motions[k] for k in named]),
-        f"{name}_inputs.csv": {
-            "motion": np.arange(1, len(named) + 1).astype(float),
-            **{f"{x} [SI]": points[named, k] for k, x in enumerate(trial.envelope.inputs)},
-        },
-    }
-    for file, table in files.items():
-        put_text(folder, file, columns_text(table))
+    # points are compared as bytes, in which + 0.0 leaves no negative zero
+    indices = {point.tobytes(): k for k, point in enumerate(points + 0.0)}
+    at_peaks = (point.tobytes() for point in trial.named() + 0.0)
+    shown = [indices[point] for point in at_peaks if point in indices]
+    inputs: dict[str, Array] = {"motion": np.arange(1, len(shown) + 1).astype(float)}
+    inputs |= {f"{x} [SI]": points[shown, k] for k, x in enumerate(trial.envelope.inputs)}
+    motions_shown = motions_table(trial, [motions[k] for k in shown])
+    files = {f"{name}_motions.csv": motions_shown, f"{name}_inputs.csv": inputs}
+    for file, columns in files.items():
+        put_text(folder, file, columns_text(columns))
     tested = {"motions_tested": len(points), "files": list(files)}
     return {"nature": str(data.attrs["nature"]), **tested}
 
@@ -98,9 +101,9 @@ def motions_table(trial: Trial, motions: Sequence[LinearMotion]) -> dict[str, Ar
 
 
 def envelope_of(data: xarray.Dataset) -> Envelope:
-    """The envelope in a dataset, as far as it is tested; its inputs are those of its support."""
+    """The envelope that a dataset holds, with the supports of its fuzzy inputs as intervals."""
     values = {name: variable.values for name, variable in data.data_vars.items()}
-    cut = values["cut"][0].tolist()
+    supports = values["cut"][0].tolist()
     pairs = {
         kind: Ends(values[f"{key}_lower"], values[f"{key}_upper"])
         for kind, key in (("inner", "inner"), ("outer", "proved"))
@@ -111,7 +114,7 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
         alpha=data["alpha"].values,
         time=data["time"].values,
         outputs=tuple(map(str, data["output"].values)),
-        inputs={str(x): Interval(*cut[k]) for k, x in enumerate(data["parameter"].values)},
+        inputs={str(x): Interval(*supports[k]) for k, x in enumerate(data["parameter"].values)},
         nature=Nature(data.attrs["nature"]),
         method=str(data.attrs["method"]),
         units=tuple(x.partition("[")[2].rstrip("]") for x in labels),

@@ -22,8 +22,9 @@ FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf", ".inp": "abaqus"}
 
 
 def write_cell(fields: CellFields, path: Path) -> int:
-    """Write mesh, phases, displacements and stresses by the ending of a name; nodes written.
+    """Writes mesh, phases, displacements and stresses; returns the number of nodes written.
 
+    The ending of the file's name chooses the format.
     Gmsh's file holds the mesh once, with fields as values at the nodes of its elements; in VTK's
     and XDMF nodes of the interface stand twice, since stresses jump there. Abaqus's has no fields.
 
@@ -38,10 +39,10 @@ def write_cell(fields: CellFields, path: Path) -> int:
         return _write_gmsh(fields, path)
     import meshio
 
-    mesh = wedge_mesh(fields.points, fields.cells, fields.phase, _at_points(fields))
+    mesh = wedge_mesh(fields.points, fields.cells, fields.phase, _point_fields(fields))
     if kind == "abaqus":
         say(f"{path} holds mesh and phases; displacements and stresses go to .msh, .vtu or .xdmf")
-        mesh = _abaqus(fields)
+        mesh = _abaqus_mesh(fields)
     if kind == "xdmf":
         meshio.write(path, mesh, file_format=kind, data_format="XML")
         return len(fields.points)
@@ -51,29 +52,29 @@ def write_cell(fields: CellFields, path: Path) -> int:
 
 
 def _write_gmsh(fields: CellFields, path: Path) -> int:
-    """By Gmsh itself, nodes once."""
+    """Writes a mesh with its fields by Gmsh, nodes of the interface once; returns their number."""
     count = int(fields.node.max()) + 1
     points: Array = np.empty((count, 3))
     points[fields.node] = fields.points
-    values = {name: data[fields.cells] for name, data in _at_points(fields).items()}
+    values = {name: data[fields.cells] for name, data in _point_fields(fields).items()}
     shaped = {name: x.reshape(len(x), 15, -1) for name, x in values.items()}
     write(path, points, fields.node[fields.cells], fields.phase, fields.names, shaped)
     return count
 
 
-def _at_points(fields: CellFields) -> dict[str, Array]:
-    """Displacements, (n, 3), and stresses, (n,), by name with their unit."""
+def _point_fields(fields: CellFields) -> dict[str, Array]:
+    """Displacements, (n, 3), and stresses, (n,), of each load case by name with their unit."""
     data = {}
     for load in range(fields.displacement.shape[-1]):
-        flat = np.pad(fields.displacement[..., load], ((0, 0), (0, 1)))
-        data[f"displacement_{load + 1}_in_half_sides"] = flat
+        in_space = np.pad(fields.displacement[..., load], ((0, 0), (0, 1)))  # none along θ
+        data[f"displacement_{load + 1}_in_half_sides"] = in_space
         for row, name in enumerate(COMPONENTS):
             data[f"stress_{load + 1}_{name}_Pa"] = fields.stress[:, row, load]
     return data
 
 
-def _abaqus(fields: CellFields) -> object:
-    """Abaqus's wedges, not mirrored, nodes once, a set of elements for each phase."""
+def _abaqus_mesh(fields: CellFields) -> object:
+    """Mesh of meshio for Abaqus: interface nodes once, a set of elements for each phase."""
     import meshio
 
     count = int(fields.node.max()) + 1

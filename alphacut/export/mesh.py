@@ -55,7 +55,7 @@ def wedge_mesh(
 
 
 def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
-    """The mesh at a radius map.
+    """The mesh of prisms of a cell, whose particle follows the radius map.
 
     Args:
         cell: Radius map and phases.
@@ -79,8 +79,7 @@ def prism_mesh(cell: Cell, size: float, layers: int) -> meshio.Mesh:
 def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
     """Draws the mesh of a case; returns whether a picture was made.
 
-    Where there is no display, Xvfb makes one for the time of drawing. Where there is none of both,
-    one line says so.
+    Without a display Xvfb stands in for one; without both no picture is made, and one line says so.
     """
     command = [sys.executable, "-m", "alphacut.export.mesh"]
     if not os.environ.get("DISPLAY"):
@@ -92,15 +91,18 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
         file = Path(folder) / "mesh.vtu"
         prism_mesh(cell, mesh.size, mesh.layers).write(file, file_format="vtu")
         words = [*command, str(file), str(partial)]
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        if done.returncode or not partial.is_file():
-            reason = " ".join(done.stderr.split())[-300:]
+        process = subprocess.run(words, capture_output=True, text=True, check=False)
+        if process.returncode or not partial.is_file():
+            reason = " ".join(process.stderr.split())[-300:]
             raise FailedError(f"the mesh could not be drawn: {reason}")
     return True
 
 
-def mesh(file: str, picture: str) -> None:
-    """Draw both phases with their edges; the matrix is cut open in front so that the cone shows."""
+def draw_wedges(file: str, picture: str) -> None:
+    """Draws the phases of a mesh file with their edges to a PNG file, the matrix cut open in front.
+
+    Through the cut the cone of the particle shows.
+    """
     import pyvista
 
     grid = pyvista.read(file)
@@ -134,4 +136,4 @@ def edges(part: UnstructuredGrid) -> PolyData:
 
 
 if __name__ == "__main__":
-    mesh(*sys.argv[1:])
+    draw_wedges(*sys.argv[1:])

@@ -29,9 +29,9 @@ Drawing = tuple[str, Callable[[], "Figure"]]
 
 
 def drawings(results: Results) -> Iterator[Drawing]:
-    """Name and function of each figure that the results allow."""
-    yield from _material(results)
-    yield from _structure(results)
+    """Yields the name of each figure that the results allow, and the function that draws it."""
+    yield from _material_figures(results)
+    yield from _structure_figures(results)
     if results.learned is not None and "refuted" not in results.learned:
         yield "update-inputs", partial(envelope.identified, results.learned)
     if results.suite is not None:
@@ -43,27 +43,24 @@ def drawings(results: Results) -> Iterator[Drawing]:
         yield from envelope.drawings(task, results)
 
 
-def _material(results: Results) -> Iterator[Drawing]:
-    """Figures of the radius map, the modulus, the stresses and the image.
-
-    The stage microstructure draws the p-box of its own map.
-    """
+def _material_figures(results: Results) -> Iterator[Drawing]:
+    """Figures of the radius map, the modulus, the stresses and the image, by name."""
     content, radius_map = results.content, results.content.radius_map
     if results.is_paper and content.modulus.method == "prism":
         cell, mesh = modal_cell(*content.round_cell), content.mesh
         yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
-    if radius_map is not None and results.microstructure is None:
+    if radius_map is not None and results.microstructure is None:  # which draws its own p-box
         yield "fig13-p-box", partial(material.p_box, radius_map)
     if radius_map is not None:
         yield "fig14-cone", partial(material.cone, radius_map)
     if (data := results.modulus) is not None and results.is_paper:
-        given = content.round_cell[1].inclusion_modulus
-        if isinstance(given, FuzzyNumber):
+        inclusion = content.round_cell[1].inclusion_modulus
+        if isinstance(inclusion, FuzzyNumber):
             cuts = data.document["E_GPa"]
             bounds = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
-            number = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, bounds))
-            yield "fig36-fuzzy-numbers", partial(fuzzy_numbers.kinds, given, number)
-            yield "fig37-alpha-cuts", partial(fuzzy_numbers.alpha_cuts, given)
+            effective = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, bounds))
+            yield "fig36-fuzzy-numbers", partial(fuzzy_numbers.kinds, inclusion, effective)
+            yield "fig37-alpha-cuts", partial(fuzzy_numbers.alpha_cuts, inclusion)
     if (data := results.modulus) is not None:
         yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)
         yield "fig17-mean-stress", partial(material.mean_stress, data.arrays)
@@ -74,8 +71,8 @@ def _material(results: Results) -> Iterator[Drawing]:
         yield "image", partial(material.image, results.image.arrays)
 
 
-def _structure(results: Results) -> Iterator[Drawing]:
-    """Figures of the structure, its fuzzy mapping and the walk of the Graph Follower."""
+def _structure_figures(results: Results) -> Iterator[Drawing]:
+    """Figures of the structure, its fuzzy mapping and a run of the Graph Follower, by name."""
     if not results.envelopes or results.structure is None:
         return
     if results.is_paper:
@@ -110,22 +107,22 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
 
 
 def draw_all(results: Results, executor: Executor | None, work: Work) -> StageResult:
-    """Draws all figures as `PARTS` tasks; the result has the paths of their files."""
+    """Draws all figures by `PARTS` tasks; the document of the result has the names of the files."""
     assert work.folder is not None
     folder = work.folder
-    mesh = _mesh(results, folder, executor)
+    mesh_futures = _submit_mesh(results, folder, executor)
     parts = [submitted(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
     for count, part in enumerate(parts, start=1):
         names += part.result()
         if work.tick:
             work.tick(count / PARTS)
-    drawn_meshes = [name for name, future in mesh.items() if future.result()]
+    drawn_meshes = [name for name, future in mesh_futures.items() if future.result()]
     return StageResult({"figures": [*sorted(names), *drawn_meshes]})
 
 
 def draw_part(results: Results, folder: Path, part: int) -> list[str]:
-    """Draws the figures whose index modulo `PARTS` is `part`; paths of files in `folder`."""
+    """Draws the figures whose index modulo `PARTS` is `part`; returns their paths in `folder`."""
     with report_style():
         return [
             str(path.relative_to(folder))
@@ -139,8 +136,13 @@ def file_stem(name: str, results: Results) -> str:
     return name if results.is_paper else re.sub(r"^fig[\d-]+-", "", name)
 
 
-def _mesh(results: Results, folder: Path, executor: Executor | None) -> dict[str, Future[bool]]:
-    """Fig. 15 as a future by its file, true if it was drawn; empty without prism elements."""
+def _submit_mesh(
+    results: Results, folder: Path, executor: Executor | None
+) -> dict[str, Future[bool]]:
+    """Submits the drawing of the mesh (Fig. 15), if it has prisms; its future by the file's name.
+
+    The future is true if the picture was drawn.
+    """
     prisms = results.content.round is not None and results.content.modulus.method == "prism"
     if results.modulus is None or not prisms:
         return {}

@@ -22,53 +22,56 @@ if TYPE_CHECKING:
 
 
 def draw_decision(document: Document) -> Figure:
-    """Peak of each limited output over its limit, a bar for each level."""
+    """Bars from the least to the greatest peak over its limit, of each limit and level."""
     limits = {name: limit for name, limit in document["limits"].items() if name != ANY}
     figure, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
     alpha = np.asarray(document["alpha"], float)
-    heights = np.arange(len(limits))[::-1]
-    for height, limit in zip(heights, limits.values(), strict=True):
-        margins = (np.asarray(limit["margin"][side], float) for side in ("upper", "lower"))
+    rows = np.arange(len(limits))[::-1]  # the first limit on top
+    for row, limit in zip(rows, limits.values(), strict=True):
         size = max(abs(limit["limit"]), 1e-300)
-        low, high = (1 - margin / size for margin in margins)
-        for level, left, right, shade in zip(alpha, low, high, colours(alpha), strict=True):
+        # margin = limit − peak, so that the greatest margin belongs to the least peak
+        least = 1 - np.asarray(limit["margin"]["upper"], float) / size
+        greatest = 1 - np.asarray(limit["margin"]["lower"], float) / size
+        for level, left, right, shade in zip(alpha, least, greatest, colours(alpha), strict=True):
             bar: Look = {"left": left, "height": 0.66 - 0.4 * level, "color": shade, "lw": 0}
-            axes.barh(height, right - left, **bar)
+            axes.barh(row, right - left, **bar)
         possible, necessary = degree(limit["possibility"]), degree(limit["necessity"])
         verdict = verdict_words(limit["verdict"], limit["from_level"])
         text = f"{verdict} ({limit['nature']}): possible to {possible}"
         text += f", necessary to {necessary}"
-        axes.text(0.01, height + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
+        axes.text(0.01, row + 0.4, text, fontsize=8, transform=axes.get_yaxis_transform())
     axes.axvline(1.0, color=ORANGE, lw=1.4, ls="--")
     axes.axvline(0.0, color=GREY, lw=0.4)
     axes.set_ylim(-0.5, len(limits) - 0.2)
-    words = [limit_words(x["output"], x["limit"], x["unit"]) for x in limits.values()]
-    axes.set_yticks(heights, words, color=INK)
+    labels = [limit_words(x["output"], x["limit"], x["unit"]) for x in limits.values()]
+    axes.set_yticks(rows, labels, color=INK)
     axes.set_xlabel("peak over its limit (dashed); the darker the higher α")
     return figure
 
 
-def _mark(axes: Axes, limit: float, limits: Array, unit: str) -> None:
-    """The case's limit, where it is near the curve."""
-    words = engineering(limit, unit) if unit else "1"
-    near = limit <= 2 * limits[-1]
-    if near:
+def _mark_limit(axes: Axes, limit: float, limits: Array, unit: str) -> None:
+    """Names the limit of the case in the title, and marks it if it is near the curve's `limits`."""
+    limit_text = engineering(limit, unit) if unit else "1"
+    is_near = limit <= 2 * limits[-1]
+    if is_near:
         axes.axvline(limit, color=ORANGE, lw=1.2, ls="--")
-    axes.set_title(f"limit {words} ({'dashed' if near else 'far off'})", loc="left", fontsize=10)
+    note = "dashed" if is_near else "far off"
+    axes.set_title(f"limit {limit_text} ({note})", loc="left", fontsize=10)
 
 
 def draw_probability(document: Document) -> Figure:
-    """Probability over the limit, for the last event, between its bounds by level."""
+    """Bounds of the probability of exceeding a limit over that limit, by level; the last event."""
     name, event = list(document["events"].items())[-1]
     alpha = np.asarray(document["alpha"], float)
     limits = np.asarray(event["curve"]["limit"], float)
     lower, upper = (np.asarray(event["curve"][side], float) for side in ("lower", "upper"))
     figure, axes = style.figure(7.2, 3.6)
+    # the highest level is drawn by lines, as its band may have no width
     for low, high, shade in zip(lower[:-1], upper[:-1], colours(alpha), strict=False):
         axes.fill_between(limits, low, high, color=shade, lw=0)
     for end in (lower[-1], upper[-1]):
         axes.plot(limits, end, color=INK, lw=1)
-    _mark(axes, event["limit"], limits, event["unit"])
+    _mark_limit(axes, event["limit"], limits, event["unit"])
     title = f"limit of |{name}|" if event["unit"] else "all limits, over those of the case"
     style.prefix_axis(axes, title, event["unit"], across=True)
     axes.set(ylabel="probability of exceeding it", ylim=(0, 1.02))
@@ -77,26 +80,25 @@ def draw_probability(document: Document) -> Figure:
 
 
 def draw_tolerances(document: Document) -> Figure:
-    """Supports of the case and at the scale that exceeds no limit, over their modal values."""
+    """Bars of the inputs' supports over their modal values: in the case, and with no exceedance."""
     supports = document["supports"]
     figure, axes = style.figure(7.2, 1.0 + 0.4 * len(supports))
-    places = np.arange(len(supports))[::-1]
+    rows = np.arange(len(supports))[::-1]
     series = (("own", GREY, 0.7, "in the case"), ("kept", BLUE, 0.35, "no limit exceeded"))
     for kind, colour, height, label in series:
-        ends = np.array(
-            [np.asarray(support[kind]) / (support["modal"] or 1.0) for support in supports.values()]
-        )
-        wide = ends[:, 1] - ends[:, 0]
-        axes.barh(places, wide, left=ends[:, 0], height=height, color=colour, lw=0, label=label)
+        pairs = [np.asarray(x[kind]) / (x["modal"] or 1.0) for x in supports.values()]
+        lower, upper = np.array(pairs).T
+        widths = upper - lower
+        axes.barh(rows, widths, left=lower, height=height, color=colour, lw=0, label=label)
     axes.axvline(1.0, color=INK, lw=0.8)
-    axes.set_yticks(places, list(supports))
+    axes.set_yticks(rows, list(supports))
     axes.set_xlabel("value over the modal one")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
 def draw_fragility(document: Document) -> Figure:
-    """Band of the share of records over the measure, for the last limit, by level."""
+    """Bounds of the share of records that exceed the last limit, over their measure, by level."""
     limit = list(document["limits"].values())[-1]
     alpha = np.asarray(document["alpha"], float)
     measure = np.asarray(limit["measure"], float)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callable[[], Figure]]]:
-    """Name and function of each figure of a study."""
+    """Yields the name of each figure of a study, one an output, and the function that draws it."""
     dataset, structure = results.envelopes[task.name].arrays, results.structure
     assert structure is not None
     for name in task.figures or map(str, dataset["output"].values):
@@ -35,7 +35,7 @@ def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callab
 
 
 def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Figure:
-    """Nested bands between lower and upper envelope, the error of the lowest, the modal motion."""
+    """Bands between the lower and upper envelope of an output, by level, and their errors."""
     figure, axes = style.figure()
     shown = dataset.sel(output=str(output))
     alpha, time = dataset["alpha"].values, dataset["time"].values
@@ -46,16 +46,19 @@ def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Fig
         axes.plot(time, shown.isel(alpha=-1)[side], color=style.INK, lw=0.8)
         axes.plot(time, shown.isel(alpha=0)[side], color=style.INK, lw=0.3)
     nature = str(dataset.attrs["nature"])
-    words = nature + error_band(axes, time, shown.isel(alpha=0), nature, output.unit)
+    error = draw_error_band(axes, time, shown.isel(alpha=0), nature, output.unit)
     time_axes(axes, time, output)
-    title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {words}"
+    title = f"{output.words}; fuzzy: {', '.join(task.fuzzy)}; {nature}{error}"
     style.title(axes, fill(re.sub(r"(?<=\d) ", "\u00a0", title), 80))  # keeps units by numbers
     style.alpha_legend(axes, alpha)
     return figure
 
 
-def error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: str) -> str:
-    """Draws the error outside the lowest band, and says how large it is."""
+def draw_error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: str) -> str:
+    """Draws the declared error around the band of the lowest level; returns it as a text.
+
+    Guaranteed bounds contain their error: nothing is drawn, and the text is empty.
+    """
     if "error" not in lowest or nature == "guaranteed":
         return ""
     error = lowest["error"]
@@ -72,18 +75,24 @@ def time_axes(axes: Axes, time: Array, output: Output) -> None:
 
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
-    """Fig. 20: trajectories for parameters inside an α-cut, and the envelope that encloses them."""
+    """Fig. 20: motions of random inputs inside the lowest cut, and the envelope around them.
+
+    Args:
+        results: Results of the run; the first study with two fuzzy inputs is shown.
+        count: Number of motions.
+        duration: Largest time shown, in s.
+    """
     task = next((x for x in results.tasks if len(x.fuzzy) > 1), results.tasks[0])
     dataset, structure = results.envelopes[task.name].arrays.isel(alpha=0), results.structure
     assert structure is not None
     names = [str(name) for name in dataset["output"].values]
-    output = names[-1 if "q" in names[-1] else 0]
+    output = names[-1] if "q" in names[-1] else names[0]  # the top floor's displacement
     inputs, step = structure.inputs(task.fuzzy), task.section.step
     end = round(min(duration, task.duration) / step) * step
     scheme = task.section.integrator or ("exact" if structure.frame else None)
     flow = structure.flow(tuple(inputs), end, step, scheme)
-    ends = np.array([number.cut(float(dataset["alpha"])) for number in inputs.values()])
-    points = np.random.default_rng(0).uniform(ends[:, 0], ends[:, 1], (count, len(ends)))
+    lower, upper = np.array([x.cut(float(dataset["alpha"])) for x in inputs.values()]).T
+    points = np.random.default_rng(0).uniform(lower, upper, (count, len(inputs)))
     curves = flow.values(points)[:, :, list(flow.outputs).index(output)]
     figure, axes = style.figure()
     axes.plot(flow.time, curves.T, color=style.BLUE, lw=0.5, alpha=0.5)
@@ -97,37 +106,34 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
 
 
 def identified(document: Document) -> Figure:
-    """Each input's interval at every level over that of its prior, over the middle of that.
+    """Bars of each input's prior interval and of its identified cuts, over the prior's middle.
 
     Args:
         document: As of `stages.identify.identify_inputs`.
     """
     names, alpha = list(document["inputs"]), np.asarray(document["alpha"], float)
     figure, axes = style.figure(height=0.9 + 0.32 * len(names))
-    places = np.arange(len(names), dtype=float)[::-1]
-    prior = np.array([document["prior"][name] for name in names], float)
-    unit = prior.mean(axis=1)[:, None]
-    ends = (
-        np.array(
-            [[interval["lower"], interval["upper"]] for interval in document["inputs"].values()]
-        )
-        / unit[..., None]
-    )
+    rows = np.arange(len(names), dtype=float)[::-1]
+    prior = np.array([document["prior"][name] for name in names], float)  # (inputs, 2)
+    middles = prior.mean(axis=1)[:, None]
+    before = prior / middles
     wide: style.Look = {"height": 0.7, "color": style.GREY, "alpha": 0.45, "label": "before"}
-    axes.barh(places, np.ptp(prior / unit, axis=1), left=(prior / unit)[:, 0], lw=0, **wide)
-    for row, level in enumerate(alpha):
-        words = f"after, α = {level:g}" if row in (0, len(alpha) - 1) else None
-        bar: style.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": words}
-        low, high = ends[:, 0, row], ends[:, 1, row]
-        axes.barh(places, high - low, left=low, lw=0, color=style.BLUE, **bar)
-    axes.set_yticks(places, names)
+    axes.barh(rows, np.ptp(before, axis=1), left=before[:, 0], lw=0, **wide)
+    cuts = document["inputs"].values()
+    lower, upper = (np.array([cut[side] for cut in cuts]) / middles for side in ("lower", "upper"))
+    for k, level in enumerate(alpha):
+        label = f"after, α = {level:g}" if k in (0, len(alpha) - 1) else None
+        bar: style.Look = {"height": 0.5 - 0.3 * level, "alpha": 0.35 + 0.6 * level, "label": label}
+        widths = upper[:, k] - lower[:, k]
+        axes.barh(rows, widths, left=lower[:, k], lw=0, color=style.BLUE, **bar)
+    axes.set_yticks(rows, names)
     axes.set_xlabel("value over the middle of what it was before")
     axes.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
 
 def spectra(suite: Document) -> Figure:
-    """Pseudo-acceleration of each record over the period, their mean, and T1."""
+    """Response spectra (pseudo-acceleration) of the records of a suite, their mean, and T1."""
     figure, axes = style.figure(7.2, 3.6)
     periods = np.asarray(suite["spectra"]["period_s"], float)
     names = [name for name in suite["spectra"] if name != "period_s"]

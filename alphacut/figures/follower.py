@@ -36,53 +36,55 @@ LINES: dict[str, Look] = {
 
 
 def follower(results: Results, task: EnvelopeTask) -> Figure:
-    """Five panels: from the first guess to the envelope, for one output at the lowest level."""
+    """Figs. 21 to 25: five steps of the Graph Follower, for one output at the lowest level.
+
+    A graph is the trajectory of one point of the inputs. At each node (of time) and side (lower,
+    upper) the follower guesses the best stored graph, and may compute a new one.
+    """
     import matplotlib.pyplot as plt
     from matplotlib.lines import Line2D
 
-    walk, column = recorded(results, task)
-    flow, points = walk.storage.flow, walk.storage.points
-    time, graphs = flow.time, flow.values(points)[..., column]
-    guess, new = walk.guess[0, :, column], walk.new[0, :, column]  # by node and side
+    run, column = followed_run(results, task)
+    flow, points = run.storage.flow, run.storage.points
+    time, graphs = flow.time, flow.values(points)[..., column]  # (T,), (graphs, T)
+    guess, new = run.guess[0, :, column], run.new[0, :, column]  # graphs by (node, side); −1: none
     lower, upper = graphs.min(0), graphs.max(0)
-    figure, named = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
-    panels = [named[letter] for letter in "12345"]
-    places = np.argwhere(new >= 0)
-    start = places[0, 0]
-    first = new[start][new[start] >= 0]
-    late = places[(places[:, 0] > 0.5 * len(time)) & (guess[*places.T] > 0)]
-    node, side = late[0] if len(late) else places[-1]
+    figure, mosaic = plt.subplot_mosaic("12;34;55", figsize=(8.4, 8.4), sharex=True, sharey=True)
+    panels = [mosaic[letter] for letter in "12345"]
+    computed = np.argwhere(new >= 0)  # (node, side) of each new graph
+    first_node = computed[0, 0]
+    first_graphs = new[first_node][new[first_node] >= 0]
+    late = computed[(computed[:, 0] > 0.5 * len(time)) & (guess[*computed.T] > 0)]
+    node, side = late[0] if len(late) else computed[-1]
 
-    def base(panel: Axes, shown: Iterable[int], node: int | None, last: int) -> None:
-        """Stored graphs in grey, the newest `last` in orange, and the node under treatment."""
-        rows = list(shown)
-        for index, row in enumerate(rows):
-            fresh = index >= len(rows) - last
-            colour, width = (ORANGE, 1.3) if fresh else (GREY, 0.4)
-            panel.plot(time, graphs[row], color=colour, lw=width)
+    def draw_graphs(panel: Axes, indices: Iterable[int], node: int | None, n_new: int) -> None:
+        """Draws graphs in grey, the last `n_new` of them in orange, and marks a node."""
+        shown = list(indices)
+        for position, graph in enumerate(shown):
+            is_new = position >= len(shown) - n_new
+            colour, width = (ORANGE, 1.3) if is_new else (GREY, 0.4)
+            panel.plot(time, graphs[graph], color=colour, lw=width)
         if node is not None:
             panel.axvline(time[node], color=INK, lw=0.8, ls=":")
 
-    base(panels[0], [0], start, 0)
+    draw_graphs(panels[0], [0], first_node, 0)
     panels[0].plot(time, graphs[0], color=BLUE, lw=1.3)
-    base(panels[1], [0, *first], start, len(first))
-    base(panels[2], range(new[node, side] + 1), node, 1)
+    draw_graphs(panels[1], [0, *first_graphs], first_node, len(first_graphs))
+    draw_graphs(panels[2], range(new[node, side] + 1), node, 1)
     panels[2].plot(time, graphs[guess[node, side]], color=BLUE, lw=1.3)
-    base(panels[3], range(len(graphs)), None, 0)
+    draw_graphs(panels[3], range(len(graphs)), None, 0)
     nodes = np.arange(len(time))[:, None]
-    seen = np.stack([graphs[guess, nodes], graphs[np.where(new < 0, guess, new), nodes]])
-    for local, final in ((seen[..., 0].min(0), lower), (seen[..., 1].max(0), upper)):
-        panels[3].plot(time, local, color=BLUE, lw=1.0)
+    # what the sweep knew at each node: the guess, and the new graph if there is one
+    swept = np.stack([graphs[guess, nodes], graphs[np.where(new < 0, guess, new), nodes]])
+    for bound, final in ((swept[..., 0].min(0), lower), (swept[..., 1].max(0), upper)):
+        panels[3].plot(time, bound, color=BLUE, lw=1.0)
         panels[3].plot(time, final, color=INK, lw=1.3)
     panels[4].fill_between(time, lower, upper, color=BLUE, alpha=0.2, lw=0)
     for final in (lower, upper):
         panels[4].plot(time, final, color=INK, lw=1.3)
     for number, (panel, title) in enumerate(zip(panels, TITLES, strict=False), start=1):
-        panel.set_title(
-            f"{f'Fig. {20 + number}' if results.is_paper else number}: {title}",
-            loc="left",
-            fontsize=9,
-        )
+        label = f"Fig. {20 + number}" if results.is_paper else number
+        panel.set_title(f"{label}: {title}", loc="left", fontsize=9)
     panels[4].set_xlabel("time t (s)")
     output = flow.outputs[column]
     for panel in panels[::2]:
@@ -92,23 +94,21 @@ def follower(results: Results, task: EnvelopeTask) -> Figure:
     return figure
 
 
-def recorded(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
-    """A run of the Graph Follower, and the column of the output drawn."""
-    structure = results.structure
+def followed_run(results: Results, task: EnvelopeTask) -> tuple[Followed, int]:
+    """Bounds and graphs of a Graph Follower at α = 0, and the column of the output to be drawn.
+
+    The output is the displacement of the highest floor.
+    """
+    structure, step = results.structure, task.section.step
     assert structure is not None
-    cuts = boxes(structure.inputs(task.fuzzy), (0.0,))
-    steps = max(
-        1, min(round(DURATION / task.section.step), round(task.duration / task.section.step))
-    )
-    flow = UnitFlow(
-        structure.flow(cuts.names, steps * task.section.step, task.section.step),
-        cuts,
-        not task.tolerance(structure).unit,
-    )
-    output = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
-    for share in (1.0, 1e-2, 1e-4, 1e-8):  # fine enough that there is something to see
-        fine = share * task.section.gain * task.tolerance(structure).value
-        walk = GraphFollower(tolerance=fine).follow(flow)
-        if (walk.new[0, :, output] >= 0).any():
+    cuts, tolerance = boxes(structure.inputs(task.fuzzy), (0.0,)), task.tolerance(structure)
+    steps = max(1, min(round(DURATION / step), round(task.duration / step)))
+    motion = structure.flow(cuts.names, steps * step, step)
+    flow = UnitFlow(motion, cuts, not tolerance.unit)
+    column = max(0, len([name for name in flow.outputs if name.startswith("q")]) - 1)
+    for refinement in (1.0, 1e-2, 1e-4, 1e-8):  # until a new graph is computed, to have one to show
+        gain = refinement * task.section.gain * tolerance.value
+        run = GraphFollower(tolerance=gain).follow(flow)
+        if (run.new[0, :, column] >= 0).any():
             break
-    return walk, output
+    return run, column

@@ -19,7 +19,7 @@ CUTS = 6
 
 
 def kinds_of(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
-    """A number of each kind: parts of an input, and a result whose α-cuts are joined."""
+    """A fuzzy number of each kind, by its name: four made of an input, and a computed result."""
     half, three_quarters = given.cut(0.5), given.cut(0.75)
     ends = (given.support.lower, *three_quarters, given.support.upper)
     return {
@@ -32,11 +32,11 @@ def kinds_of(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
 
 
 def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
-    """Fig. 36: membership of each kind of number: the particle's modulus, and the cell's at last.
+    """Fig. 36: membership functions of crisp, interval, triangular … numbers, side by side.
 
     Args:
-        given: Young's modulus of the particle, in Pa.
-        result: Young's modulus of the cell, in Pa.
+        given: Young's modulus of the particle, in Pa, of which the first four are made.
+        result: Young's modulus of the cell, in Pa, which is the last.
     """
     import matplotlib.pyplot as plt
 

@@ -38,14 +38,14 @@ def distribution(radius: HermiteMap, at: Array) -> Array:
     """Probabilities P(r ≤ at) of the radius under the law of θ, in the shape of `at`."""
     law = radius.distribution
     theta = np.linspace(law.lower, law.upper, 4001)
-    radii, mass = radius((theta[1:] + theta[:-1]) / 2), np.diff(law.cdf(theta))
-    order = np.argsort(radii, kind="stable")
+    radii, mass = radius((theta[1:] + theta[:-1]) / 2), np.diff(law.cdf(theta))  # of each piece
+    order = np.argsort(radii, kind="stable")  # the map need not rise
     cdf = np.cumsum(mass[order]) - mass[order] / 2
     return np.asarray(np.interp(at, radii[order], cdf, left=0.0, right=1.0))
 
 
 def p_box(section: RadiusMapSection) -> Figure:
-    """Fig. 13: lower, upper and modal distribution of r_n over the fuzzy slopes."""
+    """Fig. 13: p-box of the reduced radius, between the maps at the corners of the supports."""
     figure, axes = style.figure()
     corners = maps(section, 0.0)
     low = min(radius.extremes()[0] for radius in corners)

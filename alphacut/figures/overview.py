@@ -75,7 +75,13 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
 
 
 def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
-    """Product domain: faces of the prisms on the cell's sides in front and on the cone."""
+    """Product domain: faces of prisms on the front sides of the cell, and on the particle's cone.
+
+    Args:
+        axes: Axes in three dimensions.
+        grid: Mesh of prisms.
+        levels: Positions (x1, x2, θ) of the plane nodes at each level of θ, (levels, nodes, 3).
+    """
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
@@ -110,7 +116,13 @@ def boundary_edges(grid: PrismGrid) -> Rows:
 
 
 def layer_faces(levels: Array, edges: Rows, nodes: Mask) -> Array:
-    """Quadrilaterals of each layer over the edges between chosen nodes, shape (n, 4, 3)."""
+    """Side faces of the prisms over the edges between chosen nodes, shape (n, 4, 3).
+
+    Args:
+        levels: Positions of the plane nodes at each level of θ, shape (levels, nodes, 3).
+        edges: Nodes of each plane edge, shape (edges, 2).
+        nodes: True for a node that is chosen, shape (nodes,).
+    """
     first, second = edges[nodes[edges].all(axis=1)].T
     below, above = levels[:-1], levels[1:]
     faces = np.stack([below[:, first], below[:, second], above[:, second], above[:, first]], axis=2)
@@ -121,7 +133,7 @@ def stages(results: Results) -> Figure:
     """Fig. 2: the stages of the run, with the data that each hands to the next."""
     from matplotlib.patches import FancyBboxPatch
 
-    boxes, arrows = stages_of(results)
+    boxes, arrows = boxes_and_arrows(results)
     figure, axes = style.figure(2.9 * len(boxes), 1.9)
     box: Look = {"boxstyle": "round,pad=0.02", "facecolor": "#dbe9f4", "edgecolor": INK, "lw": 1}
     centred: Look = {"ha": "center", "va": "top"}
@@ -140,14 +152,18 @@ def stages(results: Results) -> Figure:
     return figure
 
 
-def stages_of(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]:
-    """Title and lines of each stage of a run, and what goes from each to the next."""
+def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]:
+    """Title and lines of the box of each stage of a run, and a text for the arrow after each box.
+
+    The last box has no arrow.
+    """
     content = results.content
     boxes: list[tuple[str, list[str]]] = []
     arrows: list[str] = []
     if content.radius is not None and results.modulus is not None:
         numbers = getattr(content.radius, "numbers", {})
-        lines = [f"{x} = [{', '.join(f'{y:.4g}' for y in ends_of(n))}]" for x, n in numbers.items()]
+        texts = {x: ", ".join(f"{end:.4g}" for end in ends_of(n)) for x, n in numbers.items()}
+        lines = [f"{name} = [{text}]" for name, text in texts.items()]
         boxes.append(("radius of the particle", lines))
         arrows.append("r(θ)")
     if (data := results.modulus) is not None:
@@ -157,7 +173,7 @@ def stages_of(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]
         boxes.append(("cell on the product domain", lines))
         arrows.append("fuzzy E")
     if results.structure is not None:
-        fuzzy = {name: None for task in results.tasks for name in task.fuzzy}
+        fuzzy = dict.fromkeys(name for task in results.tasks for name in task.fuzzy)
         outputs = ", ".join(results.structure.outputs[:4])
         boxes.append(("structure", [f"fuzzy: {', '.join(fuzzy)}", f"outputs: {outputs}"]))
         arrows.append("flow q(t; p)")

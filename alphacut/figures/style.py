@@ -59,7 +59,7 @@ def colours(alpha: Array) -> list[Colour]:
 
 
 def alpha_legend(axes: Axes, alpha: Array) -> None:
-    """The α scale, explained beside the axes, where no data are."""
+    """Adds a legend of the colours of α-levels, beside the axes where no data are."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -76,7 +76,14 @@ def title(axes: Axes, text: str) -> None:
 
 
 def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> None:
-    """Labels the vertical or horizontal axis, with a prefix to its unit; the data stay in SI."""
+    """Labels an axis, and scales its tick labels to a prefixed unit such as mm; data stay in SI.
+
+    Args:
+        axes: Axes whose limits are set.
+        label: Name of the quantity.
+        si: Its SI unit.
+        across: Whether the axis is the horizontal one; else the vertical one.
+    """
     limits = axes.get_xlim() if across else axes.get_ylim()
     factor, unit = axis_prefix(max(map(abs, limits)), si)
     words = f"{label} ({unit})".replace("^2", "²") if unit else label
@@ -97,7 +104,7 @@ def outline(lower: Array, upper: Array) -> Array:
 
 
 def shaded_cuts(axes: Axes, alpha: Array, lower: Array, upper: Array) -> None:
-    """A membership function from its α-cuts, each cut as a bar at its level."""
+    """Draws a membership function from its α-cuts, each cut as a bar at its level."""
     for level, low, high, shade in zip(alpha, lower, upper, colours(alpha), strict=True):
         axes.plot([low, high], [level, level], color=shade, lw=3, solid_capstyle="butt", zorder=2)
     line: Look = {"color": INK, "lw": 1.2, "marker": "o", "ms": 3.5, "zorder": 3}

@@ -174,7 +174,7 @@ class Pipeline:
         results.structure = structure
         mode = suite.nominal_mode(structure)
         records = suite.suite(section, task.section, structure)
-        for words in suite.warnings(records):
+        for words in suite.suite_warnings(records):
             say(f"warning: {words}")
         limited = self.content.limited_outputs or structure.outputs
         stages = suite.stages(structure, replace(task, limited=limited), records)

@@ -125,7 +125,7 @@ def _record(
     return SuiteRecord(named.name, scaled, steps * envelope.step, sizes, cut_share, offset)
 
 
-def warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
+def suite_warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
     """Sentences on records that are not centred, or are cut."""
     for record in records:
         if abs(record.offset_share) > MAX_OFFSET:

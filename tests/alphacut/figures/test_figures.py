@@ -64,7 +64,7 @@ def test_the_error_is_drawn_outside_bounds_that_it_may_pass(nature, lines):
     data = study(nature, error=0.25 * np.ones((2, 11, 1)))
     with style.report_style():
         _, axes = style.figure()
-        words = envelope.error_band(
+        words = envelope.draw_error_band(
             axes, data["time"].values, data.sel(output="q1").isel(alpha=0), nature, "m"
         )
         ends = sorted(float(line.get_ydata()[0]) for line in axes.lines)
