@@ -60,8 +60,8 @@ class PartBounds:
             in SI units; None for all of the part.
         pruned: Upper bounds over the remainder of the part, for the nodes asked for; None if
             nothing was pruned.
-        least_peaks: Lower bound of each output's smallest peak, and one that is reached, shapes
-            (m,); None where not all nodes are bounded.
+        least_peaks: Lower bound of each output's smallest peak, and one that some motion does not
+            exceed, between nodes too, shapes (m,); None where not all nodes are bounded.
         facts: Further numbers by name.
     """
 

@@ -28,7 +28,8 @@ class Envelope(Bounds):
         attained_error: What the exact motion at `lower_at` and `upper_at` may exceed the attained
             bounds `inner` by, shape (T, m); None for rounding alone.
         least_peaks: Proved lower bound of the smallest peak of the output in each cut, and the
-            smallest that a motion is known to have, each (A, m); None for what the bounds say.
+            smallest that some motion does not exceed, between nodes too, each (A, m); None for what
+            the bounds say.
         facts: Further numbers by name. A length is that of the first displacement, of the first
             output where none is one, and a share of each peak where the tolerance was relative.
             `step_error`: what time stepping adds; `gain`: predicted gain worth a graph;

@@ -26,6 +26,9 @@ from alphacut.fuzzy.arrays import Array, Rows
 
 MOST_ENTRIES = 400_000
 """Entries of the matrices of all points whose exact motions are computed together."""
+SUBSTEPS = 4
+"""Parts of a step at whose ends the peak of one motion is read; what lies between falls with its
+square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +129,19 @@ class Box:
         columns = [outputs_at(modal, once, once + o, self.time, loads) for o in range(m)]
         value, error = (np.stack(column, -1) for column in zip(*columns, strict=True))
         return value, error, self._line_deviation(modal)
+
+    def peak_over_time(self, unit: Array) -> Array:
+        """Upper bound of each output's largest magnitude at coordinates (d,), steps included, (m,).
+
+        Raises:
+            UnprovedError: A mode does not oscillate there.
+        """
+        point, steps = self.inputs(unit), SUBSTEPS * (len(self.time) - 1)
+        time = np.linspace(self.time[0], self.time[-1], steps + 1)
+        motion = replace(self, time=time, low=point, high=point)
+        value, error, deviation = motion.centre_motion()
+        size = np.abs(value) + error
+        return np.asarray((np.maximum(size[1:], size[:-1]) + deviation[1:]).max(0))
 
     @property
     def _shape(self) -> tuple[int, int]:

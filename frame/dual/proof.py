@@ -151,7 +151,7 @@ class DualProof:
         sides, margin = np.stack([-value, value], -1), error[..., None]
         at = np.broadcast_to(low, (*sides.shape, len(low))).copy()
         shares = np.zeros((*sides.shape[1:], len(low)))
-        least = Ends((np.abs(value) - error).max(0), (np.abs(value) + error).max(0))
+        least = Ends((np.abs(value) - error).max(0), box.peak_over_time(np.zeros(0)))
         found = PartBounds(sides + margin, sides - margin, at, deviation, shares, 2 * error)
         return replace(found, least_peaks=least)
 
@@ -230,7 +230,9 @@ class _Bounding:
         return Ends(np.array(bounds), self._small_peaks(np.stack(units)))
 
     def _small_peaks(self, unit: Array) -> Array:
-        """A small peak that is reached of each output (m,), by a descent over corners.
+        """A small peak that some motion does not exceed, of each output (m,), over corners.
+
+        A descent by the peaks at the nodes chooses the motion; its steps are then included.
 
         Args:
             unit: Coordinates near each output's smallest peak, shape (m, d).
@@ -241,7 +243,7 @@ class _Bounding:
             tried = np.unique((unit[:, None] * moves).reshape(-1, d), axis=0)
             peaks = np.abs(self.flow.values(self.box.inputs(tried))).max(1)
             unit = tried[peaks.argmin(0)]
-        return np.asarray(peaks.min(0))
+        return np.array([self.box.peak_over_time(at)[o] for o, at in enumerate(unit)])
 
     def _require_narrow(self) -> None:
         """Refuse a part whose Taylor remainders exceed `WIDE` of a peak, if bisections help.

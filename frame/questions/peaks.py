@@ -138,6 +138,9 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
     lower = np.where(proved, np.maximum(lower, least_proved), lower)
     upper = np.where(proved, upper + above, upper)
     reached = np.where(np.isnan(attained), floor, attained).max(1)
+    least_reached = np.full(envelope.upper[:, 0].shape, np.inf)
+    if envelope.least_peaks is not None:
+        least_reached = envelope.least_peaks.upper
     return Peaks(
         np.asarray(envelope.alpha),
         names,
@@ -146,7 +149,7 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
         np.where(proved, 0.0, np.maximum(above, below)),
         np.maximum(reached, floor),
         least_proved,
-        np.where(signed, np.inf, _least_reached(envelope, envelope.upper.max(1))[:, columns]),
+        np.where(signed, np.inf, least_reached[:, columns]),
         natures,
     )
 
@@ -170,14 +173,6 @@ def _sided(band: Ends, names: Sequence[str], columns: Sequence[int]) -> tuple[Ar
         upper.append(most)
         lower.append(least)
     return np.stack(upper, -1), np.stack(lower, -1)
-
-
-def _least_reached(envelope: Envelope, like: Array) -> Array:
-    """Return the peak that some motion of each cut does not exceed, steps included, (A, m)."""
-    if envelope.least_peaks is None:
-        return np.full_like(like, np.inf)
-    between = 0.0 if envelope.between is None else envelope.between.max(0)
-    return envelope.least_peaks.upper + between
 
 
 def joined(first: Peaks, second: Peaks) -> Peaks:

@@ -5,6 +5,7 @@ import pytest
 
 from alphacut.frame import DualProof, envelope
 from alphacut.frame.dual import least_peaks
+from alphacut.frame.dual.box import Box
 from alphacut.frame.dynamics.flow import LinearFlow
 from alphacut.frame.dynamics.integrators import Exact
 from alphacut.frame.questions.peaks import passing, peaks
@@ -37,6 +38,18 @@ def test_no_motion_peaks_lower(found):
     assert (proved <= reached).all()
     assert (np.diff(proved, axis=0) >= 0).all()
     assert (proved[0] >= 0.75 * np.minimum(reached[0], lowest(0.0))).all()
+
+
+def test_the_peak_of_a_motion_holds_between_nodes():
+    low, high = np.array([number.cut(0.0) for number in FUZZY.values()]).T
+    seed = np.random.SeedSequence().entropy
+    unit = np.random.default_rng(seed).uniform(-1, 1, len(low))
+    box = Box(MODEL, tuple(FUZZY), np.linspace(0.0, 4.0, 81), low, high)
+    bound = box.peak_over_time(unit)
+    fine = LinearFlow(MODEL, tuple(FUZZY), 4.0, 0.001, Exact()).values(box.inputs(unit)[None])[0]
+    peak = np.abs(fine).max(0)
+    assert (peak <= bound).all(), f"seed {seed}"
+    np.testing.assert_allclose(bound, peak, rtol=0.02, err_msg=f"seed {seed}")
 
 
 def test_a_limit_below_the_least_peak_must_be_exceeded(found):
