@@ -179,12 +179,12 @@ class Search:
         """
         if not isinstance(flow.flow, LinearFlow):
             raise ModalError("search: the system is not linear; take the Graph Follower")
-        small = SMALL * flow.tolerance(self.tolerance)
-        model = fit_modes(flow.flow, flow.boxes, tolerance=small, scale=flow.scale)
+        least_gain = SMALL * flow.tolerance(self.tolerance)
+        model = fit_modes(flow.flow, flow.boxes, tolerance=least_gain, scale=flow.scale)
         exact = ExactResponse.from_model(model, flow.scale, bent=not _rough(model, flow))
         levels, solved = len(flow.boxes.alpha), list[Optima]()
         for done, level in enumerate(reversed(range(levels))):
-            box = (*flow.boxes.unit(level), small)
+            box = (*flow.boxes.unit(level), least_gain)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
             optima = first_optima(exact.model, *box, nodes=nodes)
             _evaluate(exact, optima, box, tick)
@@ -240,7 +240,7 @@ class Search:
             if difference.max() <= AGREEMENT * tolerance:
                 break
         outputs = len(first.response.outputs)
-        return best, best.left + _missed(difference, outputs, AGREEMENT * tolerance)
+        return best, best.predicted_gain + _missed(difference, outputs, AGREEMENT * tolerance)
 
 
 class _IndependentSearch:
@@ -258,16 +258,16 @@ class _IndependentSearch:
         self.response, self.seed, self.number = response, seed, number
         self.narrower: Optima | None = None
 
-    def start(self, lower: Array, upper: Array, small: float, tick: Progress) -> None:
+    def start(self, lower: Array, upper: Array, least_gain: float, tick: Progress) -> None:
         """Find optima in a box from a sample of it, and from those of the narrower box.
 
         Args:
             lower: Lower ends of the box in unit coordinates, shape (d,).
             upper: Upper ends.
-            small: Gain below which Newton's method stops.
+            least_gain: Gain below which Newton's method stops.
             tick: Called with the completed fraction.
         """
-        self.box = lower, upper, small
+        self.box = lower, upper, least_gain
         unit = None
         if self.number:
             rng = np.random.default_rng((self.seed, self.number))
@@ -368,7 +368,7 @@ def _compared(
         first,
         point=np.where(better[:, None], improved.point, first.point),
         value=np.maximum(first.value, improved.value),
-        left=np.where(better, improved.left, first.left),
+        predicted_gain=np.where(better, improved.predicted_gain, first.predicted_gain),
     )
     return best, np.abs(improved.value - first.value)
 

@@ -14,16 +14,19 @@ from alphacut.fuzzy.progress_bar import Progress, subprogress
 
 SAMPLES = 256
 """Trajectories of the model that the first optima begin at."""
-PIECE = 6000
-"""Problems treated together; more would leave the cache."""
-LEAST = 250
+MAX_PIECE = 6000
+"""Most problems solved together, of six inputs; more would leave the cache."""
+MIN_PIECE = 250
 """Problems below which a piece costs more than it saves."""
-USUAL = 6
-"""Newton steps after which quadratic models are maximised over all faces: the rest is on ridges."""
-FIRST_RADIUS, SURE = 0.4, 0.1
-"""Trust region's first radius; by how much a gain may miss what was promised of a sound model."""
-WIDTH = 2.0
-"""Of the unit box."""
+LOCAL_STEPS = 6
+"""Newton steps by local maxima of the quadratic models; problems that need more lie on ridges, and
+their models are maximised over all faces of the box."""
+FIRST_RADIUS = 0.4
+"""First radius of the trust region, in unit coordinates."""
+SOUND = 0.1
+"""Relative error of a predicted gain up to which the radius grows five times in place of twice."""
+BOX_WIDTH = 2.0
+"""Width of the unit box [−1, 1]^d."""
 ITERATIONS = 300
 """Newton steps after which a problem that has not converged is left as it is."""
 
@@ -32,7 +35,7 @@ def first_optima(
     model: ModalModel,
     lower: Array,
     upper: Array,
-    small: float,
+    least_gain: float,
     unit: Array | None = None,
     progress: Progress | None = None,
     nodes: Rows | None = None,
@@ -43,9 +46,9 @@ def first_optima(
         model: The modal model.
         lower: Lower ends, shape (d,).
         upper: Upper ends.
-        small: What Newton's method may leave, in units of the outputs.
+        least_gain: Predicted gain below which Newton's method stops, in units of the outputs.
         unit: The sample in [−1, 1]^d, shape (n, d); the centre and Chebyshev points unless given.
-        progress: Takes the share done.
+        progress: Called with the completed fraction.
         nodes: Indices of the nodes, shape (J,); all of the model unless given.
     """
     nodes = np.arange(len(model.time)) if nodes is None else nodes
@@ -54,7 +57,7 @@ def first_optima(
     points = (lower + upper) / 2 + (upper - lower) / 2 * unit
     optima = best_of(points, trajectories(model, points, nodes), nodes)
     if (upper > lower).any():
-        refine(model, optima, np.arange(len(optima.value)), lower, upper, small, progress)
+        refine(model, optima, np.arange(len(optima.value)), lower, upper, least_gain, progress)
     return optima
 
 
@@ -64,15 +67,18 @@ def refine(
     which: Array,
     lower: Array,
     upper: Array,
-    small: float,
+    least_gain: float,
     progress: Progress | None = None,
 ) -> None:
-    """Newton's method in the box on `which`, until none promises more than `small`."""
-    size = min(PIECE * 6 // max(lower.size, 6), max(LEAST, -(-len(which) // 2)))
+    """Improve the optima in rows `which` by Newton's method in a box, in place.
+
+    A problem ends when its quadratic model predicts a gain of at most `least_gain`.
+    """
+    size = min(MAX_PIECE * 6 // max(lower.size, 6), max(MIN_PIECE, -(-len(which) // 2)))
     pieces = np.array_split(which, -(-len(which) // size) or 1)
     for done, piece in enumerate(pieces):
         tick = subprogress(progress, done / len(pieces), (done + 1) / len(pieces))
-        _newton(model, optima, piece, lower, upper, small, tick)
+        _newton(model, optima, piece, lower, upper, least_gain, tick)
 
 
 def _newton(
@@ -81,33 +87,35 @@ def _newton(
     which: Array,
     lower: Array,
     upper: Array,
-    small: float,
+    least_gain: float,
     tick: Progress,
 ) -> None:
-    """End a problem when its model, not held back by the trust region, promises at most `small`.
+    """Improve the optima in rows `which` by Newton's method with a trust region, in place.
 
-    What the models last promised is kept in `optima.left`.
+    A problem ends when its quadratic model predicts a gain of at most `least_gain` without the
+    trust region. The gain predicted last is kept in `optima.predicted_gain`.
     """
     size = len(which)
     radius: Array = np.full(size, FIRST_RADIUS)
     f, g, H = _signed(model, optima, optima.point[which], which)
-    bend = np.zeros_like(H)  # what gradients have shown H to lack
+    correction = np.zeros_like(H)  # of H, by secants of the gradient
     for count in range(ITERATIONS):
         low = np.maximum(lower - optima.point[which], -radius[:, None])
         high = np.minimum(upper - optima.point[which], radius[:, None])
         step = (
             local_maximum(g, H, low, high, rounds=2)
-            if count < USUAL
+            if count < LOCAL_STEPS
             else global_maximum(g, H, low, high)
         )
-        promised = gain(g, H, step)
-        optima.left[which] = promised
+        predicted = gain(g, H, step)
+        optima.predicted_gain[which] = predicted
         at_edge = np.abs(step).max(1, initial=0.0) >= 0.999 * radius
-        # held back, it may promise as much more in the whole box as a parabola does
-        open_ = promised * np.where(at_edge, np.minimum((WIDTH / radius) ** 2, 1e3), 1.0) > small
+        # at the edge of the region, a parabola would gain as much more in the whole box
+        growth = np.where(at_edge, np.minimum((BOX_WIDTH / radius) ** 2, 1e3), 1.0)
+        open_ = predicted * growth > least_gain
         if not open_.all():
-            which, radius, step, promised, g, H, bend = (
-                x[open_] for x in (which, radius, step, promised, g, H, bend)
+            which, radius, step, predicted, g, H, correction = (
+                x[open_] for x in (which, radius, step, predicted, g, H, correction)
             )
         tick(1 - len(which) / max(size, 1))
         if not len(which):
@@ -116,29 +124,29 @@ def _newton(
         step = trial - optima.point[which]
         f, g2, H2 = _signed(model, optima, trial, which)
         if model.secant:
-            H2 += bend
-            lack = _symmetric_rank_one(H2, step, g2 - g)
-            for x in (bend, H, H2):
-                x += lack
-        got = f - optima.value[which]
-        better = got > 0
+            H2 += correction
+            update = _symmetric_rank_one(H2, step, g2 - g)
+            for x in (correction, H, H2):
+                x += update
+        gained = f - optima.value[which]
+        better = gained > 0
         optima.point[which[better]], optima.value[which[better]] = trial[better], f[better]
         g[better], H[better] = g2[better], H2[better]
-        ratio = got / promised
+        ratio = gained / predicted
         radius = np.where(
             ratio > 0.75,
-            np.minimum(np.where(np.abs(ratio - 1) < SURE, 5, 2) * radius, WIDTH),
+            np.minimum(np.where(np.abs(ratio - 1) < SOUND, 5, 2) * radius, BOX_WIDTH),
             np.where(ratio < 0.25, 0.3 * np.abs(step).max(1), radius),
         )
 
 
 def _symmetric_rank_one(H: Array, step: Array, change: Array) -> Array:
-    """Least correction of Hessians (N, d, d) that explains a change of gradients over a step."""
+    """Symmetric rank-one updates of Hessians (N, d, d) from changes of gradients over steps."""
     lack = change - (H @ step[..., None])[..., 0]
     weight = (lack * step).sum(1)
     size = np.sqrt((lack**2).sum(1) * (step**2).sum(1))
-    sound = np.abs(weight) > 1e-6 * size
-    scaled = lack / np.where(sound, weight, 1.0)[:, None] * sound[:, None]
+    is_stable = np.abs(weight) > 1e-6 * size
+    scaled = lack / np.where(is_stable, weight, 1.0)[:, None] * is_stable[:, None]
     return np.asarray(lack[:, :, None] * scaled[:, None, :])
 
 

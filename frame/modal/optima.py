@@ -25,7 +25,7 @@ class Optima:
         side: +1 for an upper bound, −1 for a lower, shape (N,).
         point: Unit coordinates, shape (N, d).
         value: side × output there, shape (N,).
-        left: What Newton's method last promised beyond it, shape (N,).
+        predicted_gain: Gain over it that Newton's method predicted last, shape (N,).
     """
 
     node: Array
@@ -33,7 +33,7 @@ class Optima:
     side: Array
     point: Array
     value: Array
-    left: Array
+    predicted_gain: Array
 
     def offer(self, model: Response, points: Array, which: Array) -> Array:
         """Try `points` (W, d) on problems `which` (W,), keep and return the better ones."""
