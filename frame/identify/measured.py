@@ -103,7 +103,7 @@ def measured_mode(
         mode: Its number by rising frequency, from 1.
         frequencies: Measured values, in Hz.
         shapes: Measured amplitudes by floor, as many of each as frequencies. Each set is divided by
-            that of the reference floor, the highest near the largest: no chance decides.
+            that of the reference floor, the highest with a mean near the largest.
         frequency_deviation: Standard deviation of one value as a fraction of it, where it is known
             from elsewhere; from the values' own scatter otherwise, which takes two at least.
         shape_deviation: The same of any amplitude, as a fraction of the largest of the mode. Those
@@ -149,20 +149,20 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     Raises:
         RefusedError: The reference scatters by more than `ROUGH`, or as `_mean`.
     """
-    square = _scatter(ratios, deviation)
-    value, cure = f"{np.sqrt(square):.2g} of its amplitude", "take means of several rows"
+    variance = _reference_variance(ratios, deviation)
+    value, cure = f"{np.sqrt(variance):.2g} of its amplitude", "take means of several rows"
     key = f"{what}: scatter of floor {reference}"
-    clear = bool(np.isfinite(ratios).all()) and square <= ROUGH**2
+    clear = bool(np.isfinite(ratios).all()) and variance <= ROUGH**2
     require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
     # both amplitudes scatter; the last factor is above the second order's
-    combined = deviation and deviation * float(np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * square))
-    mean_of_inverse = 1 + square + 3 * square**2  # of 1/(1 + x), x normal
+    combined = deviation and deviation * float(np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance))
+    mean_of_inverse = 1 + variance + 3 * variance**2  # of 1/(1 + x), x normal
     unbiased = np.asarray(ratios / mean_of_inverse, float)
     return _mean(unbiased, combined, what, "shape_deviation")
 
 
-def _scatter(ratios: Array, deviation: float | None) -> float:
-    """Return the squared relative deviation of the reference amplitude.
+def _reference_variance(ratios: Array, deviation: float | None) -> float:
+    """Return the variance of the reference amplitude over its squared mean.
 
     Without a known deviation it is estimated from the variance of the ratios (n,).
     """
