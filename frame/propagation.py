@@ -163,7 +163,7 @@ def _problem(
     integrator: str | Integrator | None,
     options: Mapping[str, object],
 ) -> _Problem:
-    """Return method, flow (trajectories) and distinct boxes from the arguments of `envelope`.
+    """Return the method, the trajectories over distinct cuts, and the row of each level's cut.
 
     Raises:
         RefusedError: As `envelope`.
@@ -173,13 +173,14 @@ def _problem(
     require(is_system, "model", value=type(model).__name__, allowed=allowed)
     chosen_method = _method(model, method, options)
     if integrator is None:
-        proves = isinstance(chosen_method, Auto | Proof | DualProof | Search)
-        integrator = "exact" if proves and not isinstance(model, LagrangianSystem) else "midpoint"
-    levels = boxes(inputs, alpha)
-    flow = flow_of(model, levels.names, duration, step, integrator)
-    require_admissible(model, levels)
-    cuts, rows = levels.distinct()
-    return _Problem(chosen_method, UnitFlow(flow, cuts), levels.alpha, rows)
+        uses_modes = isinstance(chosen_method, Auto | Proof | DualProof | Search)
+        is_linear = not isinstance(model, LagrangianSystem)
+        integrator = "exact" if uses_modes and is_linear else "midpoint"
+    cuts = boxes(inputs, alpha)
+    flow = flow_of(model, cuts.names, duration, step, integrator)
+    require_admissible(model, cuts)
+    distinct_cuts, rows = cuts.distinct()
+    return _Problem(chosen_method, UnitFlow(flow, distinct_cuts), cuts.alpha, rows)
 
 
 def require_envelope(

@@ -225,19 +225,24 @@ class LowerGrid:
         return [self._along(axis, triangle) for triangle in triangles for axis in axes]
 
     def _along(self, axis: int, factor: Array) -> csr_array:
-        """Sparse matrix on all terms that applies a triangular `factor` along one axis, (S, S)."""
+        """Sparse matrix (S, S) that applies a triangular `factor` (n, n) along one axis.
+
+        Its rows and columns are the S terms. With a term the set holds all of lower exponents, so
+        that each term with a lower degree along the axis is found by its key.
+        """
         degrees = self.index[:, axis]
-        weights = len(factor) ** np.arange(len(self.degrees))
-        order = np.argsort(keys := self.index @ weights)
+        place_values = len(factor) ** np.arange(len(self.degrees))
+        keys = self.index @ place_values
+        order = np.argsort(keys)
         rows, columns = [], []
-        for drop in range(int(degrees.max()) + 1):
-            high = np.flatnonzero(degrees >= drop)
-            low = order[np.searchsorted(keys[order], keys[high] - drop * weights[axis])]
+        for difference in range(int(degrees.max()) + 1):
+            high = np.flatnonzero(degrees >= difference)
+            low = order[np.searchsorted(keys[order], keys[high] - difference * place_values[axis])]
             rows.append(high)
             columns.append(low)
         high, low = np.concatenate(rows), np.concatenate(columns)
-        down = bool(factor[-1, 0])  # a lower triangle takes from the terms below
-        to, source = (high, low) if down else (low, high)
+        is_lower = bool(factor[-1, 0])  # a lower triangle takes from the terms below
+        to, source = (high, low) if is_lower else (low, high)
         return csr_array(
             (factor[degrees[to], degrees[source]], (to, source)), shape=(len(degrees),) * 2
         )

@@ -165,42 +165,50 @@ class AttainedWaves:
     slope_anywhere: Array
 
 
-def _wave(
-    source: str, sigma: Array, turn: Array, order: Rows, rho: tuple[Array, ...], most: Array
+def _waves(
+    source: str,
+    sigma: Array,
+    sigma_slope: Array,
+    order: Rows,
+    rho: tuple[Array, ...],
+    rho_bounds: Array,
 ) -> AttainedWaves:
-    """Responses e of all modes to one source, with bounds of their rounding and slopes.
+    """Responses e of all modes to one source, with bounds of their rounding and of |de/dλ|.
+
+    With G = σ^order ρ(σ; t), e is Re G + (γ/ω) Im G for a start, γ = −Re σ, and Im G/ω for the
+    other sources, with the other sign for the ground's acceleration, which acts as −M a.
 
     Args:
-        source: load, velocity, start or the name of a force.
+        source: "load" (the ground), "velocity", "start" or the name of a force.
         sigma: Exponents σ of the modes, shape (N, n), in 1/s.
-        turn: Bound of |dσ/dλ|, shape (N, n).
+        sigma_slope: Bound of |dσ/dλ|, shape (N, n).
         order: Derivative of the motion that is read, shape (N,).
         rho: ρ(σ; t), its derivative by σ, and the rounding of ρ, each (N, n).
-        most: Bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).
+        rho_bounds: Bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).
     """
     value, slope, error = rho
     omega, order, size = sigma.imag, order[:, None], np.abs(sigma)
-    power, lower = sigma**order, order * size ** np.maximum(order - 1, 0)
-    G, steep = power * value, lower * np.abs(value) + size**order * np.abs(slope)
-    anywhere = lower * most[0][:, None] + size**order * most[1][:, None]
-    error = size**order * error + gamma(2 * order.max() + 6) * np.abs(G)
+    power, power_slope = size**order, order * size ** np.maximum(order - 1, 0)
+    G = sigma**order * value
+    G_slope = power_slope * np.abs(value) + power * np.abs(slope)
+    G_bound = power * rho_bounds[0][:, None]
+    G_slope_bound = power_slope * rho_bounds[0][:, None] + power * rho_bounds[1][:, None]
+    error = power * error + gamma(2 * order.max() + 6) * np.abs(G)
     quotient = -sigma.real / omega
     if source == "start":
-        of_quotient = turn * (1 + quotient) / omega
-        largest = size**order * most[0][:, None]
+        quotient_slope = sigma_slope * (1 + quotient) / omega
         return AttainedWaves(
-            G.real + quotient * G.imag,
-            (1 + quotient) * error,
-            turn * (1 + quotient) * steep + of_quotient * np.abs(G),
-            turn * (1 + quotient) * anywhere + of_quotient * largest,
+            value=G.real + quotient * G.imag,
+            error=(1 + quotient) * error,
+            slope=sigma_slope * (1 + quotient) * G_slope + quotient_slope * np.abs(G),
+            slope_anywhere=sigma_slope * (1 + quotient) * G_slope_bound + quotient_slope * G_bound,
         )
-    side = -1.0 if source == "load" else 1.0
-    largest = size**order * most[0][:, None]
+    sign = -1.0 if source == "load" else 1.0
     return AttainedWaves(
-        side * G.imag / omega,
-        error / omega,
-        turn * (steep / omega + np.abs(G) / omega**2),
-        turn * (anywhere / omega + largest / omega**2),
+        value=sign * G.imag / omega,
+        error=error / omega,
+        slope=sigma_slope * (G_slope / omega + np.abs(G) / omega**2),
+        slope_anywhere=sigma_slope * (G_slope_bound / omega + G_bound / omega**2),
     )
 
 
@@ -220,26 +228,28 @@ def outputs_at(
         time: Node of each value, shape (N,), in s.
         loads: The loads by name.
     """
-    sigma, turn, t = modal.sigma[point], modal.sigma_slope[point], time[:, None]
+    sigma, sigma_slope, t = modal.sigma[point], modal.sigma_slope[point], time[:, None]
     free = np.exp(sigma * t)
     of_free = free, t * free, (gamma(4) + UNIT_ROUNDOFF * np.abs(sigma) * t) * np.abs(free)
-    most = {"velocity": np.stack([np.ones_like(time), time])}
-    most["start"], rho = most["velocity"], {"velocity": of_free, "start": of_free}
+    free_bounds = np.stack([np.ones_like(time), time])
+    rho = {"velocity": of_free, "start": of_free}
+    rho_bounds = {"velocity": free_bounds, "start": free_bounds}
     for name, load in loads.items():
         rho[name] = load.rho[0], load.rho[1], load.error
-        most[name] = np.stack([load.impulse, time * load.impulse])
+        rho_bounds[name] = np.stack([load.impulse, time * load.impulse])
     read, read_error = modal.output_coefficients(point, output)
     total, total_error = np.zeros(len(point)), np.zeros(len(point))
     for source, values in rho.items():
-        wave = _wave(source, sigma, turn, modal.order[output], values, most[source])
+        order, bounds = modal.order[output], rho_bounds[source]
+        wave = _waves(source, sigma, sigma_slope, order, values, bounds)
         if source.startswith("force"):
-            direct = np.where(modal.order[output] == 2, loads[source].value, 0.0)
+            direct = np.where(order == 2, loads[source].value, 0.0)
             error = wave.error + gamma(8) * np.abs(direct)[:, None]
             wave = replace(wave, value=wave.value + direct[:, None], error=error)
         share, share_error = modal.share[source][point], modal.share_error[source][point]
         total += (read * share * wave.value).sum(-1)
         total_error += _error(modal, point, (read, read_error), (share, share_error), wave)
-    longest = (np.einsum("skk->sk", modal.stiffness_error[point]) * turn * t).max(-1)
+    longest = (np.einsum("skk->sk", modal.stiffness_error[point]) * sigma_slope * t).max(-1)
     # what is of second order in G is a share of `longest` of what is of first
     return total, total_error / np.maximum(1 - longest, 1e-300)
 

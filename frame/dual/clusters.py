@@ -148,14 +148,18 @@ def _couplings(centre: CentredMatrices, some: Rows) -> Array:
 
 
 def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
-    """How far λ_j and λ_k may vary against one another, over their distance, (modes, modes).
+    """Bound of the change of λ_j − λ_k over the box to first order, over its size, (modes, modes).
 
-    At 1 their series meet a point where both are equal, for complex inputs within the unit discs.
+    From 1 on both may be equal at complex inputs of sizes up to 1, where their series diverge.
+
+    Args:
+        centre: M and K in the coordinates of the box's middle.
+        slopes: ∂λ_j/∂u_i in the middle, shape (modes, d).
     """
     couplings = np.abs(_couplings(centre, np.arange(centre.modes)))
-    moved = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
+    change = np.abs(slopes[:, None] - slopes).sum(-1) + 2 * couplings.sum(0)
     distance = np.abs(centre.squared[:, None] - centre.squared)
-    near = moved / np.maximum(distance, 1e-9 * centre.squared)
+    near = change / np.maximum(distance, 1e-9 * centre.squared)
     near[np.diag_indices_from(near)] = 0.0
     return near
 

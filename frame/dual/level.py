@@ -318,7 +318,11 @@ class OutputBounds:
         slack_below_peak: float,
         remainder_multiple: float,
     ) -> None:
-        """Improve bounds and model values at nodes (J,); other arguments as of `Effort`."""
+        """Improve the output's bounds at nodes (J,), and the model's values beside them, in place.
+
+        The other arguments are the fields of `Effort`: most slabs, evaluations for each, the gap
+        that is allowed below the peak, and the least gap in remainders that is worth any effort.
+        """
         self.improve(nodes, self.effort(slabs, steps, slack_below_peak, remainder_multiple))
 
     def effort(

@@ -155,7 +155,9 @@ def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: in
     clear = bool(np.isfinite(ratios).all()) and variance <= ROUGH**2
     require(clear, key, value=value, allowed=f"values up to {ROUGH:g}", cure=cure)
     # both amplitudes scatter; the last factor is above the second order's
-    combined = deviation and deviation * float(np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance))
+    combined = deviation and deviation * float(
+        np.hypot(1, ratios.mean()) * np.sqrt(1 + 8 * variance)
+    )
     mean_of_inverse = 1 + variance + 3 * variance**2  # of 1/(1 + x), x normal
     unbiased = np.asarray(ratios / mean_of_inverse, float)
     return _mean(unbiased, combined, what, "shape_deviation")

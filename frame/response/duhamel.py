@@ -217,33 +217,36 @@ def responses_in_windows(sigma: Array, history: History, time: Array, length: in
 
 
 def _with_sine(
-    walked: Callable[[np.ndarray[Any, Any]], tuple[Array, Array]],
+    response_to_g: Callable[[np.ndarray[Any, Any]], tuple[Array, Array]],
     sigma: Array,
     history: History,
     time: Array,
 ) -> tuple[Array, Array]:
     """Responses to a load g(t) sin θ(t), and their rounding, from those to g at two exponents.
 
-    `walked` returns ρ_g with derivatives and its rounding for exponents; a load without a sine is
-    passed through.
+    With θ(τ) = θ(t) − ω (t − τ), ρ(σ) = [exp(iθ) ρ_g(σ − iω) − exp(−iθ) ρ_g(σ + iω)] / 2i. A load
+    without a sine is passed through. |ρ′| is at most t ∫ |g| exp(Re σ τ), by which rounding of an
+    exponent is bounded.
 
-    |ρ′| is at most t ∫ |g| exp(Re σ τ), by which rounding of an exponent is bounded.
+    Args:
+        response_to_g: Returns ρ_g with derivatives, and its rounding, for exponents.
+        sigma: Exponents σ, in 1/s.
+        history: The load.
+        time: Nodes t, in s, broadcast with σ.
     """
     rate = history.frequency
     if not rate:
-        return walked(sigma)
+        return response_to_g(sigma)
     angle = rate * (time - history.start) + history.phase
-    (later, later_change), (sooner, sooner_change) = (
-        walked(sigma - 1j * rate),
-        walked(sigma + 1j * rate),
-    )
-    turn = np.exp(1j * angle)
-    response = (turn * later - turn.conj() * sooner) / 2j
-    size = np.abs(later[0]) + np.abs(sooner[0])
+    minus, minus_rounding = response_to_g(sigma - 1j * rate)
+    plus, plus_rounding = response_to_g(sigma + 1j * rate)
+    phasor = np.exp(1j * angle)
+    response = (phasor * minus - phasor.conj() * plus) / 2j
+    size = np.abs(minus[0]) + np.abs(plus[0])
     grown = np.exp(np.maximum(sigma.real * time, 0.0)) * history.extremes[0] * time**2
     of_exponent = (np.abs(sigma) + rate) * grown
     rounding = UNIT_ROUNDOFF * ((8 + np.abs(angle)) * size + of_exponent)
-    return response, (later_change + sooner_change) / 2 + rounding
+    return response, (minus_rounding + plus_rounding) / 2 + rounding
 
 
 @njit(cache=True, parallel=True)

@@ -219,8 +219,9 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
 def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
     """D = 2 ζ M √(M⁻¹K) at S parameter sets: every mode has the ratio ζ, V = (S, n, n), in N s/m.
 
-    D follows the parameters through the modes; it is not frozen at their modal values. The root R
-    with R R = M⁻¹K is smooth however the frequencies lie.
+    D is that of each parameter set, with its derivatives, not that of the most plausible one. The
+    root R with R R = M⁻¹K is smooth however the frequencies lie; its derivatives solve Sylvester's
+    equation.
 
     Args:
         mass: M, symmetric and positive definite, V = (S, n, n), in kg.
@@ -239,12 +240,12 @@ def ratio_damping(mass: Jet, stiffness: Jet, ratio: Jet) -> Jet:
     Y = U.swapaxes(-1, -2) @ lower.swapaxes(-1, -2)
     total = omega[:, :, None] + omega[:, None, :]
 
-    def solved(right: Array) -> Array:
+    def sylvester(right: Array) -> Array:  # Z with R Z + Z R = right
         return np.asarray(X @ ((Y @ right @ X) / total) @ Y)
 
-    first, value = solved(operator.first), (X * omega[:, None, :]) @ Y
+    first, value = sylvester(operator.first), (X * omega[:, None, :]) @ Y
     second = np.zeros((0, 0, *value.shape))
     if len(operator.second):
         pair = first[:, None] @ first[None, :]
-        second = solved(operator.second - pair - pair.swapaxes(0, 1))
+        second = sylvester(operator.second - pair - pair.swapaxes(0, 1))
     return 2.0 * ratio[:, None, None] * (mass @ Jet(value, first, second))

@@ -29,13 +29,13 @@ them the wider cut holds.
 def law_cuts(
     data: Observations, law: Law, quantile: float | None, *, mean: bool
 ) -> tuple[Stepwise, float]:
-    """Return the α-cuts under a named law, and the least level at which both ends are finite.
+    """Return the α-cuts of a quantity under a named law, and the least level with finite ends.
 
     Args:
         data: The values.
         law: Name of the law.
-        quantile: Probability of a quantile; None for the next value, or for the mean.
-        mean: Whether the mean is meant.
+        quantile: Probability of the quantile to bound; None for the next value, or for the mean.
+        mean: Whether the mean is to be bounded, which `from_data` allows with a normal law alone.
 
     Returns:
         The cuts at the `LEVELS`, clipped to the physical bounds, and the level, which is 0 with
@@ -55,9 +55,9 @@ def law_cuts(
         allowed="positive ones with a log-normal law",
         cure=cure,
     )
-    unlike = not data.exact or data.lower[0] < data.lower[-1]
+    are_distinct = not data.exact or data.lower[0] < data.lower[-1]
     values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
-    enough = data.count > 1 and finite and unlike
+    enough = data.count > 1 and finite and are_distinct
     require(
         enough,
         f"values of a {law} law",

@@ -68,15 +68,14 @@ class Packing:
         """
         radii: Array = np.empty(0)
         side = -np.inf
-        room = 2.0 * (self.shape.dimensions - 1)  # a sphere's cell has room for its own images
-        while not len(radii) or room * radii.max() > side:
-            largest = radii.max(initial=0.0)
-            least = f"more than {MAX_NUMBER}, where the largest radius is {largest:.3g} m"
+        # a diameter of a disc, and two of a sphere, so that its cell is apart from its own images
+        radii_in_side = 2.0 * (self.shape.dimensions - 1)
+        while not len(radii) or radii_in_side * radii.max() > side:
+            largest, key = radii.max(initial=0.0), f"packing.{self.shape.particles}"
+            allowed = f"more than {MAX_NUMBER}, where the largest radius is {largest:.3g} m"
             cure = "leave out the smallest sizes, or lower the fraction"
-            few = len(radii) < max(MAX_NUMBER, self.number)
-            require(
-                few, f"packing.{self.shape.particles}", value=self.number, allowed=least, cure=cure
-            )
+            is_within_limit = len(radii) < max(MAX_NUMBER, self.number)
+            require(is_within_limit, key, value=self.number, allowed=allowed, cure=cure)
             radii = np.append(radii, self.radii.sample(self.number, generator))
             measure = float(self.shape.measure(radii).sum()) / self.fraction
             side = float(np.sqrt(measure) if self.shape == DISCS else np.cbrt(measure))

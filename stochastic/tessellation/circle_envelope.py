@@ -117,7 +117,7 @@ def upper_envelopes(a: Array, b: Array, c: Array, counts: Rows) -> Arcs:
 def _sweep(
     a: Array, b: Array, c: Array, table: Rows, group: Rows
 ) -> tuple[Rows, Rows, Array, Array]:
-    """Return the arcs of n envelopes by one sweep around the circle, n at a time.
+    """Return the arcs of n upper envelopes by one sweep around the circle.
 
     Args:
         a: Coefficients of cos φ, shape (n, w), one row a group.
@@ -179,10 +179,10 @@ def _arcs(
 def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Array]:
     """Return the uppermost function of each row at φ, and the angle to its next crossing.
 
-    With g ≤ 0 the difference of another function to the uppermost, h = −g(φ), slope q = g'(φ) and p
-    the oscillating part of g at φ, the crossing solves (c − p) t² + 2 q t − h = 0 for the root at
-    which g rises; its 1/t orders the angles δ = 2 arccot(1/t) in (0, 2π) from the greatest to the
-    least, and is computed without cancellation.
+    The difference g ≤ 0 of another function to the uppermost one has at φ the value −h, the slope q
+    and the oscillating part p; d is its constant. Ahead by δ, with t = tan(δ/2), it crosses zero
+    where (d − p) t² + 2 q t − h = 0, at the root where it rises. The largest 1/t is the nearest
+    crossing; it is computed without cancellation.
 
     Args:
         a: Coefficients of cos φ, shape (n, w).
@@ -192,7 +192,7 @@ def _next_crossing(a: Array, b: Array, c: Array, phi: Array) -> tuple[Rows, Arra
 
     Returns:
         Column of the uppermost function, shape (n,), and the angle from φ at which another one
-        rises above it, shape (n,).
+        rises above it, 2π if none does, shape (n,).
     """
     row = np.arange(len(a))
     cos, sin = np.cos(phi)[:, None], np.sin(phi)[:, None]
