@@ -21,7 +21,7 @@ from alphacut.report.results import GRAVITY
 from alphacut.report.tables import text_table
 from alphacut.stages.cell import model_of, solve
 from alphacut.stages.readiness import cut_record_warnings, require_runnable
-from alphacut.stages.suite import SuiteRecord, suite, suite_warnings
+from alphacut.stages.suite import SuiteRecord, suite_records, suite_warnings
 
 KINDS = {Crisp: "crisp", Interval: "interval", Triangular: "triangle", Trapezoidal: "trapezoid"}
 Row = tuple[str, str, str]
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
         warnings = cut_record_warnings(content, Structure(linear, {}))
         text += "".join(f"{warning}\n" for warning in warnings)
     if content.records is not None and content.envelope is not None and linear:
-        records = suite(content.records, content.envelope, Structure(linear, {}))
+        records = suite_records(content.records, content.envelope, Structure(linear, {}))
         text += records_text(content.records, records)
     write_answer(options, document, out, f"{text}{options.case}: no problems\n")
     return 0

@@ -34,7 +34,7 @@ ONLY = "Plane strain alone: the other definition is for one particle of two isot
 def microstructure(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the radius map of particles, and prints its section [radius]; exit status 0."""
     with open_results(options) as (case, store):
-        numbers = Pipeline(Results(case.content), store).particles().document
+        numbers = Pipeline(Results(case.content), store).compute_microstructure().document
     text = fragment(numbers)
     write_answer(options, numbers | {"fragment": text}, out, text)
     return 0
@@ -44,7 +44,7 @@ def modulus(options: argparse.Namespace, out: TextIO) -> int:
     """Computes the fuzzy modulus of the cell, and prints its tables; returns exit status 0."""
     with open_results(options) as (case, store):
         results = Results(case.content)
-        Pipeline(results, store, options.petsc).material()
+        Pipeline(results, store, options.petsc).compute_modulus()
     document, texts = results.document(), {"modulus": modulus_text, "image": image_text}
     for name in document.keys() & texts.keys():
         text = text_table(*tables(document)[name]) + texts[name](document[name])
@@ -123,7 +123,7 @@ def envelope(options: argparse.Namespace, out: TextIO) -> int:
     data = read_dataset(Path(options.modulus), "--modulus") if options.modulus else None
     with open_results(options) as (case, store):
         pipeline = Pipeline(Results(case.content), store)
-        pipeline.motion(pipeline.structure(data, "--modulus"), studies=False)
+        pipeline.compute_envelopes(pipeline.structure(data, "--modulus"), studies=False)
     document = pipeline.results.document()
     write_answer(options, document["envelopes"]["all"], out, run_text(document))
     return 0

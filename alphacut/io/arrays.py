@@ -15,7 +15,7 @@ ALLOWED = "a file .mtx, .npz, .npy or .csv with one array of finite real numbers
 
 
 def read_array(path: Path, name: str = "") -> Array:
-    """Array of a file; sparse ones become dense.
+    """Reads one array of floats, shape (n,) or (n, m), from a file; a sparse one becomes dense.
 
     Args:
         path: The file.
@@ -27,24 +27,20 @@ def read_array(path: Path, name: str = "") -> Array:
     if path.suffix.lower() not in ENDINGS:
         raise RefusedError(path.name, f"of type {path.suffix or 'none'}", ALLOWED)
     try:
-        array = np.asarray(_read(path, name))
+        array = np.asarray(_read_by_ending(path, name))
     except RefusedError:
         raise
     except Exception as error:  # whatever the readers of SciPy and NumPy raise
         reason = " ".join(str(error).split())[:80]
         raise RefusedError(path.name, reason or type(error).__name__, ALLOWED) from None
-    real = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
-    require(
-        real and array.ndim in (1, 2) and array.size > 0,
-        path.name,
-        value="no such array",
-        allowed=ALLOWED,
-    )
+    is_finite = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
+    fits = is_finite and array.ndim in (1, 2) and array.size > 0
+    require(fits, path.name, value="no such array", allowed=ALLOWED)
     return array.astype(float)
 
 
-def _read(path: Path, name: str) -> Array:
-    """The array of a file by the reader that its ending calls for."""
+def _read_by_ending(path: Path, name: str) -> Array:
+    """The array in a .mtx, .csv, .npy or .npz file; `name` chooses one of several in a .npz."""
     import scipy.io
     import scipy.sparse
 

@@ -45,9 +45,9 @@ def is_special(path: Path) -> bool:
 
 @contextmanager
 def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]:
-    """Temporary name beside `path`, renamed to it once the block is through.
+    """Yields a temporary path beside `path`; the file written there replaces `path` in the end.
 
-    A device or a pipe is written to.
+    If the block fails, `path` stays as it was. A device or a pipe is written to instead.
 
     Args:
         path: The file.
@@ -62,7 +62,7 @@ def whole_file(path: Path | str, *, follow_links: bool = True) -> Iterator[Path]
     path = Path(os.path.realpath(path)) if follow_links else path
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # no link's target
+    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # through no link
     try:
         yield partial
         os.replace(partial, path)
@@ -94,7 +94,7 @@ def _plain(value: object) -> object:
 
 @contextmanager
 def standard_output(*, alone: bool) -> Iterator[TextIO]:
-    """The stream that answers go to, of the first MPI rank only.
+    """Yields the stream for answers: standard output of the first MPI rank, nothing of others.
 
     Args:
         alone: Whether all else that is printed, by C libraries too, goes to standard error.
@@ -104,15 +104,15 @@ def standard_output(*, alone: bool) -> Iterator[TextIO]:
         sys.stdout.flush()
         return
     sys.stdout.flush()
-    duplicate = os.dup(1)
-    os.dup2(2, 1)
+    original = os.dup(1)
+    os.dup2(2, 1)  # what C libraries print goes to standard error
     try:
-        target = os.dup(duplicate) if rank() == 0 else os.open(os.devnull, os.O_WRONLY)
+        target = os.dup(original) if rank() == 0 else os.open(os.devnull, os.O_WRONLY)
         with redirect_stdout(sys.stderr), os.fdopen(target, "w", encoding="utf-8") as stream:
             yield stream
     finally:
-        os.dup2(duplicate, 1)
-        os.close(duplicate)
+        os.dup2(original, 1)
+        os.close(original)
 
 
 def say(message: str) -> None:
@@ -123,7 +123,7 @@ def say(message: str) -> None:
 
 
 def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuses what a command could not write."""
+    """Refuses options of a command that name files or folders where nothing can be written."""
     for action in parser._actions:
         value = getattr(options, action.dest, None)
         if action.dest in OUTPUTS and isinstance(value, str) and value != "-":
@@ -132,29 +132,33 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
 
 
 def require_writable(option: str, value: str, *, folder: bool) -> None:
-    """Refuses a place where nothing can be written."""
+    """Refuses a file or folder that an option names where nothing can be written.
+
+    Args:
+        option: The option, for messages.
+        value: Path of the file or folder, which need not exist.
+        folder: Whether it is a folder.
+    """
     path, kind, reason = Path(value), "a folder" if folder else "a file", ""
-    holds = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
-    there = path if folder else path.parent
-    while not there.exists() and there != there.parent:
-        there = there.parent
+    fits = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
+    existing = path if folder else path.parent
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
     try:
-        tempfile.TemporaryFile(dir=there).close()
+        tempfile.TemporaryFile(dir=existing).close()
     except OSError as error:
-        holds, reason = False, f"nothing can be written in {there}: {error.strerror or error}"
-    allowed = f"the name of {kind} where you may write"
-    require(
-        holds or is_special(path),
-        option,
-        value=value or "empty",
-        allowed=allowed,
-        cure=reason.lower(),
-    )
+        fits, reason = False, f"nothing can be written in {existing}: {error.strerror or error}"
+    allowed, fits = f"the name of {kind} where you may write", fits or is_special(path)
+    require(fits, option, value=value or "empty", allowed=allowed, cure=reason.lower())
 
 
 @contextmanager
 def locked(option: str, folder: Path) -> Iterator[None]:
-    """Keeps other runs out of a folder; where the file system cannot, nothing is kept out.
+    """Locks a folder during the block against other runs, if the file system can lock.
+
+    Args:
+        option: Option that names the folder, for messages.
+        folder: The folder; made if it does not exist.
 
     Raises:
         RefusedError: Another run is writing into it.

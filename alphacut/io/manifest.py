@@ -54,7 +54,7 @@ class ResultsFolder:
 
     Args:
         path: The folder; it may be a link itself.
-        parts: Files by the name of their stage.
+        parts: Files of each stage, by the stage's name.
         is_lost: Whether there was a manifest that could not be read, so that a run replaces its
             files although none lists them.
     """
@@ -93,7 +93,7 @@ class ResultsFolder:
             return "the manifest is damaged" if self.is_lost else "no files"
         for name, digest in self.parts[stage].files.items():
             try:
-                self._content(name, digest)
+                self._read_checked(name, digest)
             except RefusedError as error:
                 return f"{name} {error.value}"
         return ""
@@ -111,9 +111,10 @@ class ResultsFolder:
             raise RefusedError(
                 str(self.path), f"without {name} in its manifest", COMPLETE, RUN_AGAIN
             )
-        return self._content(name, files[name])
+        return self._read_checked(name, files[name])
 
-    def _content(self, name: str, digest: str) -> bytes:
+    def _read_checked(self, name: str, digest: str) -> bytes:
+        """The content of a file, whose SHA-256 must be `digest`; any if that is empty."""
         file = self.path / name
         try:
             self._require_real_parents(name)
@@ -136,9 +137,9 @@ class ResultsFolder:
                 raise NotADirectoryError(f"{parent} is no folder")
 
     def require_free(self, name: str) -> None:
-        """Refuses a place that something else takes: a file that is not listed, a pipe, a folder.
+        """Refuses a name that an unlisted file, a pipe or a folder has, so that none is lost.
 
-        A link is replaced by the file where its name is listed; its target stays as it is.
+        A link with a listed name is free: the file will replace it, not its target.
         """
         file, allowed = self.path / name, "a place for a file of this run"
         cure = "move it away, or name another folder"
@@ -149,27 +150,22 @@ class ResultsFolder:
             return
         except NotADirectoryError as error:
             raise RefusedError(str(file), str(error), allowed, cure) from None
-        listed = self.is_lost or any(name in part.files for part in self.parts.values())
-        regular = stat.S_ISREG(mode)
-        kind = "a file that no manifest lists" if regular else "no regular file"
-        require(
-            listed and (regular or stat.S_ISLNK(mode)),
-            str(file),
-            value=kind,
-            allowed=allowed,
-            cure=cure,
-        )
+        is_listed = self.is_lost or any(name in part.files for part in self.parts.values())
+        is_regular = stat.S_ISREG(mode)
+        kind = "a file that no manifest lists" if is_regular else "no regular file"
+        is_free = is_listed and (is_regular or stat.S_ISLNK(mode))
+        require(is_free, str(file), value=kind, allowed=allowed, cure=cure)
 
     def put(self, stage: str, fingerprint: str, source: Path) -> None:
-        """Moves the files below a folder here as those of a stage, and lists them.
+        """Copies all files below a folder here as those of a stage, and lists them.
 
         Files that the stage listed before and has no more are removed.
 
         Raises:
             RefusedError: Something else is in the place of one.
         """
-        below = (file for file in sorted(source.rglob("*")) if file.is_file())
-        contents = {file.relative_to(source).as_posix(): file.read_bytes() for file in below}
+        files = (file for file in sorted(source.rglob("*")) if file.is_file())
+        contents = {file.relative_to(source).as_posix(): file.read_bytes() for file in files}
         for name in contents:
             self.require_free(name)
         before = self.parts[stage].files if stage in self.parts else {}
@@ -194,7 +190,7 @@ class ResultsFolder:
         self._write()
 
     def _remove(self, name: str, digest: str = "") -> None:
-        """Removes a link, or a regular file if it has a digest; leaves everything else."""
+        """Removes a link, or a regular file with this digest ("": any); leaves everything else."""
         file = self.path / name
         try:
             self._require_real_parents(name)
@@ -205,6 +201,7 @@ class ResultsFolder:
             return
 
     def _write(self) -> None:
+        """Writes manifest.json, with a checksum of its own list."""
         stages = {name: [part.fingerprint, part.files] for name, part in self.parts.items()}
         document: Document = {
             "format_version": FORMAT,
@@ -249,21 +246,11 @@ def is_plain(name: str) -> bool:
 
 
 def require_known(facts: Mapping[str, object], path: Path) -> None:
-    """Refuses a format that this program does not know.
-
-    Args:
-        facts: Content of a JSON file of the program.
-        path: The file.
-    """
+    """Refuses a JSON file of this program, with content `facts`, whose format is not `FORMAT`."""
     version = facts.get("format_version")
+    value, allowed = f"of format {version}", f"files of format {FORMAT}"
     cure = "name another folder" if version is None else f"make it anew by {RUN}"
-    require(
-        version == FORMAT,
-        str(path),
-        value=f"of format {version}",
-        allowed=f"files of format {FORMAT}",
-        cure=cure,
-    )
+    require(version == FORMAT, str(path), value=value, allowed=allowed, cure=cure)
 
 
 def _names(parts: Mapping[str, StageFiles]) -> Iterator[str]:

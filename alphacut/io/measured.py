@@ -42,7 +42,7 @@ class ModeRows:
 
 
 def mode_rows(path: Path) -> tuple[ModeRows, ...]:
-    """The measurements of each mode, by rising number, from ``mode,frequency [Hz],q1,q2``.
+    """Reads the measurements of each mode, by rising number, from ``mode,frequency [Hz],q1,q2``.
 
     An empty amplitude was not measured. Standard deviations, which operational modal analysis
     states beside the modes, may stand in columns of their own.
@@ -61,14 +61,14 @@ def mode_rows(path: Path) -> tuple[ModeRows, ...]:
             for column in range(len(head))
         ]
         mode, allowed = values[columns["mode"]], "a mode from 1, frequency and deviations above 0"
-        right = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
-        require(right, f"{path.name}, row {row}", value=",".join(cells)[:80], allowed=allowed)
+        fits = mode >= 1 and mode % 1 == 0 and all(values[column] > 0 for column in positive)
+        require(fits, f"{path.name}, row {row}", value=",".join(cells)[:80], allowed=allowed)
         modes[int(mode)].append(values)
     return tuple(_mode(path, mode, np.array(modes[mode]), columns) for mode in sorted(modes))
 
 
 def _columns(path: Path, head: list[str]) -> dict[str, int]:
-    """Column of each name in a header, each once."""
+    """Index of each column of a header by its name without the unit: "mode", "frequency", "q1"."""
     matches = [HEAD.fullmatch(cell) for cell in head]
     names = [match[1].partition("[")[0].strip() if match else "" for match in matches]
     columns = {name: column for column, name in enumerate(names)}
@@ -79,27 +79,34 @@ def _columns(path: Path, head: list[str]) -> dict[str, int]:
 
 
 def _mode(path: Path, mode: int, values: Array, columns: dict[str, int]) -> ModeRows:
-    """The measurements of one mode from its rows, shape (rows, columns)."""
+    """The measurements of one mode.
+
+    Args:
+        path: The file, for messages.
+        mode: Number of the mode.
+        values: Its rows, shape (rows, columns); NaN where nothing was measured.
+        columns: Index of each column by its name.
+    """
     floors = {int(name[1:]): k for name, k in columns.items() if name.startswith("q")}
     amplitudes = {floor: values[:, column] for floor, column in floors.items()}
-    missing = {floor: np.isnan(row) for floor, row in amplitudes.items()}
+    missing = {floor: np.isnan(x) for floor, x in amplitudes.items()}
     if any(gaps.any() and not gaps.all() for gaps in missing.values()):
         allowed = "an amplitude of a floor in every row of a mode, or in none"
         raise RefusedError(f"{path.name}, mode {mode}", "an amplitude in some rows", allowed)
-    shape = {floor: row for floor, row in amplitudes.items() if not missing[floor].all()}
+    shape = {floor: x for floor, x in amplitudes.items() if not missing[floor].all()}
     frequencies = values[:, columns["frequency"]]
     largest = max((abs(x).mean() for x in shape.values()), default=0.0)
     return ModeRows(
         mode,
         frequencies,
         shape if len(shape) > 1 else {},
-        _share(values, columns.get("frequency_std"), float(frequencies.mean())),
-        _share(values, columns.get("shape_std"), float(largest)) if len(shape) > 1 else None,
+        _relative_rms(values, columns.get("frequency_std"), float(frequencies.mean())),
+        _relative_rms(values, columns.get("shape_std"), float(largest)) if len(shape) > 1 else None,
     )
 
 
-def _share(values: Array, column: int | None, size: float) -> float | None:
-    """Root mean square of a column of deviations as a share; None without the column."""
+def _relative_rms(values: Array, column: int | None, size: float) -> float | None:
+    """Root mean square of a column of deviations over a size; None without the column."""
     if column is None:
         return None
     return float(np.sqrt((values[:, column] ** 2).mean())) / size

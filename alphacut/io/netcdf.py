@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def dataset_of(content: bytes) -> xarray.Dataset:
-    """The dataset of a NetCDF file, from its content, whose digest was compared."""
+    """The dataset that the content of a NetCDF file holds; its digest must have been compared."""
     import netCDF4
     import xarray
 
@@ -25,7 +25,7 @@ def dataset_of(content: bytes) -> xarray.Dataset:
 
 
 def read_dataset(path: Path, key: str) -> xarray.Dataset:
-    """A NetCDF file that the manifest beside it lists.
+    """Reads a NetCDF file that the manifest beside it lists.
 
     Args:
         path: The file.
@@ -35,20 +35,15 @@ def read_dataset(path: Path, key: str) -> xarray.Dataset:
         RefusedError: There is no such file or manifest, or the file was changed.
     """
     folder, is_dataset = ResultsFolder.opened(path.parent), path.suffix == ".nc"
-    listed = is_dataset and any(path.name in part.files for part in folder.parts.values())
+    is_listed = is_dataset and any(path.name in part.files for part in folder.parts.values())
+    allowed = "a NetCDF file in the results of this program"
     cure = "its folder holds it with manifest.json, which tells whether it is as it was written"
-    require(
-        listed,
-        key,
-        value=str(path),
-        allowed="a NetCDF file in the results of this program",
-        cure=cure,
-    )
+    require(is_listed, key, value=str(path), allowed=allowed, cure=cure)
     return dataset_of(folder.content(path.name))
 
 
 def read_summary(folder: ResultsFolder) -> Document:
-    """summary.json of a folder that a run has written; what it names lies in that folder.
+    """Reads summary.json of a folder of results; the files that it names have plain names.
 
     Raises:
         RefusedError: There is none, it is damaged, or its format is another one.
@@ -60,26 +55,22 @@ def read_summary(folder: ResultsFolder) -> Document:
         studies = summary.get("envelopes", {})
         names = [*summary["fingerprints"], *studies, *summary["figures"]]
         names += [output for study in studies.values() for output in study["min"]]
-        is_whole = all(map(is_plain, names))
+        is_safe = all(map(is_plain, names))  # no name leads out of the folder
     except RefusedError as error:
         raise damaged(folder, f"damaged (summary.json {error.value})") from None
     except (ValueError, RecursionError, LookupError, TypeError, AttributeError) as error:
         raise damaged(folder, f"damaged ({type(error).__name__})") from None
-    if not is_whole:
+    if not is_safe:
         raise damaged(folder, "damaged")
     return summary
 
 
 def require_same_run(summary: Document, folder: ResultsFolder) -> None:
-    """Refuses the files of another run in a folder."""
+    """Refuses a folder with files of another run than that of its summary."""
     listed = {name: part.fingerprint for name, part in folder.parts.items()}
     changed = [name for name, key in summary["fingerprints"].items() if listed.get(name) != key]
-    require(
-        not changed,
-        str(folder.path),
-        value=f"with {', '.join(changed)} of another run",
-        allowed="one run's files",
-    )
+    value = f"with {', '.join(changed)} of another run"
+    require(not changed, str(folder.path), value=value, allowed="one run's files")
 
 
 def damaged(folder: ResultsFolder, what: str) -> RefusedError:

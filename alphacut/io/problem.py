@@ -40,14 +40,16 @@ class InputProblem:
         return cls(error.key, what, value, error.allowed, error.cure)
 
     def __str__(self) -> str:
-        location = (
-            f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
-        )
+        """The problem as one line: ``FILE:LINE: KEY is VALUE; allowed: ALLOWED; CURE``."""
+        place = f"{self.file}:{self.line}" if self.line else self.file
 
         def line(value: str, allowed: str) -> str:
-            has = f" is {value}" if value else ""
-            what = f"{':' * bool(value)} {self.what}" if self.what else ""
-            return f"{location}{self.key}{has}{what}" + (f"; allowed: {allowed}" if allowed else "")
+            """The line without the cure; `fitted` shortens both texts."""
+            text = f"{place}: {self.key}" if place else self.key
+            text += f" is {value}" if value else ""
+            if self.what:
+                text += f": {self.what}" if value else f" {self.what}"
+            return f"{text}; allowed: {allowed}" if allowed else text
 
         return fitted(printable(self.value), printable(self.allowed), line, printable(self.cure))
 

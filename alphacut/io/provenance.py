@@ -53,12 +53,13 @@ def versions() -> dict[str, str]:
 
 @cache
 def source_digest(packages: tuple[str, ...]) -> str:
-    """Digest of the source of some of this project's packages."""
+    """SHA-256 of all Python files of some of this project's packages, in hexadecimal digits."""
     root, digest = Path(__file__).resolve().parents[1], hashlib.sha256()
     for package in packages:
         folder = root if package == "alphacut" else (root / package).resolve()
         names = {file.relative_to(folder).as_posix(): file for file in folder.rglob("*.py")}
         for name in sorted(names):
+            # the packages linked into alphacut are not part of it
             if package != "alphacut" or name.partition("/")[0] not in NESTED:
                 digest.update(name.encode() + names[name].read_bytes())
     return digest.hexdigest()
@@ -77,6 +78,10 @@ def file_digest(path: Path) -> str:
 
 
 def _canonical(value: object) -> object:
+    """What stands for an object in the JSON text of a fingerprint: its type and values, or a name.
+
+    It must be the same in every process: no addresses, no whole paths.
+    """
     if isinstance(value, BaseModel):
         return [type(value).__name__, {x: getattr(value, x) for x in type(value).model_fields}]
     if is_dataclass(value) and not isinstance(value, type):
@@ -84,7 +89,7 @@ def _canonical(value: object) -> object:
         return [type(value).__name__, values]
     if isinstance(value, np.ndarray):
         return [value.shape, str(value.dtype), hashlib.sha256(value.tobytes()).hexdigest()]
-    if isinstance(value, FunctionType):  # whose text names an address; the source is digested
+    if isinstance(value, FunctionType):  # its source is part of the fingerprint elsewhere
         return f"{value.__module__}.{value.__qualname__}"
     return value.name if isinstance(value, Path) else str(value)
 

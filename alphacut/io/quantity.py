@@ -72,7 +72,7 @@ def registry() -> pint.UnitRegistry:
 
 @cache
 def factor(unit: str, si: str) -> Decimal:
-    """Size of one `unit` in `si`.
+    """Value of one `unit` in the SI unit `si`, as 1000 of "kN" in "N".
 
     Raises:
         ValueError: The unit is unknown, or measures something else.
@@ -85,8 +85,8 @@ def factor(unit: str, si: str) -> Decimal:
         raise ValueError(f'the unit "{unit}" is wrong')
     spelt = re.sub(r"([A-Za-z])([234])(?!\w)", r"\1^\2", unit)
     try:
-        si_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
-        return Decimal(si_unit.to(si).magnitude)
+        one_unit = registry().Quantity(Decimal(1), registry().parse_units(spelt))
+        return Decimal(one_unit.to(si).magnitude)
     except Exception:  # Pint's parser raises whatever Python's does
         raise ValueError(f'the unit "{unit}" is no unit of {QUANTITIES[si][0]}') from None
 
@@ -97,7 +97,7 @@ def decimal(text: str) -> Decimal:
 
 
 def parse_number(text: str, si: str) -> Decimal:
-    """A single quantity such as "80 GPa", in `si`.
+    """The number in the SI unit `si` that a quantity such as "80 GPa" states.
 
     Raises:
         ValueError: It begins with no number, or its unit is wrong.
@@ -109,19 +109,24 @@ def parse_number(text: str, si: str) -> Decimal:
 
 
 def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
-    """Both ends of the interval "20 t ± 5 %" or "20 t ± 1 t"."""
+    """Both ends of "20 t ± 5 %" or "20 t ± 1 t", in `si`.
+
+    Args:
+        match: Match of `SPREAD`: middle, its unit, half-width, its unit.
+        si: SI unit; empty for a number without a unit.
+    """
     middle = parse_number(f"{match[1]} {match[2]}", si)
-    share = match[4].strip() == "%" and (si or match[2].strip() != "%")
-    half = (
-        abs(middle) * decimal(match[3]) / 100
-        if share
-        else parse_number(f"{match[3]} {match[4]}", si)
-    )
-    return middle - half, middle + half
+    # "2 % ± 1 %" is 1 % to 3 %: there the half-width is no share of the middle
+    is_share = match[4].strip() == "%" and (si or match[2].strip() != "%")
+    if is_share:
+        half_width = abs(middle) * decimal(match[3]) / 100
+    else:
+        half_width = parse_number(f"{match[3]} {match[4]}", si)
+    return middle - half_width, middle + half_width
 
 
 def numbers(value: object, si: str) -> tuple[float, ...]:
-    """Every number of a quantity, in `si`.
+    """All numbers of a quantity in the SI unit `si`: one, an array, or the ends of a spread.
 
     Args:
         value: Text with a unit, or a bare number or array where no unit is needed.
@@ -132,24 +137,23 @@ def numbers(value: object, si: str) -> tuple[float, ...]:
     """
     if isinstance(value, list):
         value = "[" + ", ".join(map(str, value)) + "]"
-    text, kind = str(value).strip(), isinstance(value, str | int | float)
-    if isinstance(value, bool) or not kind or len(text) > MAX_CHARACTERS:
-        raise ValueError(
-            "this is no quantity" if len(text) <= MAX_CHARACTERS else "this is too long"
-        )
+    text = str(value).strip()
+    if len(text) > MAX_CHARACTERS:
+        raise ValueError("this is too long")
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise ValueError("this is no quantity")
     if match := LIST.fullmatch(text):
-        items = [item.strip() for item in match[1].split(",")]
-        values = tuple(
-            parse_number(f"{item} {match[2]}" if match[2] else item, si) for item in items
-        )
+        items = (item.strip() for item in match[1].split(","))
+        unit = f" {match[2]}" if match[2] else ""
+        values = tuple(parse_number(f"{item}{unit}", si) for item in items)
     elif match := SPREAD.fullmatch(text):
         values = interval_of_spread(match, si)
     else:
         values = (parse_number(text, si),)
-    return tuple(_checked_magnitude(x) for x in values)
+    return tuple(_checked_float(x) for x in values)
 
 
-def _checked_magnitude(value: Decimal) -> float:
+def _checked_float(value: Decimal) -> float:
     size = abs(float(value))
     if not (size == 0 or LEAST <= size <= GREATEST) or not math.isfinite(size):
         raise ValueError(f"magnitudes go from {LEAST:g} to {GREATEST:g} in SI, or are 0")
@@ -169,7 +173,7 @@ def number(value: object, si: str) -> float:
 
 
 def fuzzy(value: object, si: str) -> FuzzyNumber:
-    """A crisp or fuzzy quantity, in `si`.
+    """A quantity in the SI unit `si` as a fuzzy number: the count of its values says which kind.
 
     Raises:
         ValueError: As of `numbers`, more than four values, or values that do not rise.
@@ -181,10 +185,10 @@ def fuzzy(value: object, si: str) -> FuzzyNumber:
 
 
 def fuzzy_of_any_unit(value: object) -> FuzzyNumber:
-    """A crisp or fuzzy quantity of any kind in `QUANTITIES`, in SI.
+    """A crisp or fuzzy quantity in the SI unit of `QUANTITIES` that its own unit fits.
 
     Raises:
-        ValueError: It is none.
+        ValueError: It fits none.
     """
     reasons = []
     for si in QUANTITIES:
@@ -196,13 +200,15 @@ def fuzzy_of_any_unit(value: object) -> FuzzyNumber:
 
 
 def engineering(value: float, si: str, *, digits: int = 4) -> str:
-    """A value in `si` for people, with a prefix: ``−3.590 MN``."""
-    short = f"{value:.{digits}g}"
-    if si not in PREFIXED or not 1e-12 <= abs(float(short)) < 1e12:
-        plain = f"{float(short):.0f}" if 1e4 <= abs(value) < 1e7 else short
+    """Text of a value in the SI unit `si`, with a prefix if the unit takes one: ``−3.590 MN``."""
+    rounded_text = f"{value:.{digits}g}"
+    rounded_value = float(rounded_text)
+    if si not in PREFIXED or not 1e-12 <= abs(rounded_value) < 1e12:
+        # without an exponent where that is short enough
+        plain = f"{rounded_value:.0f}" if 1e4 <= abs(value) < 1e7 else rounded_text
         return f"{plain} {si}".strip().replace("-", MINUS)
-    exponent = _exponent(abs(float(short)))
-    scaled = float(short) / 10.0**exponent
+    exponent = _exponent(abs(rounded_value))
+    scaled = rounded_value / 10.0**exponent
     places = max(digits, len(f"{abs(scaled):.0f}"))
     number = f"{scaled:#.{places}g}".rstrip(".")
     return f"{number} {PREFIXES[exponent]}{si}".replace("-", MINUS)
@@ -213,14 +219,17 @@ def _exponent(largest: float) -> int:
 
 
 def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
-    """Both ends of a range with so many digits, or more where those would cross."""
-    crisp = high - low <= 1e-9 * abs(high)
-    lower = low if crisp else rounded(low, "lower", nature, digits)
-    upper = low if crisp else rounded(high, "upper", nature, digits)
-    if lower > upper:  # inwards past each other
+    """Texts of both ends of a range, rounded outwards or inwards as its nature demands.
+
+    Digits are added where ends rounded inwards would cross.
+    """
+    is_crisp = high - low <= 1e-9 * abs(high)
+    lower = low if is_crisp else rounded(low, "lower", nature, digits)
+    upper = low if is_crisp else rounded(high, "upper", nature, digits)
+    if lower > upper:
         return ends(low, high, nature, digits + 1)
-    words = (f"{end:#.{digits}g}".rstrip(".").replace("-", MINUS) for end in (lower, upper))
-    return next(words), next(words)
+    low_text, high_text = (f"{end:#.{digits}g}".rstrip(".") for end in (lower, upper))
+    return low_text.replace("-", MINUS), high_text.replace("-", MINUS)
 
 
 def between(low: float, high: float, nature: Nature, digits: int = 4) -> str:

@@ -10,11 +10,25 @@ from alphacut.case.limits import DecisionSection
 from alphacut.frame.questions.peaks import ANY, Passing, Peaks, passing, verdict_words
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.question import Motion, NumberRow, Question, Row, limit_words, peak_document
+from alphacut.questions.question import (
+    FuzzyResponse,
+    NumberRow,
+    Question,
+    Row,
+    limit_words,
+    peak_document,
+)
 
 
-def _document(name: str, answer: Passing, limit: float, peaks: Peaks) -> Document:
-    """Degrees and margins of a limit, and on each level the greatest peak, proved and reached."""
+def _limit_document(name: str, answer: Passing, limit: float, peaks: Peaks) -> Document:
+    """Numbers on one limit: degrees, margins, verdict, and the peak on each level.
+
+    Args:
+        name: Name of the limit, or `ANY`, which has no peak.
+        answer: Possibility and necessity that the limit is exceeded, and its margins.
+        limit: The limit, in SI.
+        peaks: Peaks by the names of the limits.
+    """
     peak = {} if name == ANY else peak_document(peaks, name) | {"proved": peaks.most(name).upper}
     return {
         "peak": peak,
@@ -42,7 +56,7 @@ def _least_margin(limit: Document) -> str:
 
 
 def _peak(limit: Document) -> Row:
-    """Greatest peak at the lowest level, proved and reached, and the gap as a share of it."""
+    """Texts of the greatest peak at the lowest level: proved bound, reached, relative gap."""
     if not limit.get("peak"):
         return ("", "", "")
     proved, reached = limit["peak"]["proved"][0], limit["peak"]["reached"][0]
@@ -65,24 +79,24 @@ class DecisionQuestion(Question):
         *("peak at most", "peak reached", "gap"),
     )
 
-    def answer(self, motion: Motion) -> Document:
-        """Degrees and margins of every limit, from the peaks of the limited outputs."""
-        assert motion.peaks is not None
-        limits = self.section.in_si(motion.structure)
-        peaks = motion.peaks.named(
+    def answer(self, response: FuzzyResponse) -> Document:
+        """Possibility, necessity and margins of exceeding each limit, from the response's peaks."""
+        assert response.peaks is not None
+        limits = self.section.in_si(response.structure)
+        peaks = response.peaks.named(
             {name: x.peak for name, x in self.section.limits_by_name.items()}
         )
         answers = passing(peaks, limits)
         documents = {
-            name: _document(name, answer, limits.get(name, 1.0), peaks)
-            | self.section.peak_and_unit(name, motion.structure)
+            name: _limit_document(name, answer, limits.get(name, 1.0), peaks)
+            | self.section.peak_and_unit(name, response.structure)
             for name, answer in answers.items()
         }
-        return {"alpha": motion.alpha, "step": motion.step, "limits": documents}
+        return {"alpha": response.alpha, "step": response.step, "limits": documents}
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
-        """A row for each limit."""
+        """Table of the report, with the columns of `head`: a row for each limit."""
         return [
             (
                 limit_words(limit["output"], limit["limit"], limit["unit"]),
@@ -98,7 +112,7 @@ class DecisionQuestion(Question):
 
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """A row for each limit."""
+        """Titles of the columns, and a row for each limit."""
         head: Row = ("limited output", "unit", "limit", "verdict", "from α", "nature")
         head += ("least possibility", "greatest possibility", "least necessity")
         head += ("greatest necessity", "least margin", "peak at most", "peak reached")
@@ -113,7 +127,7 @@ class DecisionQuestion(Question):
 
     @staticmethod
     def words(document: Document) -> str:
-        """How to read the degrees."""
+        """Sentences on how to read the verdicts."""
         return (
             "A limit is not exceeded where no motion exceeds it, exceeded where every motion does,"
             " and can be exceeded where a motion is known that does."

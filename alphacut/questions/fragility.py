@@ -11,11 +11,11 @@ from alphacut.case.structure import Structure
 from alphacut.frame.questions.fragility import CriticalMeasures, any_limit
 from alphacut.frame.questions.peaks import ANY
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import require
+from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.quantity import between, engineering
-from alphacut.questions.question import Motion, NumberRow, Question, Row, limit_words
+from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row, limit_words
 
 POINTS = 60
 """Measures at which bands are drawn and tabulated."""
@@ -32,19 +32,14 @@ class FragilityQuestion(Question):
     caption = "Band of the share of records under which the limit is exceeded, over their measure"
     head = ("limit", "median at the lowest α", "nature", "dispersion", "median at the highest α")
 
-    def answer(self, motion: Motion) -> Document:
+    def answer(self, response: FuzzyResponse) -> Document:
         """Critical measures, bands, medians and dispersions of each limit, and of any of them."""
-        require(
-            motion.suite is not None,
-            "fragility",
-            value="without records",
-            allowed="a section [records]",
-        )
-        assert motion.suite is not None
-        limits = self.section.in_si(motion.structure)
+        if response.suite is None:
+            raise RefusedError("fragility", "without records", "a section [records]")
+        limits = self.section.in_si(response.structure)
         names = {name: limit.peak for name, limit in self.section.limits_by_name.items()}
-        peaks = [x.named(names) for x in motion.suite.peaks.values()]
-        measures = [sizes[self.section.measure] for sizes in motion.suite.measures.values()]
+        peaks = [x.named(names) for x in response.suite.peaks.values()]
+        measures = [sizes[self.section.measure] for sizes in response.suite.measures.values()]
         critical = {
             name: CriticalMeasures.from_peaks(peaks, measures, name, limit)
             for name, limit in limits.items()
@@ -54,16 +49,16 @@ class FragilityQuestion(Question):
             critical[ANY] = any_limit(list(critical.values()))
             natures[ANY] = Nature.weakest(natures.values())
         return {
-            "alpha": motion.alpha,
+            "alpha": response.alpha,
             "measure": self.section.measure,
             "unit": UNITS[self.section.measure],
-            "period_s": motion.suite.period,
-            "damping_ratio": motion.suite.ratio,
-            "records": list(motion.suite.peaks),
+            "period_s": response.suite.period,
+            "damping_ratio": response.suite.ratio,
+            "records": list(response.suite.peaks),
             "limits": {
                 name: self._document(measures_of_limit)
                 | {"limit": limits.get(name, 1.0), "nature": str(natures[name])}
-                | self._shown(name, motion.structure)
+                | self._shown(name, response.structure)
                 for name, measures_of_limit in critical.items()
             },
         }
@@ -73,24 +68,23 @@ class FragilityQuestion(Question):
         return {"output": shown["output"], "output_unit": shown["unit"]}
 
     def _document(self, critical: CriticalMeasures) -> Document:
-        """Numbers of one limit; of α-levels first, then of records or measures."""
+        """Numbers on one limit; arrays have shape (levels, records) or (levels, measures)."""
         grid = measure_grid(critical)
-        bands = {"band": critical.band(grid)}
+        bounds = {"band": critical.band(grid), "median": critical.median}
         if self.section.independent:
-            bands["confidence"] = critical.confidence_band(grid)
-        spread = {} if len(critical.low) < 2 else {"dispersion": critical.dispersion._asdict()}
+            bounds["confidence"] = critical.confidence_band(grid)
+        if len(critical.low) > 1:  # one record has no dispersion
+            bounds["dispersion"] = critical.dispersion
         ends = ("low", "low_reached", "high_reached", "high")
         return {
             "critical": {end: getattr(critical, end).T for end in ends},
             "measure": grid,
-            **{name: band._asdict() for name, band in bands.items()},
-            "median": critical.median._asdict(),
-            **spread,
+            **{name: pair._asdict() for name, pair in bounds.items()},
         }
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
-        """A row for each limit."""
+        """Table of the report, with the columns of `head`: a row for each limit."""
         return [
             (
                 limit_words(limit["output"], limit["limit"], limit["output_unit"]),
@@ -104,7 +98,7 @@ class FragilityQuestion(Question):
 
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """A row for each limit and level."""
+        """Titles of the columns, and a row for each limit and level."""
         measure = f"{document['measure']} [{document['unit']}]" if document["unit"] else "scale"
         head: Row = ("limited output", "unit", "limit", "α", f"least median {measure}")
         head += (f"greatest median {measure}", "least dispersion", "greatest dispersion", "nature")
@@ -120,7 +114,7 @@ class FragilityQuestion(Question):
 
     @staticmethod
     def words(document: Document) -> str:
-        """How to read the bands."""
+        """Sentences on the measure, and on how to read the bands."""
         text = (
             f"Measure: {document['measure']}"
             f" (T1 = {document['period_s']:.4g} s, ζ = {document['damping_ratio']:.3g}, at the most"
@@ -141,7 +135,7 @@ def measure_grid(critical: CriticalMeasures) -> Array:
 
 
 def _range(ends: Document | None, level: int, unit: str) -> str:
-    """Both ends on a level; the upper one is "no end" where it is infinite."""
+    """Text of the range between both ends on a level; the upper one may be infinite ("no end")."""
     if ends is None:
         return "–"
     low, high = ends["lower"][level], ends["upper"][level]

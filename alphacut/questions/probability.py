@@ -14,22 +14,28 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.quantity import between
-from alphacut.questions.question import Motion, NumberRow, Question, Row, event_words
+from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row, event_words
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
-    """Independent random values with a density proportional to the membership."""
+    """A function of a generator and a count that draws values with the membership as density.
+
+    Args:
+        number: The fuzzy number, whose membership function is scaled to an integral of 1.
+    """
     grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
-    density = number.membership(grid)
-    share = np.concatenate([[0.0], np.cumsum(np.diff(grid) * (density[1:] + density[:-1]) / 2)])
+    membership = number.membership(grid)
+    areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2
+    integral = np.concatenate([[0.0], np.cumsum(areas)])
 
     def draw(rng: np.random.Generator, count: int) -> Array:
-        return np.asarray(np.interp(rng.random(count) * share[-1], share, grid))
+        return np.asarray(np.interp(rng.random(count) * integral[-1], integral, grid))
 
     return draw
 
 
-def _document(answer: Probability, limit: float, unit: str) -> Document:
+def _event_document(answer: Probability, limit: float, unit: str) -> Document:
+    """Numbers on the event that a limit, in the SI unit `unit`, is exceeded, by level."""
     return {
         "limit": limit,
         "unit": unit,
@@ -71,33 +77,34 @@ class ProbabilityQuestion(Question):
         "between nodes",
     )
 
-    def answer(self, motion: Motion) -> Document:
-        """Probabilities of exceeding each limit, and any of several."""
-        structure = motion.structure
+    def answer(self, response: FuzzyResponse) -> Document:
+        """Bounds of the probability of exceeding each limit, and any of several, by level."""
+        structure = response.structure
         limits = self.section.in_si(structure)
         random = structure.inputs(self.section.random, "probability.random")
-        fuzzy = {name: number for name, number in motion.inputs.items() if name not in random}
+        fuzzy = {name: number for name, number in response.inputs.items() if name not in random}
         crisp = {x: number for x, number in structure.numbers.items() if number.support.width == 0}
+        stand_in = dict([*crisp.items()][:1])  # for no fuzzy input
         answers = probabilities(
             structure.model_with_outputs("probability.limits", tuple(limits)),
-            fuzzy or dict([next(iter(crisp.items()))]),
+            fuzzy or stand_in,
             {name: shaped_like(number) for name, number in random.items()},
             limits,
-            duration=motion.duration,
-            step=motion.step,
-            alpha=motion.alpha,
+            duration=response.duration,
+            step=response.step,
+            alpha=response.alpha,
             samples=self.section.samples,
             rng=np.random.default_rng(0),
-            progress=motion.progress,
+            progress=response.progress,
         )
         return {
             "fuzzy": list(fuzzy),
             "random": list(random),
             "samples": self.section.samples,
-            "step": motion.step,
-            "alpha": motion.alpha,
+            "step": response.step,
+            "alpha": response.alpha,
             "events": {
-                name: _document(
+                name: _event_document(
                     answer,
                     limits.get(name, 1.0),
                     self.section.peak_and_unit(name, structure)["unit"],
@@ -108,7 +115,7 @@ class ProbabilityQuestion(Question):
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
-        """A row for each limit."""
+        """Table of the report, with the columns of `head`: a row for each limit."""
         return [
             (
                 event_words(name, event["limit"], event["unit"]),
@@ -123,7 +130,7 @@ class ProbabilityQuestion(Question):
 
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """A row for each limit and level."""
+        """Titles of the columns, and a row for each limit and level."""
         head: Row = ("limited output", "unit", "limit", "α", "at least", "at most", "nature")
         head += (
             f"{CONFIDENCE:.0%} interval from",
@@ -134,14 +141,14 @@ class ProbabilityQuestion(Question):
         for name, event in document["events"].items():
             interval, first = event["interval"], (name, event["unit"], event["limit"])
             for k, alpha in enumerate(document["alpha"]):
-                ends = (alpha, event["lower"][k], event["upper"][k], event["nature"])
+                bounds = (event["lower"][k], event["upper"][k], event["nature"])
                 outer = (interval["lower"][k], interval["upper"][k], event["error"][k])
-                rows.append((*first, *ends, *outer))
+                rows.append((*first, alpha, *bounds, *outer))
         return head, rows
 
     @staticmethod
     def words(document: Document) -> str:
-        """How the probability was computed."""
+        """Sentences on how the probability was computed, and on what its interval holds."""
         random = ", ".join(document["random"]) or "no input"
         return (
             f"Random: {random}, with {document['samples']} independent draws at each fuzzy point."

@@ -24,14 +24,18 @@ PEAK_ERROR = 5e-3
 
 
 def limit_words(peak: str, limit: float, unit: str) -> str:
-    """A limit for people: "|drift1| ≤ 40.00 mm"; the name of several where it has no unit."""
+    """Text of a limit, such as "|drift1| ≤ 40.00 mm"; `peak` alone without a unit ("any of them").
+
+    The limit of "min q3" is given with the opposite sign, as that of −q3.
+    """
     if not unit:
         return peak
     if peak.startswith("min "):
         return f"{peak} ≥ {engineering(-limit, unit)}"
-    of_mean = f"mean |{peak.removeprefix('mean ')}|" if peak.startswith("mean ") else f"|{peak}|"
-    shown = peak if peak.startswith("max ") else of_mean
-    return f"{shown} ≤ {engineering(limit, unit)}"
+    if peak.startswith("max "):
+        return f"{peak} ≤ {engineering(limit, unit)}"
+    mean = "mean " if peak.startswith("mean ") else ""
+    return f"{mean}|{peak.removeprefix('mean ')}| ≤ {engineering(limit, unit)}"
 
 
 def event_words(output: str, limit: float, unit: str) -> str:
@@ -48,8 +52,8 @@ def peak_document(peaks: Peaks, output: str) -> Document:
 
 
 @dataclass(frozen=True)
-class SuiteMotion:
-    """Motions of the structure under the records of a suite.
+class SuiteResponse:
+    """Peaks of the structure under the records of a suite.
 
     Args:
         period: First natural period at the most plausible inputs, in s.
@@ -65,8 +69,8 @@ class SuiteMotion:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """The motion of [envelope], to which a question is put.
+class FuzzyResponse:
+    """Fuzzy response of the structure, as section [envelope] names it: what questions are about.
 
     Args:
         structure: The structure.
@@ -86,7 +90,7 @@ class Motion:
     duration: float
     step: float
     peaks: Peaks | None = None
-    suite: SuiteMotion | None = None
+    suite: SuiteResponse | None = None
     progress: Progress | None = None
 
     @property
@@ -116,16 +120,16 @@ class Question(ABC):
     caption: ClassVar[str]
     head: ClassVar[Row]
 
-    def require_answerable(self, motion: Motion) -> None:
-        """Refuses a motion that the question cannot be put to.
+    def require_answerable(self, response: FuzzyResponse) -> None:
+        """Refuses a response about which this question cannot be answered.
 
         Raises:
-            RefusedError: It is one.
+            RefusedError: The structure lacks an output, or a limit does not fit.
         """
-        self.section.check(motion.structure)
+        self.section.check(response.structure)
 
     @abstractmethod
-    def answer(self, motion: Motion) -> Document:
+    def answer(self, response: FuzzyResponse) -> Document:
         """Numbers of the answer, in SI, as JSON holds them."""
 
     @staticmethod

@@ -14,19 +14,34 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.question import PEAK_ERROR, Motion, NumberRow, Question, Row, peak_document
+from alphacut.questions.question import (
+    PEAK_ERROR,
+    FuzzyResponse,
+    NumberRow,
+    Question,
+    Row,
+    peak_document,
+)
 
 
 def _row(name: str, support: Document, document: Document) -> Row:
-    """An input's support at the scale that exceeds no limit, and relative to its modal value."""
-    modal = support["modal"]
-    share = [end / modal - 1 for end in support["kept"] if modal]
-    ends = ", ".join(f"{end:+.2%}".replace("-", "−") for end in share) or f"about {modal:g}"
-    ends_and_sides = zip(support["kept"], ("lower", "upper"), strict=True)
-    inside = (rounded(end, side, Nature.ATTAINED) for end, side in ends_and_sides)
+    """Row of an input: its support with no limit exceeded, the nature, and the relative support.
+
+    Args:
+        name: Name of the input.
+        support: Entry of the input in the answer.
+        document: The answer; its "kept" is None where limits are exceeded at any scale.
+    """
+    if document["kept"] is None:
+        return f"tolerance of {name}", "–", document["nature"], ""
+    ends, modal = support["kept"], support["modal"]
+    relative = f"about {modal:g}"
+    if modal:
+        relative = ", ".join(f"{end / modal - 1:+.2%}".replace("-", "−") for end in ends)
+    sides = zip(ends, ("lower", "upper"), strict=True)
+    inside = (rounded(end, side, Nature.ATTAINED) for end, side in sides)
     text = " … ".join(engineering(end, of_storey_frame(name).unit) for end in inside)
-    tolerance = "–" if document["kept"] is None else text
-    return f"tolerance of {name}", tolerance, document["nature"], ends if tolerance != "–" else ""
+    return f"tolerance of {name}", text, document["nature"], relative
 
 
 @dataclass(frozen=True)
@@ -39,57 +54,61 @@ class TolerancesQuestion(Question):
     caption = "Supports of the inputs in the case, and at the scale that exceeds no limit"
     head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
 
-    def require_answerable(self, motion: Motion) -> None:
-        """Refuses scales at which inputs reach values that have no meaning.
+    def require_answerable(self, response: FuzzyResponse) -> None:
+        """Refuses limits that do not fit, and a largest scale at which an input is inadmissible.
 
         Raises:
-            RefusedError: They do at the largest scale.
+            RefusedError: As of `Question.require_answerable`, or a mass is negative, for example.
         """
-        super().require_answerable(motion)
+        super().require_answerable(response)
+        largest = self.section.most
         try:
-            widest = boxes(scaled(motion.inputs, self.section.most), [0.0])
-            require_admissible(motion.structure.model, widest)
+            widest = boxes(scaled(response.inputs, largest), [0.0])
+            require_admissible(response.structure.model, widest)
         except RefusedError as error:
-            what, cure = f"{self.section.most:g} times the supports: {error.key}", "a smaller scale"
-            value = f"{what} is {error.value}"
-            raise RefusedError("tolerances.most", value, error.allowed, cure) from None
+            value = f"{largest:g} times the supports: {error.key} is {error.value}"
+            raise RefusedError("tolerances.most", value, error.allowed, "a smaller scale") from None
 
-    def answer(self, motion: Motion) -> Document:
-        """Scales at which no limit and one is exceeded, and the supports at the first."""
-        assert motion.peaks is not None
-        limits = self.section.in_si(motion.structure)
+    def answer(self, response: FuzzyResponse) -> Document:
+        """Largest scale of all supports at which no limit is exceeded, and the supports there.
+
+        "kept" is that scale, or None; "passed" the least scale known to exceed a limit, or None;
+        "supports" holds each input's modal value and its support in the case and at that scale.
+        """
+        assert response.peaks is not None
+        limits = self.section.in_si(response.structure)
         scale = tolerances(
-            motion.structure.model_with_outputs("tolerances.limits", tuple(limits)),
-            motion.inputs,
+            response.structure.model_with_outputs("tolerances.limits", tuple(limits)),
+            response.inputs,
             limits,
-            duration=motion.duration,
-            step=motion.step,
+            duration=response.duration,
+            step=response.step,
             most=self.section.most,
             error=PEAK_ERROR,
-            at_one=motion.peaks if motion.alpha[0] == 0 else None,
-            progress=motion.progress,
+            at_one=response.peaks if response.alpha[0] == 0 else None,
+            progress=response.progress,
         )
-        modal = {name: number.modal for name, number in motion.inputs.items()}
+        modal = {name: number.modal for name, number in response.inputs.items()}
         supports = {
-            name: {"modal": modal[name], "own": motion.inputs[name].support, "kept": ends}
+            name: {"modal": modal[name], "own": response.inputs[name].support, "kept": ends}
             for name, ends in scale.supports.items()
         }
         return {
             "limits": limits,
-            "peaks": {name: peak_document(motion.peaks, name) for name in limits},
+            "peaks": {name: peak_document(response.peaks, name) for name in limits},
             "kept": scale.admissible,
             "clear": scale.clear,
             "passed": scale.passed if math.isfinite(scale.passed) else None,
             "most": self.section.most,
             "nature": str(scale.nature),
             "envelopes": scale.envelopes,
-            "step": motion.step,
+            "step": response.step,
             "supports": supports,
         }
 
     @staticmethod
     def rows(document: Document) -> list[Row]:
-        """The scale, then each input's tolerance."""
+        """Table of the report: the scale of all supports, then the tolerance of each input."""
         largest, passed = document["kept"], document["passed"]
         scale = "none"
         if largest is not None:
@@ -103,15 +122,15 @@ class TolerancesQuestion(Question):
 
     @staticmethod
     def number_rows(document: Document) -> tuple[Row, list[NumberRow]]:
-        """The scale, then the range of each input."""
+        """Titles of the columns; rows of the scale, then of the range of each input."""
         head: Row = ("quantity", "unit", "from", "to", "from in the case", "to in the case")
         head += ("most plausible", "nature")
         scale = (None, document["kept"], None, 1.0, None, document["nature"])
         rows: list[NumberRow] = [("scale of all ranges", "", *scale)]
         for name, support in document["supports"].items():
+            unit, ends_in_case = of_storey_frame(name).unit, support["own"]
             ends = (None, None) if document["kept"] is None else support["kept"]
-            unit, last = of_storey_frame(name).unit, (support["modal"], document["nature"])
-            rows.append((name, unit, *ends, *support["own"], *last))
+            rows.append((name, unit, *ends, *ends_in_case, support["modal"], document["nature"]))
         return head, rows
 
     @staticmethod

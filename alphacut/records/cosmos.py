@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from math import ceil
 
 from alphacut.records.recording import Recording
 from alphacut.records.text_file import ACCELERATION_UNITS, TextFile, acceleration_factor
@@ -44,7 +45,7 @@ def is_cosmos(file: TextFile) -> bool:
 
 
 def read_cosmos(file: TextFile, channel: str = "") -> Recording:
-    """Recording of one channel.
+    """Recording of one channel of a COSMOS file.
 
     Args:
         file: The file.
@@ -55,31 +56,40 @@ def read_cosmos(file: TextFile, channel: str = "") -> Recording:
         RefusedError: There is no such channel or there are several, or its step, unit or samples
             are not those of the format.
     """
-    channels = _channels(file)
+    channels = _acceleration_channels(file)
     chosen = [entry for entry in channels if not channel or channel.lower() in entry.names]
     if len(chosen) != 1:
         names = "; ".join(" or ".join(entry.names) for entry in channels)
         line = channels[0].data if channels else 0
         raise file.refusal(line, f"channel {channel or 'not named'}", f"one of: {names}")
-    return _recording(file, chosen[0])
+    return _read_channel(file, chosen[0])
 
 
-def _recording(file: TextFile, channel: _Channel) -> Recording:
+def _read_channel(file: TextFile, channel: _Channel) -> Recording:
+    """Recording of a channel, from the line that announces its samples and the lines below it."""
     match = DATA.fullmatch(file.lines[channel.data])
     assert match is not None
     count, duration, unit, width = int(match[1]), float(match[2]), match[3], int(match[4])
-    size = acceleration_factor(unit)
-    if size is None:
+    factor = acceleration_factor(unit)
+    if factor is None:
         raise file.refusal(channel.data, f"in units of {unit}", ACCELERATION_UNITS)
     step = _step(file, channel, count, duration)
-    lines = -(-count // max(1, len(file.lines[channel.data + 1].rstrip()) // width))
-    samples = file.numbers(channel.data + 1, channel.data + 1 + lines, width=width)
+    first = channel.data + 1
+    per_line = max(1, len(file.lines[first].rstrip()) // width)
+    samples = file.numbers(first, first + ceil(count / per_line), width=width)
     file.require_count(samples, count, channel.data)
-    return Recording("COSMOS V2", unit, step, samples * size)
+    return Recording("COSMOS V2", unit, step, samples * factor)
 
 
 def _step(file: TextFile, channel: _Channel, count: int, duration: float) -> float:
-    """The step in s, from entry 34 of the real header."""
+    """Step between samples in s: entry 34 of the real header, which has s or ms.
+
+    Args:
+        file: The file.
+        channel: The channel.
+        count: Number of its samples.
+        duration: Their duration in s as the file states it, by which the unit of the step is known.
+    """
     match = REALS.fullmatch(file.lines[channel.reals]) if channel.reals >= 0 else None
     allowed = "a real header whose entry 34 is the step, and agrees with the duration"
     if match is None:
@@ -94,8 +104,8 @@ def _step(file: TextFile, channel: _Channel, count: int, duration: float) -> flo
     raise file.refusal(channel.reals, value, allowed)
 
 
-def _channels(file: TextFile) -> list[_Channel]:
-    """Channels of acceleration in the order of the file; velocities and displacements are not."""
+def _acceleration_channels(file: TextFile) -> list[_Channel]:
+    """Channels of acceleration, without those of velocity and displacement, in the file's order."""
     channels: list[_Channel] = []
     reals, names = -1, list[str]()
     for row, line in enumerate(file.lines):

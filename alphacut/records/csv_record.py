@@ -26,32 +26,36 @@ def read_csv_record(file: TextFile) -> Recording:
     Raises:
         RefusedError: A unit is wrong, a row is no pair of numbers, or the steps are not even.
     """
-    (_, head), *rows = rows_of(file)
-    time_factor, unit, size = _units(file, head)
+    (_, head), *rows = table_rows(file)
+    time_factor, unit, to_si = _parse_head(file, head)
     table = numbered_rows(file, rows)
-    step = even_step(file, time_factor * table[:, 0], [row for row, _ in rows])
-    return Recording("CSV", unit, step, size * table[:, 1])
+    step = even_step(file, time_factor * table[:, 0], [line for line, _ in rows])
+    return Recording("CSV", unit, step, to_si * table[:, 1])
 
 
-def rows_of(file: TextFile) -> list[tuple[int, list[str]]]:
-    """Lines from 0 that are neither empty nor comments, cut at the head's separator."""
-    lines = [(row, line) for row, line in enumerate(file.lines)]
-    lines = [(row, line) for row, line in lines if line.strip() and not line.startswith("#")]
+def table_rows(file: TextFile) -> list[tuple[int, list[str]]]:
+    """Number (from 0) and cells of each line that is neither empty nor a comment, head first."""
+    lines = [(k, x) for k, x in enumerate(file.lines) if x.strip() and not x.startswith("#")]
     allowed = "a header with units, and rows of numbers below it"
     require(len(lines) > 1, file.name, value=f"{len(lines)} lines", allowed=allowed)
-    separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    return [(row, cells_of(file.name, row + 1, line, separator)) for row, line in lines]
+    head = lines[0][1]
+    separator = next((mark for mark in ";\t" if mark in head), ",")
+    return [(number, cells_of(file.name, number + 1, x, separator)) for number, x in lines]
 
 
-def _units(file: TextFile, head: list[str]) -> tuple[float, str, float]:
-    """Size of the unit of time in s; unit of acceleration, and its size in m/s²."""
+def _parse_head(file: TextFile, head: list[str]) -> tuple[float, str, float]:
+    """Units in a head such as ``time [s],acceleration [g]``.
+
+    Returns:
+        Factor of times to s; unit of acceleration as it is written; its factor to m/s².
+    """
     matches = [HEAD.fullmatch(cell.strip()) for cell in head]
     if len(matches) == 2 and matches[0] and matches[0][2] and matches[1] and matches[1][4]:
-        unit = matches[1][4]
+        time_unit, unit = matches[0][2], matches[1][4]
         try:
-            size = acceleration_factor(unit) or float(factor(unit, "m/s^2"))
-            return float(factor(matches[0][2], "s")), unit, size
-        except ValueError:
+            to_si = acceleration_factor(unit) or float(factor(unit, "m/s^2"))
+            return float(factor(time_unit, "s")), unit, to_si
+        except ValueError:  # an unknown unit
             pass
     raise file.refusal(0, ",".join(head)[:80], ALLOWED)
 
@@ -73,12 +77,21 @@ def _number(file: TextFile, row: int, cells: Sequence[str], column: int) -> floa
     return float(text)
 
 
-def even_step(file: TextFile, time: Array, places: list[int]) -> float:
-    """The step of times that are even from 0."""
+def even_step(file: TextFile, time: Array, lines: list[int]) -> float:
+    """The step in s of times that rise evenly from 0, to within `UNEVEN`.
+
+    Args:
+        file: The file, for messages.
+        time: Times in s, shape (n,).
+        lines: Line of each time in the file, from 0.
+
+    Raises:
+        RefusedError: Times are not even.
+    """
     even = np.linspace(0, time[-1], len(time))
-    off = np.abs(time - even)
-    worst = int(off.argmax())
-    if not (len(time) > 1 and time[-1] > 0 and off[worst] <= UNEVEN * even[1]):
+    deviation = np.abs(time - even)
+    worst = int(deviation.argmax())
+    if not (len(time) > 1 and time[-1] > 0 and deviation[worst] <= UNEVEN * even[1]):
         value, allowed = f"time {time[worst]:g} s", "even steps from 0 s"
-        raise file.refusal(places[worst], value, allowed, "resample to even steps")
+        raise file.refusal(lines[worst], value, allowed, "resample to even steps")
     return float(even[1])

@@ -25,23 +25,23 @@ def read_esm(file: TextFile) -> Recording:
             not as many as the head states.
     """
     head = _head(file)
-    step, count = float(_number(file, head, INTERVAL)), int(float(_number(file, head, COUNT)))
+    step, count = _positive_number(file, head, INTERVAL), int(_positive_number(file, head, COUNT))
     if not 0 < step < 10:
         raise file.refusal(head[INTERVAL][1], f"a step of {step:g} s", "above 0 and below 10 s")
     unit, line = head.get("UNITS", ("", head[INTERVAL][1]))
-    size = acceleration_factor(unit)
+    factor = acceleration_factor(unit)
     kind = head.get(KIND, ("ACCELERATION", 0))[0]
-    if size is None or "ACCELERATION" not in kind.upper():
+    if factor is None or "ACCELERATION" not in kind.upper():
         value = f"{kind} in {unit or 'no unit'}"
         raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}")
     first = 1 + max(row for _, row in head.values())
     samples = file.numbers(first, len(file.lines))
     file.require_count(samples, count, head[COUNT][1])
-    return Recording("ESM", unit, step, samples * size)
+    return Recording("ESM", unit, step, samples * factor)
 
 
 def _head(file: TextFile) -> dict[str, tuple[str, int]]:
-    """Values of the head by their keys, with their lines from 0, up to the first number."""
+    """Value of each key of the head, and its line from 0; the head ends at the first number."""
     head: dict[str, tuple[str, int]] = {}
     for row, line in enumerate(file.lines):
         match = LINE.fullmatch(line.strip())
@@ -53,8 +53,8 @@ def _head(file: TextFile) -> dict[str, tuple[str, int]]:
     return head
 
 
-def _number(file: TextFile, head: dict[str, tuple[str, int]], key: str) -> str:
+def _positive_number(file: TextFile, head: dict[str, tuple[str, int]], key: str) -> float:
     text, line = head.get(key, ("", 0))
     if not NUMBER.fullmatch(text) or float(text) <= 0:
         raise file.refusal(line, f"{key}: {text}", "a number above 0", "load the file anew")
-    return text
+    return float(text)

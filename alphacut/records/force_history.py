@@ -10,7 +10,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.quantity import factor
-from alphacut.records.csv_record import even_step, numbered_rows, rows_of
+from alphacut.records.csv_record import even_step, numbered_rows, table_rows
 from alphacut.records.text_file import TextFile
 
 HEAD = re.compile(r"(?:time|t)\s*[\[(](.+)[\])]", re.IGNORECASE)
@@ -34,24 +34,25 @@ class Series:
 
 
 def read_force_history(path: Path) -> Series:
-    """Samples of a CSV file with even steps from t = 0.
+    """Samples of a force in a CSV file with even steps from t = 0.
 
     Raises:
         RefusedError: A unit is wrong, a row is no pair of numbers, or the steps are not even.
     """
     file = TextFile.read(path)
-    (_, head), *rows = rows_of(file)
+    (_, head), *rows = table_rows(file)
     matches = [x.fullmatch(cell.strip()) for x, cell in zip((HEAD, FORCE), head, strict=False)]
     if len(head) != 2 or None in matches:
         raise file.refusal(0, ",".join(head)[:80], ALLOWED)
-    time, force = (match[1] if match else None for match in matches)
+    time_unit, force_unit = (match[1] if match else None for match in matches)
     try:
-        of_time, size = float(factor(str(time), "s")), float(factor(force, "N")) if force else 1.0
+        time_factor = float(factor(str(time_unit), "s"))
+        force_factor = float(factor(force_unit, "N")) if force_unit else 1.0
     except ValueError as error:
         raise file.refusal(0, ",".join(head)[:80], ALLOWED, str(error)) from None
     table = numbered_rows(file, rows)
-    step = even_step(file, of_time * table[:, 0], [row for row, _ in rows])
-    samples = np.asarray(size * table[:, 1])
+    step = even_step(file, time_factor * table[:, 0], [line for line, _ in rows])
+    samples = np.asarray(force_factor * table[:, 1])
     if not samples.any():
         raise file.refusal(0, "zeros throughout", "a force that moves something")
-    return Series(step, samples, force is not None)
+    return Series(step, samples, force_unit is not None)

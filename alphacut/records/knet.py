@@ -30,24 +30,26 @@ def read_knet(file: TextFile) -> Recording:
     Raises:
         RefusedError: A line of the head is missing, or the counts are not those it states.
     """
-    head = next((k for k, line in enumerate(file.lines) if line.startswith("Memo")), None)
-    if head is None:
+    end = next((k for k, line in enumerate(file.lines) if line.startswith("Memo")), None)
+    if end is None:
         raise file.refusal(len(file.lines) - 1, "without a line Memo.", "the head of a K-NET file")
-    fields = {name: _field(file, name, head) for name in NAMES}
-    (frequency, _), (duration, line), (scale, _) = fields.values()
-    rate = float(frequency[1])
+    (frequency, _), (duration, line), (scale, _) = (_field(file, name, end) for name in NAMES)
+    rate = float(frequency[1])  # samples in a second
     gal_per_count = float(scale[1]) / float(scale[2])
-    counts = file.numbers(head + 1, len(file.lines))
+    counts = file.numbers(end + 1, len(file.lines))
     file.require_count(counts, round(float(duration[1]) * rate), line)
     return Recording("K-NET", "gal", 1 / rate, counts * gal_per_count * 0.01)
 
 
-def _field(file: TextFile, name: str, head: int) -> tuple[re.Match[str], int]:
-    """Value of a line of the head, and the line from 0."""
-    for row, line in enumerate(file.lines[:head]):
+def _field(file: TextFile, name: str, end: int) -> tuple[re.Match[str], int]:
+    """Match of the value that a line of the head gives a name of `NAMES`, and that line from 0.
+
+    The head has `end` lines.
+    """
+    for row, line in enumerate(file.lines[:end]):
         if line.startswith(name):
             match = NAMES[name].fullmatch(line[min(LABEL, len(line)) :])
             if match and all(float(number) > 0 for number in match.groups()):
                 return match, row
             raise file.refusal(row, line.strip(), f"{name}, as in files of K-NET")
-    raise file.refusal(head, f"without {name}", "the head of a K-NET file")
+    raise file.refusal(end, f"without {name}", "the head of a K-NET file")

@@ -43,14 +43,14 @@ def read_peer(file: TextFile) -> Recording:
     if not 0 < step < 10:
         raise file.refusal(row, f"a step of {step:g} s", "a step above 0 and below 10 s")
     line, unit = _unit(file, row)
-    size = acceleration_factor(unit)
-    if size is None or re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
+    factor = acceleration_factor(unit)
+    if factor is None or re.search(r"\b(velocity|displacement)\b", file.lines[line], re.I):
         value = f"in units of {unit}" if unit else "without a unit"
         raise file.refusal(line, value, f"accelerations in {ACCELERATION_UNITS}", ALLOWED)
     samples = file.numbers(row + 1, len(file.lines))
     if count is not None:
         file.require_count(samples, count, row)
-    return Recording("PEER AT2", unit, step, samples * size)
+    return Recording("PEER AT2", unit, step, samples * factor)
 
 
 def _unit(file: TextFile, last: int) -> tuple[int, str]:

@@ -24,7 +24,7 @@ FORMATS: tuple[tuple[Callable[[TextFile], bool], Callable[[TextFile], Recording]
 
 
 def read_recording(path: Path, channel: str = "") -> Recording:
-    """Recording of a file of PEER, K-NET, ESM or COSMOS, of a universal or a CSV file.
+    """Reads a recording from a file of PEER, K-NET, ESM or COSMOS, a universal or a CSV file.
 
     Args:
         path: The file.
@@ -35,15 +35,15 @@ def read_recording(path: Path, channel: str = "") -> Recording:
             do not fit; the message names the line.
     """
     try:
-        return _read(path, channel)
+        return _read_by_format(path, channel)
     except RefusedError:
         raise
     except (ValueError, OverflowError) as error:  # of a head's integer of thousands of digits
         raise RefusedError(path.name, str(error), "numbers of a recording") from None
 
 
-def _read(path: Path, channel: str) -> Recording:
-    """Recording of a file by its format."""
+def _read_by_format(path: Path, channel: str) -> Recording:
+    """Reads a recording by the format that a file's ending or content shows."""
     if path.suffix.lower() in ENDINGS:
         return read_uff_record(path, channel)
     file = TextFile.read(path)

@@ -57,39 +57,39 @@ class Recording:
         Raises:
             RefusedError: `trim` leaves fewer than two samples.
         """
-        samples = _trimmed(_corrected(self.samples, baseline), self.step, trim)
+        samples = _trim(_subtract_baseline(self.samples, baseline), self.step, trim)
         return Accelerogram(self.step, scale * samples)
 
 
 def arias_shares(samples: Array, step: float) -> Array:
-    """Arias intensity up to each sample as a share of all of it, shape (n,).
+    """Arias intensity up to each sample over that of the whole record, shape (n,).
 
-    The integral of the squared piecewise linear acceleration is exact; shares of a record of zeros
-    are zeros.
+    The integral of the squared piecewise linear acceleration is exact; of zeros it is zeros.
     """
-    before, after = samples[:-1], samples[1:]
-    energy = np.append(0.0, np.cumsum(before**2 + before * after + after**2)) * step / 3
-    return np.asarray(energy / energy[-1] if energy[-1] > 0 else energy)
+    left, right = samples[:-1], samples[1:]
+    intensity = np.append(0.0, np.cumsum(left**2 + left * right + right**2)) * step / 3
+    return np.asarray(intensity / intensity[-1] if intensity[-1] > 0 else intensity)
 
 
-def _corrected(samples: Array, baseline: Baseline) -> Array:
+def _subtract_baseline(samples: Array, baseline: Baseline) -> Array:
     if baseline == "mean":
         return np.asarray(samples - samples.mean())
     if baseline == "linear":
-        places = np.linspace(-1.0, 1.0, len(samples))
-        return np.asarray(samples - np.polyval(np.polyfit(places, samples, 1), places))
+        time = np.linspace(-1.0, 1.0, len(samples))
+        return np.asarray(samples - np.polyval(np.polyfit(time, samples, 1), time))
     return samples
 
 
-def _trimmed(samples: Array, step: float, trim: Trim | None) -> Array:
+def _trim(samples: Array, step: float, trim: Trim | None) -> Array:
+    """The samples between two times in s, or, of "arias", those of the significant duration."""
     if trim is None:
         return samples
     if trim == "arias":
         first, last = np.searchsorted(arias_shares(samples, step), ARIAS_SHARES)
     else:  # a time that is a sample's but for rounding keeps that sample
         first, last = np.ceil(trim[0] / step - 1e-6), np.floor(trim[1] / step + 1e-6)
-    trimmed = samples[max(int(first), 0) : int(last) + 1]
-    shown = trim if isinstance(trim, str) else f"{trim[0]:g} … {trim[1]:g} s"
+    kept_samples = samples[max(int(first), 0) : int(last) + 1]
+    value = trim if isinstance(trim, str) else f"{trim[0]:g} … {trim[1]:g} s"
     allowed = f"times within 0 … {(len(samples) - 1) * step:g} s with two samples between them"
-    require(len(trimmed) > 1, "trim", value=shown, allowed=allowed)
-    return trimmed
+    require(len(kept_samples) > 1, "trim", value=value, allowed=allowed)
+    return kept_samples

@@ -37,15 +37,16 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     from scipy.signal import lfilter
 
     omega = 2 * pi / period
-    parts = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
-    substep = ground.step / parts
-    start, end = _ends_of_substeps(ground, parts, ceil(period / substep))
-    state = np.zeros((4, 4))
-    state[0, 1] = 1.0
-    state[1, :2] = -(omega**2), -2 * ratio * omega
-    state[1, 2], state[2, 3] = -1.0, 1.0
-    step = expm(state * substep)
-    A, b = step[:2, :2], step[:2, 2:]
+    substeps = max(1, ceil(ground.step * POINTS_PER_PERIOD / period))
+    substep = ground.step / substeps
+    start, end = _substep_accelerations(ground, substeps, ceil(period / substep))
+    # x' = F x of x = (u, u', a, a'), with a the ground's acceleration and a' its constant slope
+    F = np.zeros((4, 4))
+    F[0, 1] = 1.0
+    F[1, :2] = -(omega**2), -2 * ratio * omega
+    F[1, 2], F[2, 3] = -1.0, 1.0
+    step_map = expm(F * substep)
+    A, b = step_map[:2, :2], step_map[:2, 2:]
     load = b[:, :1] * start + b[:, 1:] * (end - start) / substep  # (2, steps)
     # u[k+1] = tr(A) u[k] − det(A) u[k−1] + what the loads of both steps add, by Cayley and Hamilton
     added = load[0].copy()
@@ -54,10 +55,13 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     return float(omega**2 * np.abs(displacement).max())
 
 
-def _ends_of_substeps(ground: Accelerogram, parts: int, free: int) -> tuple[Array, Array]:
-    """Accelerations at the start and the end of each substep, then of `free` ones of zeros."""
+def _substep_accelerations(ground: Accelerogram, substeps: int, n_free: int) -> tuple[Array, Array]:
+    """Ground's acceleration at the start and at the end of each substep, in m/s².
+
+    A step of the record has `substeps`; `n_free` of zero acceleration follow its end.
+    """
     samples = ground.acceleration
-    places = np.arange((len(samples) - 1) * parts + 1) / parts
-    values = np.interp(places, np.arange(len(samples)), samples)
-    after = np.zeros(free)
-    return np.append(values[:-1], after), np.append(values[1:], after)
+    positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
+    values = np.interp(positions, np.arange(len(samples)), samples)
+    zeros = np.zeros(n_free)
+    return np.append(values[:-1], zeros), np.append(values[1:], zeros)

@@ -75,7 +75,7 @@ class TextFile:
         Args:
             first: Line from 0.
             last: Line from 0.
-            width: Columns of one number in files of fixed columns; 0 where spaces part them.
+            width: Characters of one number in files of fixed columns; 0 where spaces part them.
 
         Raises:
             RefusedError: Something there is no finite number.
@@ -104,7 +104,7 @@ class TextFile:
 
 
 def acceleration_factor(unit: str) -> float | None:
-    """Size in m/s² of a unit of acceleration as files of records write it; None of others."""
+    """Factor to m/s² of a unit of acceleration as files of records write it; None if unknown."""
     text = unit.strip().strip("()[]").strip()
     if GRAVITY_UNIT.fullmatch(text):
         return float(factor("g", "m/s^2"))

@@ -30,7 +30,7 @@ EVEN = 1e-3
 
 
 def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]:
-    """Modes of the sets 55 of a universal file, one measurement each, by rising number.
+    """Reads the modes of a universal file (data sets 55), one measurement each, by rising number.
 
     Args:
         path: The file.
@@ -40,25 +40,21 @@ def uff_mode_rows(path: Path, floors: Mapping[str, int]) -> tuple[ModeRows, ...]
         RefusedError: The file cannot be read, has no mode or one mode twice, a named unknown is not
             in it, or a shape is complex with a modal phase collinearity below `MIN_COLLINEARITY`.
     """
-    modes: dict[int, ModeRows] = {}
+    modes: dict[int, ModeRows] = {}  # by number
     for dataset in _datasets(path, 55):
         kind, key = dataset.get("analysis_type"), f"{path.name}, data set 55"
         if kind not in (NORMAL_MODE, *COMPLEX_MODES):
             continue
         number = int(dataset["mode_n"])
         require(number not in modes, key, value=f"mode {number} again", allowed="each mode once")
-        modes[number] = _mode(path, dataset, number, floors)
-    require(
-        bool(modes),
-        path.name,
-        value="without a mode",
-        allowed="a data set 55 of a normal or complex mode",
-    )
+        modes[number] = _mode_rows(path, dataset, number, floors)
+    allowed = "a data set 55 of a normal or complex mode"
+    require(bool(modes), path.name, value="without a mode", allowed=allowed)
     return tuple(modes[number] for number in sorted(modes))
 
 
 def read_uff_record(path: Path, channel: str = "") -> Recording:
-    """Recording of the acceleration of a set 58.
+    """Reads a recording of acceleration from a data set 58 of a universal file.
 
     Args:
         path: The file.
@@ -68,41 +64,33 @@ def read_uff_record(path: Path, channel: str = "") -> Recording:
         RefusedError: The file cannot be read, or holds no such acceleration over even times in a
             known unit.
     """
-    sets = {_response(dataset): dataset for dataset in _datasets(path, 58)}
+    sets = {_response_name(dataset): dataset for dataset in _datasets(path, 58)}
     names = [name for name in sets if not channel or name == channel.lower()]
-    value = f"channel {channel or 'not named'}"
-    require(
-        len(names) == 1,
-        path.name,
-        value=value,
-        allowed=f"one of: {', '.join(sets) or 'none is there'}",
-    )
+    value, allowed = f"channel {channel or 'not named'}", ", ".join(sets) or "none is there"
+    require(len(names) == 1, path.name, value=value, allowed=f"one of: {allowed}")
     dataset, key = sets[names[0]], f"{path.name}, response {names[0]}"
     kind = dataset["func_type"], dataset.get("ordinate_spec_data_type")
     allowed = "a time history (1) of an acceleration (12)"
     value = f"of function type {kind[0]} and data type {kind[1]}"
     require(kind == (TIME_HISTORY, ACCELERATION), key, value=value, allowed=allowed)
     unit = str(dataset.get("ordinate_axis_units_lab", "")).strip()
-    size = acceleration_factor(unit)
-    if size is None:
+    factor = acceleration_factor(unit)
+    if factor is None:
         raise RefusedError(key, f"in units of {unit or 'none'}", ACCELERATION_UNITS)
     time, samples = np.asarray(dataset["x"], float), np.real(np.asarray(dataset["data"]))
     steps = np.diff(time)
-    even = len(steps) > 0 and steps[0] > 0 and np.ptp(steps) <= EVEN * steps[0]
-    require(
-        even and np.isfinite(samples).all(),
-        key,
-        value="uneven",
-        allowed="even times, finite samples",
-    )
+    is_even = len(steps) > 0 and steps[0] > 0 and np.ptp(steps) <= EVEN * steps[0]
+    fits = is_even and np.isfinite(samples).all()
+    require(fits, key, value="uneven", allowed="even times, finite samples")
     step = float(time[-1] - time[0]) / len(steps)
-    return Recording("UFF 58", unit, step, size * samples)
+    return Recording("UFF 58", unit, step, factor * samples)
 
 
 def phase_collinearity(shape: Array) -> float:
     """Modal phase collinearity of a complex shape, 1 where all phases are equal or opposite.
 
-    (λ₁ − λ₂)²/(λ₁ + λ₂)² of the covariance of real and imaginary parts (Pappa, Elliott 1993).
+    (λ₁ − λ₂)²/(λ₁ + λ₂)² with the eigenvalues λ of the covariance of real and imaginary parts
+    (Pappa, Elliott 1993).
     """
     parts = np.stack([shape.real, shape.imag])
     covariance = parts @ parts.T
@@ -112,42 +100,48 @@ def phase_collinearity(shape: Array) -> float:
 
 
 def _datasets(path: Path, kind: int) -> list[dict[str, Any]]:
-    """Sets of a kind, as pyuff reads them."""
+    """Data sets of a kind (55 or 58) in a universal file, as pyuff reads them.
+
+    Raises:
+        RefusedError: The file cannot be read.
+    """
     import pyuff
 
     try:
         file = pyuff.UFF(str(path))
-        places = [k for k, found in enumerate(file.get_set_types()) if found == kind]
-        sets = file.read_sets(places) if places else []
+        indices = [k for k, set_kind in enumerate(file.get_set_types()) if set_kind == kind]
+        sets = file.read_sets(indices) if indices else []
     except Exception as error:  # pyuff raises plain exceptions, and whatever NumPy does
         reason = str(error)[:80] or type(error).__name__
         raise RefusedError(path.name, reason, "a universal file (UFF)") from None
     return [sets] if isinstance(sets, dict) else list(sets)
 
 
-def _mode(path: Path, dataset: dict[str, Any], number: int, floors: Mapping[str, int]) -> ModeRows:
+def _mode_rows(
+    path: Path, dataset: dict[str, Any], number: int, floors: Mapping[str, int]
+) -> ModeRows:
+    """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`.
+
+    Raises:
+        RefusedError: An unknown is missing, or the shape is too complex.
+    """
     key = f"{path.name}, mode {number}"
     nodes = [int(node) for node in dataset["node_nums"]]
-    values: dict[str, complex] = {}
+    values: dict[str, complex] = {}  # amplitude of each unknown
     for axis, direction in enumerate(DIRECTIONS, start=1):
         column = dataset.get(f"r{axis}")
         if column is not None:
             values |= {f"{n}.{direction}": complex(x) for n, x in zip(nodes, column, strict=True)}
     missing = [name for name in floors if name.lower() not in values]
-    require(
-        not missing,
-        key,
-        value=f"without {', '.join(missing)}",
-        allowed=f"unknowns of {nodes[:8]} …",
-    )
+    value, allowed = f"without {', '.join(missing)}", f"unknowns of {nodes[:8]} …"
+    require(not missing, key, value=value, allowed=allowed)
     shape = np.array([values[name.lower()] for name in floors])
     collinearity = phase_collinearity(shape)
+    is_real, value = collinearity >= MIN_COLLINEARITY, f"complex: {collinearity:.3f}"
     allowed = f"a modal phase collinearity from {MIN_COLLINEARITY:g} on"
-    require(
-        collinearity >= MIN_COLLINEARITY, key, value=f"complex: {collinearity:.3f}", allowed=allowed
-    )
-    turned = _real(shape)
-    amplitudes = {floor: np.array([x]) for floor, x in zip(floors.values(), turned, strict=True)}
+    require(is_real, key, value=value, allowed=allowed)
+    pairs = zip(floors.values(), _real_shape(shape), strict=True)
+    amplitudes = {floor: np.array([amplitude]) for floor, amplitude in pairs}
     frequency = _frequency(dataset)
     require(frequency > 0, f"{key}: frequency", value=frequency, allowed="above 0 Hz")
     return ModeRows(number, np.array([frequency]), amplitudes if len(amplitudes) > 1 else {})
@@ -160,13 +154,13 @@ def _frequency(dataset: dict[str, Any]) -> float:
     return float(abs(dataset["eig"])) / (2 * np.pi)
 
 
-def _real(shape: Array) -> Array:
-    """The shape turned in the complex plane to the largest real part, and that part."""
+def _real_shape(shape: Array) -> Array:
+    """Real part of a complex shape, after a turn of all phases that makes it largest."""
     angle = 0.5 * np.angle((shape**2).sum())
     return np.asarray((shape * np.exp(-1j * angle)).real)
 
 
-def _response(dataset: dict[str, Any]) -> str:
+def _response_name(dataset: dict[str, Any]) -> str:
     """NODE.DIRECTION of the response, whose direction is ±1 … ±6."""
     direction = abs(int(dataset["rsp_dir"]))
     name = DIRECTIONS[direction - 1] if 1 <= direction <= len(DIRECTIONS) else str(direction)

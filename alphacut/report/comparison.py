@@ -14,12 +14,13 @@ HEAD = ("at the lowest α", "first", "second", "second over first")
 
 
 def comparison(first: Document, second: Document) -> Table:
-    """Rows of what both summaries have: greatest peak, width of the peak, limits and verdicts."""
-    rows = [*_material(first, second), *_peaks(first, second), *_limits(first, second)]
+    """Table of what both runs have: E, greatest peaks and their widths, verdicts on limits."""
+    rows = [*_modulus_rows(first, second), *_peak_rows(first, second), *_limit_rows(first, second)]
     return HEAD, rows
 
 
-def _material(first: Document, second: Document) -> Iterator[Row]:
+def _modulus_rows(first: Document, second: Document) -> Iterator[Row]:
+    """Rows on the greatest E and the width of E, of a round cell and of an image."""
     for key in ("modulus", "image"):
         if key in first and key in second:
             parts = (first[key].get("cuts", first[key]), second[key].get("cuts", second[key]))
@@ -28,15 +29,16 @@ def _material(first: Document, second: Document) -> Iterator[Row]:
             yield _row("width of E", "Pa", *(1e9 * (high - low) for low, high in ends))
 
 
-def _peaks(first: Document, second: Document) -> Iterator[Row]:
-    """Greatest peak and width of the peak of each output that both runs have."""
-    for study, output, pair in _pairs(first.get("envelopes", {}), second.get("envelopes", {})):
-        where = "" if study == "all" else f" ({study})"
-        unit = unit_of(first["envelopes"][study], output)
+def _peak_rows(first: Document, second: Document) -> Iterator[Row]:
+    """Rows on the greatest peak and its width of each output, then on statistics of records."""
+    studies = first.get("envelopes", {})
+    for study, output, pair in _common_peaks(studies, second.get("envelopes", {})):
+        name = output if study == "all" else f"{output} ({study})"
+        unit = unit_of(studies[study], output)
         upper = [peak["upper"][0] for peak in pair]
         widths = [peak["upper"][0] - peak["lower"][0] for peak in pair]
-        yield _row(f"greatest peak of {output}{where}", unit, *upper)
-        yield _row(f"width of the peak of {output}{where}", unit, *widths)
+        yield _row(f"greatest peak of {name}", unit, *upper)
+        yield _row(f"width of the peak of {name}", unit, *widths)
     statistics = [run.get("records", {}).get("statistics", {}) for run in (first, second)]
     for output in statistics[0].keys() & statistics[1].keys():
         for word in statistics[0][output]["proved"]:
@@ -45,10 +47,10 @@ def _peaks(first: Document, second: Document) -> Iterator[Row]:
             yield _row(f"{word} of the records' peaks of {output}", unit, *peaks)
 
 
-def _pairs(
+def _common_peaks(
     first: Document, second: Document
 ) -> Iterator[tuple[str, str, tuple[Document, Document]]]:
-    """Study, output and peaks of what both have."""
+    """Yields the name of each study and output that both runs have, and its peaks in both."""
     for study in first:
         if study in second:
             peaks = first[study]["peak"], second[study]["peak"]
@@ -57,14 +59,14 @@ def _pairs(
                     yield study, output, (peaks[0][output], peaks[1][output])
 
 
-def _limits(first: Document, second: Document) -> Iterator[Row]:
-    """Verdicts on the limits that both runs have, and the scale of tolerances that both keep."""
+def _limit_rows(first: Document, second: Document) -> Iterator[Row]:
+    """Rows on the verdicts on limits that both runs have, and on their scales of tolerances."""
     limits = [run.get("decision", {}).get("limits", {}) for run in (first, second)]
     for name in limits[0]:
         if name in limits[1]:
             pair = limits[0][name], limits[1][name]
-            words = (verdict_words(x["verdict"], x["from_level"]) for x in pair)
-            yield (_limit_words(pair[0]), *words, "")
+            verdicts = (verdict_words(x["verdict"], x["from_level"]) for x in pair)
+            yield (_limit_words(pair[0]), *verdicts, "")
             if pair[0]["limit"] != pair[1]["limit"]:
                 yield (_limit_words(pair[1]), "another limit", "this limit", "")
     scales = [run.get("tolerances", {}).get("kept") for run in (first, second)]

@@ -27,8 +27,8 @@ from alphacut.report.results import (
     answers,
     drivers,
     material,
-    motion,
     natures,
+    peak_table,
     unit_of,
     width_text,
 )
@@ -69,7 +69,7 @@ def render_page(folder: ResultsFolder) -> str:
     """The page for the results in a folder.
 
     Raises:
-        RefusedError: The folder holds no results of a run, those of two, or of a newer program.
+        RefusedError: The folder holds no results of a run, or of two, or of another program.
     """
     summary = read_summary(folder)
     try:
@@ -80,8 +80,8 @@ def render_page(folder: ResultsFolder) -> str:
 
 
 def page(summary: Document, folder: ResultsFolder) -> str:
-    """The page for a summary."""
-    return rendered(
+    """The HTML page for a summary and the results in a folder."""
+    return render_template(
         title=summary["title"],
         name=summary["case"],
         about=" ".join(summary.get("about", "").split()),
@@ -96,10 +96,10 @@ def comparison_page(first: Document, second: Document, table: Table) -> str:
     """The page for two summaries with the table of both side by side."""
     title, name = (f"{first[key]} and {second[key]}" for key in ("title", "case"))
     sections = [("Side by side", [("table", *table)])]
-    return rendered(title=title, name=name, about="", sections=sections, envelopes=[])
+    return render_template(title=title, name=name, about="", sections=sections, envelopes=[])
 
 
-def rendered(**parts: object) -> str:
+def render_template(**parts: object) -> str:
     """The template of the page with its parts; all texts of it are escaped."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -109,14 +109,18 @@ def rendered(**parts: object) -> str:
 
 
 def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
-    """One study of the interactive plot: bounds and error by level and output, in base64."""
+    """Data of a study for the interactive plot; "lower", "upper" and "error" by level and output.
+
+    Each of these is a text of base64 over time.
+    """
     dataset = dataset_of(folder.content(f"envelope_{name}.nc"))
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
     bands = {side: dataset[side] for side in ("lower", "upper")}
     nature = Nature(study["nature"])
-    proved = nature is Nature.GUARANTEED  # its error is inside
-    bands["error"] = dataset["lower"] * 0.0 if proved else dataset["error"]
+    contains_error = nature is Nature.GUARANTEED
+    bands["error"] = dataset["lower"] * 0.0 if contains_error else dataset["error"]
+    arrays = {side: band.transpose("alpha", "output", "time") for side, band in bands.items()}
     return {
         "name": name,
         "title": f"{name}: fuzzy {', '.join(study['fuzzy'])}",
@@ -127,11 +131,8 @@ def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
         "units": [unit_of(study, output) for output in outputs],
         "step": float(time[1] - time[0]),
         **{
-            side: [
-                [packed_numbers(row) for row in level]
-                for level in band.transpose("alpha", "output", "time").values
-            ]
-            for side, band in bands.items()
+            side: [[packed_numbers(row) for row in level] for level in array.values]
+            for side, array in arrays.items()
         },
     }
 
@@ -153,36 +154,36 @@ class Page:
         self.summary, self.folder, self.tables = summary, folder, tables(summary)
         self.paper = any("fig" in name for name in summary.get("figures", ()))
         pictures = [name for name in summary["figures"] if name.endswith(".png")]
-        self.left = {PurePosixPath(x).stem: x for x in pictures}  # that no section has shown yet
+        self.unshown = {PurePosixPath(x).stem: x for x in pictures}  # that no section has shown yet
 
     def sections(self) -> Iterator[tuple[str, list[Piece]]]:
-        """Title and pieces of all sections that the results allow, in reading order."""
+        """Yields title and pieces of each section that the results allow, in reading order."""
         summary = self.summary
-        first = (material(summary), motion(summary), (ANSWERS, answers(summary)))
+        key_tables = (material(summary), peak_table(summary), (ANSWERS, answers(summary)))
         remarks = [*natures(summary), *drivers(summary)]
-        meaning = [("text", f"{MEANING}.")]
-        yield "Key results", [*meaning, *(("table", *shown) for shown in first), *_texts(remarks)]
-        for name, (title, table, drawn) in PARTS.items():
+        key_pieces = [("text", f"{MEANING}."), *(("table", *table) for table in key_tables)]
+        yield "Key results", [*key_pieces, *_texts(remarks)]
+        for name, (title, table, figures) in PARTS.items():
             if part := summary.get(name):
-                yield title, [*self._drawn(drawn), *self._part(name, part, table)]
+                yield title, [*self._figure_pieces(figures), *self._part_pieces(name, part, table)]
         yield "Terms", [("glossary", TERMS.items())]
-        figures = [*self._drawn(tuple(self.left))]
-        yield "More", [("folded", "All other figures", figures), *self._origin()]
+        figures = [*self._figure_pieces(tuple(self.unshown))]
+        yield "More", [("folded", "All other figures", figures), *self._origin_pieces()]
 
-    def _part(self, name: str, part: Document, table: str) -> Iterator[Piece]:
-        """Words and table of a part."""
+    def _part_pieces(self, name: str, part: Document, table: str) -> Iterator[Piece]:
+        """Yields the sentences and the table of a part of the summary, named `table`."""
         if name == "envelopes":
             yield ("plot",)
-        yield from _texts(self._words(name, part))
+        yield from _texts(self._sentences(name, part))
         if table in self.tables:
-            shown: Piece = ("table", *self.tables[table])
-            answer = name in ("update", "shares", *(question.key for question in QUESTIONS))
-            yield shown if answer else ("folded", "As a table", [shown])
+            piece: Piece = ("table", *self.tables[table])
+            is_answer = name in ("update", "shares", *(question.key for question in QUESTIONS))
+            yield piece if is_answer else ("folded", "As a table", [piece])
         if name == "modulus":
             yield "folded", "Errors, checks and references", [("table", *_errors(part))]
 
-    def _words(self, name: str, part: Document) -> Iterator[str]:
-        """Sentences on a part."""
+    def _sentences(self, name: str, part: Document) -> Iterator[str]:
+        """Yields the sentences that stand above the table of a part of the summary."""
         for question in QUESTIONS:
             if question.key == name:
                 yield question.words(part)
@@ -210,23 +211,24 @@ class Page:
         elif name == "shares":
             yield "Share of the width that is lost when an input is fixed at its modal value."
 
-    def _drawn(self, names: tuple[str, ...]) -> Iterator[Piece]:
-        """Figures by their names without the paper's number, where this run has drawn them.
+    def _figure_pieces(self, names: tuple[str, ...]) -> Iterator[Piece]:
+        """Yields the figures of these names, without the paper's number, that the run has drawn.
 
         No SVG is taken from the folder: it could hold a script of somebody else.
         """
         for name in names:
-            stems = [stem for stem in self.left if stem == name or stem.endswith(f"-{name}")]
-            for stem in stems[:1]:
-                try:
-                    picture = base64.b64encode(self.folder.content(self.left.pop(stem))).decode()
-                except RefusedError as error:
-                    say(f"warning: a figure is left out: {InputProblem.from_error(error)}")
-                    continue
-                yield "figure", caption(stem, paper=self.paper), picture
+            matches = (stem for stem in self.unshown if stem == name or stem.endswith(f"-{name}"))
+            if (stem := next(matches, None)) is None:
+                continue
+            try:
+                content = self.folder.content(self.unshown.pop(stem))
+            except RefusedError as error:
+                say(f"warning: a figure is left out: {InputProblem.from_error(error)}")
+                continue
+            yield "figure", caption(stem, paper=self.paper), base64.b64encode(content).decode()
 
-    def _origin(self) -> Iterator[Piece]:
-        """The case file, what the command line changed, versions."""
+    def _origin_pieces(self) -> Iterator[Piece]:
+        """Yields the case file, the changes of the command line, and versions, all folded."""
         summary = self.summary
         yield "folded", f"Case {summary['case']}", [("code", summary["case_text"])]
         changes = [("code", change) for change in summary.get("changes", ())]
@@ -241,9 +243,10 @@ def _texts(texts: Iterator[str] | list[str]) -> Iterator[Piece]:
 
 
 def _errors(part: Document) -> Table:
-    """Errors of E by source, largest violations of properties, and references."""
-    rows: list[Row] = [(f"error: {in_words(x)}", f"{y:.2g} of E") for x, y in part["error"].items()]
-    rows += [(f"check: {in_words(x)}", f"{y:.2g}") for x, y in part["checks"].items()]
+    """Table of the errors of E by source, the largest violations of properties, and references."""
+    errors, checks = part["error"].items(), part["checks"].items()
+    rows: list[Row] = [(f"error: {in_words(x)}", f"{error:.2g} of E") for x, error in errors]
+    rows += [(f"check: {in_words(x)}", f"{violation:.2g}") for x, violation in checks]
     references = {
         "hashin_shtrikman_E_GPa": "Hashin–Shtrikman bounds, isotropic composites",
         "mori_tanaka_E_GPa": "Mori–Tanaka, isotropic composites",
@@ -261,14 +264,18 @@ def in_words(name: str) -> str:
 
 
 def caption(stem: str, *, paper: bool) -> str:
-    """Caption of a figure's file, with the paper's number where the case is the paper's."""
+    """Caption of a figure by its file's name without ending, as "fig21-25-graph-follower".
+
+    The paper's number stands before it where `paper` is true.
+    """
     parts = re.fullmatch(r"(?:fig)?(\d+(?:-\d+)?)[-_](.+)", stem)
     number, name = (parts[1], parts[2]) if parts else ("", stem)
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):
-        words = f"Envelope of {match[2]}" + ("" if match[1] == "all" else f", study {match[1]}")
+        study, output = match.groups()
+        text = f"Envelope of {output}" + ("" if study == "all" else f", study {study}")
     else:
-        words = FIGURES.get(name.replace("_", "-"), name.replace("-", " "))
+        text = FIGURES.get(name.replace("_", "-"), name.replace("-", " "))
     if not (paper and number):
-        return words
-    ends = [str(int(end)) for end in number.split("-")]
-    return f"{'Figs.' if len(ends) > 1 else 'Fig.'} {' to '.join(ends)}: {words}"
+        return text
+    numbers = [str(int(figure)) for figure in number.split("-")]
+    return f"{'Figs.' if len(numbers) > 1 else 'Fig.'} {' to '.join(numbers)}: {text}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 
 from alphacut.frame.questions.peaks import output_of
 from alphacut.frame.structures.quantities import Output
@@ -31,10 +31,11 @@ GRAVITY = float(STANDARD_GRAVITY)
 
 
 def cut(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
-    """One cut of a quantity with five digits; guaranteed ends contain the error."""
+    """Text of one cut of a quantity with five digits; guaranteed ends contain the error."""
     low, high = float(ends["lower"][level]), float(ends["upper"][level])
-    added_error = error if nature is Nature.GUARANTEED else 0.0
-    return between(max(low - added_error, min(low, 0.0)), high + added_error, nature, 5)
+    if nature is Nature.GUARANTEED:
+        low, high = max(low - error, min(low, 0.0)), high + error  # the error makes no sign
+    return between(low, high, nature, 5)
 
 
 def error_text(error: float, nature: Nature) -> str:
@@ -43,7 +44,7 @@ def error_text(error: float, nature: Nature) -> str:
 
 
 def material(summary: Document) -> Table:
-    """Young's modulus and Poisson's ratio of the cell or of the image."""
+    """Table of the constants of the cell or of the image, and of damping ratios by the material."""
     rows: list[Row] = []
     for part in (summary.get("modulus"), summary.get("image")):
         if part is None:
@@ -51,28 +52,29 @@ def material(summary: Document) -> Table:
         young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
         nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
-        ends = cut(young, -1, nature), cut(young, 0, nature, error)
-        off = error_text(error, nature) if part.get("particles") != "mesh" else "not declared"
-        rows.append((name, *ends, str(nature), off))
-        further_rows = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
-        for label, values in further_rows.items():
+        cuts = cut(young, -1, nature), cut(young, 0, nature, error)
+        error_cell = (
+            "not declared" if part.get("particles") == "mesh" else error_text(error, nature)
+        )
+        rows.append((name, *cuts, str(nature), error_cell))
+        further = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
+        for label, values in further.items():
             if values:
-                rows.append(
-                    (label, cut(values, -1, nature), cut(values, 0, nature), str(nature), "")
-                )
+                cuts = cut(values, -1, nature), cut(values, 0, nature)
+                rows.append((label, *cuts, str(nature), ""))
         if loss := part.get("loss"):
             nature, error = Nature(loss["nature"]), loss["error"].get("E")
-            ends = cut(loss["E"], -1, nature), cut(loss["E"], 0, nature)
-            off = "" if error is None else error_text(error, nature)
-            rows.append(("loss factor of E", *ends, str(nature), off))
+            cuts = cut(loss["E"], -1, nature), cut(loss["E"], 0, nature)
+            error_cell = "" if error is None else error_text(error, nature)
+            rows.append(("loss factor of E", *cuts, str(nature), error_cell))
     for name, (low, modal, high) in summary.get("damping", {}).items():
-        shown = [between(*pair, Nature.ATTAINED, 4) for pair in ((modal, modal), (low, high))]
-        rows.append((f"damping ratio {name}", *shown, str(Nature.ATTAINED), ""))
-    return filled(MATERIAL, rows)
+        cuts = between(modal, modal, Nature.ATTAINED), between(low, high, Nature.ATTAINED)
+        rows.append((f"damping ratio {name}", *cuts, str(Nature.ATTAINED), ""))
+    return without_empty_columns(MATERIAL, rows)
 
 
-def filled(head: Row, rows: list[Row]) -> Table:
-    """The columns that hold something, an error that ranges leave out for example."""
+def without_empty_columns(head: Row, rows: list[Row]) -> Table:
+    """The table without columns whose cells are all empty or "none"."""
     columns = [k for k in range(len(head)) if any(row[k] not in ("", "none") for row in rows)]
     return tuple(head[k] for k in columns), [tuple(row[k] for k in columns) for row in rows]
 
@@ -88,40 +90,62 @@ def width_text(image: Document) -> str:
     return f"Width of E from {', '.join(parts)}"
 
 
-def motion(summary: Document) -> Table:
-    """Peaks of all outputs: nominal, on one or two levels, error or gap, limit and verdict."""
+def peak_table(summary: Document) -> Table:
+    """Table of the peak of each output: its cuts, error or gap, limit and verdict.
+
+    Proved peaks have a gap; the others have the cut of a middle level as well.
+    """
     studies = summary.get("envelopes", {})
     if not studies:
         return (), []
     alpha = [float(x) for x in next(iter(studies.values()))["alpha"]]
-    middle = min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5))
-    has_gaps = any(
-        peak["nature"] == Nature.GUARANTEED
-        for study in studies.values()
-        for peak in study["peak"].values()
-    )
-    levels = list(dict.fromkeys((len(alpha) - 1, *([] if has_gaps else [middle]), 0)))
-    titles = [f"α = {alpha[k]:g}" for k in levels]
-    limits = limits_of(summary)
+    peaks = [peak for study in studies.values() for peak in study["peak"].values()]
+    levels = [len(alpha) - 1, 0]
+    if not any(peak["nature"] == Nature.GUARANTEED for peak in peaks):
+        levels.insert(1, min(range(len(alpha)), key=lambda k: abs(alpha[k] - 0.5)))
+    levels = list(dict.fromkeys(levels))
+    limits, structure = least_limits(summary), summary.get("structure", {})
     rows: list[Row] = []
     for name, study in studies.items():
-        where = f" ({name})" if len(studies) > 1 else ""
+        suffix = f" ({name})" if len(studies) > 1 else ""
+        drawn = study.get("drawn") or study["peak"]
         for output, peak in study["peak"].items():
-            scaled = scales(output, unit_of(study, output), peak, summary.get("structure", {}))
-            for label, factor in scaled if output in (study.get("drawn") or [output]) else ():
-                nature, error = Nature(peak["nature"]), max(peak["error"])
-                cuts = [nominal(peak, factor, nature)] if alpha[-1] == 1 else []
-                for k in levels[len(cuts) :]:
-                    low, high = float(peak["lower"][k]), float(peak["upper"][k])
-                    cuts.append(between(factor * low, factor * high, nature, 4 - (k > 0)))
-                limit, verdict = limits.get(output, (None, ""))
-                words = "" if limit is None else f"{limit * factor:.4g}", EXCEEDED.get(verdict, "")
-                cuts += [error_text(factor * error, nature), *reached(peak, factor)]
-                rows.append((label + where, *cuts, *words))
+            units = display_units(output, unit_of(study, output), peak, structure)
+            for label, factor in units if output in drawn else ():
+                cells = peak_cells(peak, factor, levels, has_core=alpha[-1] == 1)
+                limit = limit_cells(limits.get(output), factor)
+                rows.append((label + suffix, *cells, *limit))
+    titles = [f"α = {alpha[k]:g}" for k in levels]
     if alpha[-1] == 1 and not any("…" in row[1] for row in rows):
         titles[0] = "nominal"
     head = ("peak of", *titles, "± error", "reached", "gap", "limit", "exceeded")
-    return filled(head, rows)
+    return without_empty_columns(head, rows)
+
+
+def peak_cells(peak: Document, factor: float, levels: Sequence[int], *, has_core: bool) -> Row:
+    """Texts of a peak times a factor: its cut on each level, its error, what is reached, the gap.
+
+    Args:
+        peak: Bounds of the peak on all levels, in SI.
+        factor: From SI to the unit shown.
+        levels: Indices of the levels, the highest first.
+        has_core: Whether the highest level is 1, whose cut is shown by `nominal`.
+    """
+    nature, cuts = Nature(peak["nature"]), list[str]()
+    for k in levels:
+        low, high = factor * float(peak["lower"][k]), factor * float(peak["upper"][k])
+        cuts.append(between(low, high, nature, 3 if k > 0 else 4))
+    if has_core:
+        cuts[0] = nominal(peak, factor, nature)
+    error = error_text(factor * max(peak["error"]), nature)
+    return (*cuts, error, *reached_and_gap(peak, factor))
+
+
+def limit_cells(limit: tuple[float, str] | None, factor: float) -> tuple[str, str]:
+    """Texts of a limit, in SI, times a factor, and of the verdict on it; empty without a limit."""
+    if limit is None:
+        return "", ""
+    return f"{limit[0] * factor:.4g}", EXCEEDED.get(limit[1], "")
 
 
 def unit_of(part: Document, output: str) -> str:
@@ -129,8 +153,11 @@ def unit_of(part: Document, output: str) -> str:
     return part.get("units", {}).get(output_of(output)) or Output(output).unit
 
 
-def reached(peak: Document, factor: float) -> tuple[str, str]:
-    """What a motion reaches of a proved peak on the lowest level, and the gap, a share of it."""
+def reached_and_gap(peak: Document, factor: float) -> tuple[str, str]:
+    """Texts of the peak that a motion reaches on the lowest level, and of its gap to the bound.
+
+    Both are empty where the peak is not proved.
+    """
     if Nature(peak["nature"]) is not Nature.GUARANTEED:
         return "", ""
     value = rounded(factor * float(peak["reached"][0]), "upper", Nature.ATTAINED)
@@ -138,22 +165,22 @@ def reached(peak: Document, factor: float) -> tuple[str, str]:
 
 
 def peak_gap(peak: Document, level: int) -> float:
-    """Distance of a peak that is not exceeded from one that is reached, as a share of it."""
-    above = float(peak["upper"][level])
-    return 1 - float(peak["reached"][level]) / above if above > 0 else 0.0
+    """Relative gap between the bound of a peak and what a motion reaches, on a level."""
+    upper = float(peak["upper"][level])
+    return 1 - float(peak["reached"][level]) / upper if upper > 0 else 0.0
 
 
 def nominal(peak: Document, factor: float, nature: Nature) -> str:
-    """A peak on the highest level: one number, or an interval wider than a hundredth of it."""
+    """Text of a peak at α = 1: a number, or a range if that is wider than a hundredth of it."""
     low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
-    middle, near = (low + high) / 2, high - low <= 0.01 * abs(high)
-    return between(middle, middle, nature) if near else between(low, high, nature, 3)
+    middle, is_narrow = (low + high) / 2, high - low <= 0.01 * abs(high)
+    return between(middle, middle, nature) if is_narrow else between(low, high, nature, 3)
 
 
-def scales(
+def display_units(
     output: str, unit: str, peak: Document, structure: Document
 ) -> Iterator[tuple[str, float]]:
-    """Label and factor from SI of each unit in which an output is shown."""
+    """Yields the label and the factor from SI of each unit in which an output's peak is shown."""
     if unit == "m/s^2":
         yield f"{output}, g", 1 / GRAVITY
         return
@@ -165,53 +192,55 @@ def scales(
         yield "  % of weight", 100 / weight
 
 
-def limits_of(summary: Document) -> dict[str, tuple[float, str]]:
-    """Least limit in SI of each peak that a question names, and the verdict on it, or no text."""
+def least_limits(summary: Document) -> dict[str, tuple[float, str]]:
+    """Limit of each peak in SI, and the verdict on it: of a decision the least, else no verdict."""
     limits: dict[str, tuple[float, str]] = {}
-    strict: dict[str, float] = {}
-    for key, inner in (("tolerances", "limits"), ("probability", "events"), ("decision", "limits")):
-        for name, entry in summary.get(key, {}).get(inner, {}).items():
-            answer = entry if isinstance(entry, Mapping) else {"limit": entry}
-            output, value = answer.get("output", name), answer["limit"]
-            if key != "decision" or output not in strict or value < strict[output]:
-                limits[output] = value, answer.get("verdict", "")
-                strict |= {output: value} if key == "decision" else {}
+    for name, limit in summary.get("tolerances", {}).get("limits", {}).items():
+        limits[name] = limit, ""
+    for name, event in summary.get("probability", {}).get("events", {}).items():
+        limits[name] = event["limit"], ""
+    decisions = summary.get("decision", {}).get("limits", {})
+    least_first = sorted(decisions.items(), key=lambda pair: pair[1]["limit"])
+    for name, answer in reversed(least_first):  # the least overwrites others of its peak
+        limits[answer.get("output", name)] = answer["limit"], answer.get("verdict", "")
     return limits
 
 
 def natures(summary: Document) -> Iterator[str]:
-    """Lines on the nature of the peaks, and on the exact motions that tested them."""
-    groups: dict[str, dict[str, None]] = {}
-    for study in summary.get("envelopes", {}).values():
+    """Yields sentences on the nature of the peaks, and on the exact motions that tested them."""
+    studies = summary.get("envelopes", {}).values()
+    outputs_by_nature: dict[str, dict[str, None]] = {}
+    for study in studies:
         for output, peak in study["peak"].items():
-            groups.setdefault(peak["nature"], {})[output] = None
-    words = [f"{nature} ({', '.join(outputs)})" for nature, outputs in groups.items()]
-    if len(words) == 1:
-        words = [f"all {nature}" for nature in groups]
-    if words:
-        yield "Peaks are largest magnitudes over time, " + ", ".join(words)
-    if tested := sum(x.get("motions_tested", 0) for x in summary.get("envelopes", {}).values()):
+            outputs_by_nature.setdefault(peak["nature"], {})[output] = None
+    groups = [f"{nature} ({', '.join(outputs)})" for nature, outputs in outputs_by_nature.items()]
+    if len(groups) == 1:
+        groups = [f"all {nature}" for nature in outputs_by_nature]
+    if groups:
+        yield "Peaks are largest magnitudes over time, " + ", ".join(groups)
+    if tested := sum(study.get("motions_tested", 0) for study in studies):
         yield f"{tested} exact motions by another algorithm agree with what is guaranteed."
 
 
 def answers(summary: Document) -> list[Row]:
-    """A row for each answer to a question: what, answer, nature; of tolerances the first two."""
+    """Rows (what, answer, nature) of all answers to questions; inputs of tolerances share a row."""
     rows: list[Row] = []
     for question in QUESTIONS:
         if question.key in summary:
-            found = question.rows(summary[question.key])
+            answer_rows = question.rows(summary[question.key])
             if question.key == "tolerances":
-                found = [found[0], ("ranges", f"of {len(found) - 1} inputs", TOLERANCE_TABLE)]
-            rows += [(f"{question.key}: {row[0]}", *row[1:3]) for row in found]
+                scale, *inputs = answer_rows
+                answer_rows = [scale, ("ranges", f"of {len(inputs)} inputs", TOLERANCE_TABLE)]
+            rows += [(f"{question.key}: {row[0]}", *row[1:3]) for row in answer_rows]
     return rows
 
 
 def drivers(summary: Document) -> Iterator[str]:
-    """Lines on what drives the modulus, and the peak of the last output: the largest shares."""
+    """Yields sentences on the three inputs that widen E most, and the last output's peak most."""
     shares = dict(summary.get("shares", {}))
     peak_names = [name for name in shares if "peak" in name]
-    shown = [name for name in shares if name == "E"] + peak_names[-1:]
-    for name in shown:
-        first, *more_inputs = sorted(shares[name].items(), key=lambda pair: -pair[1])[:3]
-        more = "".join(f", {x} by {share:.0%}" for x, share in more_inputs)
-        yield f"Fixing {first[0]} narrows {name} by {first[1]:.0%}{more}"
+    results = [name for name in shares if name == "E"] + peak_names[-1:]
+    for name in results:
+        largest, *next_two = sorted(shares[name].items(), key=lambda pair: -pair[1])[:3]
+        more = "".join(f", {x} by {share:.0%}" for x, share in next_two)
+        yield f"Fixing {largest[0]} narrows {name} by {largest[1]:.0%}{more}"

@@ -20,12 +20,12 @@ from alphacut.report.results import (
     Table,
     answers,
     drivers,
-    filled,
     material,
-    motion,
     natures,
     peak_gap,
+    peak_table,
     unit_of,
+    without_empty_columns,
 )
 
 if TYPE_CHECKING:
@@ -35,16 +35,19 @@ DIGITS = 6
 
 
 def run_text(summary: Document) -> str:
-    """Every table of a run, and what drives the peak."""
+    """The results of a run for the console: tables, then sentences, answers and main drivers."""
     learned = summary.get("update", {})
-    shown = [table for table in (material(summary), motion(summary)) if table[1]]
-    shown += [update(learned)] if "inputs" in learned else []
-    lines = [*natures(summary), *([learned["refuted"]] if "refuted" in learned else [])]
+    shown = [table for table in (material(summary), peak_table(summary)) if table[1]]
+    if "inputs" in learned:
+        shown.append(update(learned))
+    lines = [*natures(summary)]
+    if "refuted" in learned:
+        lines.append(learned["refuted"])
     lines += [f"{row[0]}: {row[1]} ({row[2]})" for row in answers(summary)]
     lines += drivers(summary)
-    first = f"{MEANING}\n" if shown else ""
+    heading = f"{MEANING}\n" if shown else ""
     texts = [text_table(*table) for table in shown]
-    return first + "".join(texts) + "".join(f"{line}\n" for line in lines)
+    return heading + "".join(texts) + "".join(f"{line}\n" for line in lines)
 
 
 def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> list[Path]:
@@ -58,33 +61,33 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
     Returns:
         The files.
     """
-    filled_tables = {name: table for name, table in tables(summary).items() if table[1]}
+    tables_by_name = {name: table for name, table in tables(summary).items() if table[1]}
     for question in QUESTIONS:
         if question.key in summary:
             head, rows = question.number_rows(summary[question.key])
-            filled_tables[question.key] = head, [tuple(map(_cell, row)) for row in rows]
+            tables_by_name[question.key] = head, [tuple(map(_cell, row)) for row in rows]
     for name, study in summary.get("envelopes", {}).items():
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
             unit = unit_of(study, output)
-            filled_tables[f"envelope_{name}-{output}"] = over_time(data, output, unit)
+            tables_by_name[f"envelope_{name}-{output}"] = over_time(data, output, unit)
     if "records" in summary:
-        filled_tables["spectra"] = spectra(summary["records"]["spectra"])
-    return write_csv(filled_tables, folder)
+        tables_by_name["spectra"] = spectra(summary["records"]["spectra"])
+    return write_csv(tables_by_name, folder)
 
 
-def write_csv(filled_tables: Mapping[str, Table], folder: Path) -> list[Path]:
+def write_csv(tables_by_name: Mapping[str, Table], folder: Path) -> list[Path]:
     """Writes each table as a CSV file, with the minus of ASCII; returns the files."""
-    for name, (head, rows) in filled_tables.items():
+    for name, (head, rows) in tables_by_name.items():
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([head, *rows])
         content = text.getvalue().replace(MINUS, "-")
         write_text(folder / f"{name}.csv", content, follow_links=False)
-    return [folder / f"{name}.csv" for name in filled_tables]
+    return [folder / f"{name}.csv" for name in tables_by_name]
 
 
 def tables(summary: Document) -> dict[str, Table]:
-    """The table of every result by its name."""
+    """Tables of the results in a summary, by name: of stages as in `MAKERS`, then of questions."""
     stage_tables = {
         name: make(summary[key])
         for name, (key, make) in MAKERS.items()
@@ -100,10 +103,10 @@ def ends_of(values: Document, level: int, nature: Nature) -> Row:
 
 
 def radius_map(part: Document) -> Table:
-    """Parameters of the radius map."""
+    """Table of the parameters a1 … a4 of the radius map: least, modal and greatest value."""
     rows: list[Row] = []
     for name in ("a1", "a2", "a3", "a4"):
-        corners = part[name] if isinstance(part[name], list) else [part[name]]
+        corners = part[name] if isinstance(part[name], list) else [part[name]]  # three, or one
         least, modal, greatest = corners[0], corners[len(corners) // 2], corners[-1]
         rows.append((name, *map(_number, (least, modal, greatest))))
     return ("parameter of the radius map", "least", "modal", "greatest"), rows
@@ -120,7 +123,7 @@ def _number(value: float) -> str:
 
 
 def modulus(part: Document) -> Table:
-    """α-cuts of E, and of ν with the error of E where these are known."""
+    """Table of the α-cuts of E and of ν, with the error of E, of a round cell or of an image."""
     cuts, nature = part.get("cuts", part), Nature(part["nature"])
     poisson, error = part.get("nu_cuts"), sum(part.get("error", {}).values())
     rows: list[Row] = [
@@ -134,11 +137,11 @@ def modulus(part: Document) -> Table:
         for level, alpha in enumerate(cuts["alpha"])
     ]
     head = ("α", "E from [GPa]", "E to [GPa]", "ν from", "ν to", "± E [GPa]", "nature")
-    return filled(head, rows)
+    return without_empty_columns(head, rows)
 
 
 def update(part: Document) -> Table:
-    """Inputs before and after measured modes; then the modes that were predicted."""
+    """Table of the inputs before and after measured modes were used, then of predicted modes."""
     rows: list[Row] = []
     for name, identified in part["inputs"].items():
         after, unit = (identified["lower"][0], identified["upper"][0]), part["units"][name]
@@ -156,7 +159,7 @@ def _wide(ends: Sequence[float], unit: str) -> str:
 
 
 def peaks(studies: Document) -> Table:
-    """Peaks of all studies, an output and a level each, in SI."""
+    """Table of the peaks of all studies, a row for each output and level, in SI."""
     rows: list[Row] = []
     for name, study in studies.items():
         for output, peak in study["peak"].items():
@@ -173,7 +176,7 @@ def peaks(studies: Document) -> Table:
 
 
 def records(part: Document) -> Table:
-    """Measures and peaks on the lowest level of each record, then their statistics, in SI."""
+    """Table of each record's measures and peaks on the lowest level, then of statistics, in SI."""
     rows: list[Row] = []
     for name, record in part["records"].items():
         measures = tuple(_number(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
@@ -189,7 +192,7 @@ def records(part: Document) -> Table:
 
 
 def spectra(part: Document) -> Table:
-    """Pseudo-acceleration of each record at each period, and their mean."""
+    """Table of response spectra: pseudo-acceleration of each record, and their mean, by period."""
     names = [name for name in part if name != "period_s"]
     columns = [part[name] for name in names]
     rows: list[Row] = []
@@ -201,7 +204,7 @@ def spectra(part: Document) -> Table:
 
 
 def shares(part: Document) -> Table:
-    """Shares of the inputs in the width of each result, on the lowest level, largest first."""
+    """Table of each input's share in the width of each result at the lowest level, sorted."""
     rows: list[Row] = [
         (quantity, name, f"{share:.3f}")
         for quantity, values in part.items()
@@ -223,17 +226,18 @@ MAKERS = {
 
 
 def over_time(data: xarray.Dataset, output: str, unit: str) -> Table:
-    """Bounds of one output by time, those of each level beside each other with their error."""
+    """Table of the bounds of one output over time, with three columns for each level."""
     series = data.sel(output=output)
     nature = Nature(data.attrs["nature"])
-    words = {"lower": f"{nature} lower", "upper": f"{nature} upper", "error": "error"}
-    words["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
+    titles = {"lower": f"{nature} lower", "upper": f"{nature} upper"}
+    titles["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
     columns = {"time [s]": [_number(time) for time in series["time"].values]}
     for level in series["alpha"].values:
-        at = series.sel(alpha=level)
-        for band in filter(at.__contains__, words):
-            ends = (rounded(float(x), band, nature, DIGITS) for x in at[band].values)
-            columns[f"{words[band]} at alpha {level:g} [{unit}]"] = [*map(_number, ends)]
+        at_level = series.sel(alpha=level)
+        for kind, title in titles.items():
+            if kind in at_level:
+                values = (rounded(float(x), kind, nature, DIGITS) for x in at_level[kind].values)
+                columns[f"{title} at alpha {level:g} [{unit}]"] = [*map(_number, values)]
     return tuple(columns), [*zip(*columns.values(), strict=True)]
 
 

@@ -59,13 +59,13 @@ def solve_cells(
     return model(first.radius, first.matrix, [cell.inclusion for cell in cells], *interphase)
 
 
-def meaning(cell: AnyCell, modulus: ModulusSection) -> str:
-    """Average of the stiffness that gives E and ν: "eq. 16", "isotropic" or "spheres"."""
+def average_name(cell: AnyCell, modulus: ModulusSection) -> str:
+    """Name of the average of the stiffness that gives E and ν: "eq. 16", "isotropic", "spheres"."""
     return "spheres" if cell.particles == "spheres" else AVERAGES[modulus.average]
 
 
 def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any) -> Solve:
-    """The model that the sections of a case name.
+    """The function that solves cells by the model that the sections of a case name.
 
     Args:
         cell: Phases.
@@ -76,8 +76,8 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
     Raises:
         RefusedError: It needs what is not installed, or an option is out of range.
     """
-    averages = meaning(cell, modulus) == "isotropic"
-    options = {"stiffness": averages, **elements}
+    is_averaged = average_name(cell, modulus) == "isotropic"  # of the whole plane stiffness
+    options = {"stiffness": is_averaged, **elements}
     try:
         if isinstance(cell, RoundCell):
             model: Solve = partial(solve_cells, _model_of_particle(cell, mesh, modulus, options))
@@ -88,13 +88,20 @@ def model_of(cell: AnyCell, mesh: Mesh, modulus: ModulusSection, **elements: Any
             model = partial(solve_samples, PrismModel(mesh=mesh.file, **options))
     except ImportError as error:
         raise RefusedError("modulus.method", modulus.method, "series", missing(error)) from None
-    return partial(solve_and_average, model) if averages else model
+    return partial(solve_and_average, model) if is_averaged else model
 
 
 def _model_of_particle(
     cell: RoundCell, mesh: Mesh, modulus: ModulusSection, elements: Mapping[str, Any]
 ) -> Callable[..., list[HomogenisedStiffness]]:
-    """`solve` of a model of a cell with one particle."""
+    """Method `solve` of the model of a cell with one particle: series, slices or prisms.
+
+    Args:
+        cell: Phases and shape of the particle.
+        mesh: Resolution of elements.
+        modulus: Method, and tolerance of E, of which each source of error gets a part.
+        elements: Options of the prisms.
+    """
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":
         accuracy = max(TOLERANCE_PART * (tolerance or SPHERE_TOLERANCE), 1e-11)
@@ -152,7 +159,7 @@ def modal_values(radius: AnyRadius | ThetaSection, cell: AnyCell) -> dict[str, f
 
 
 def solve(radius: AnyRadius | ThetaSection, cell: AnyCell, model: Solve) -> HomogenisedStiffness:
-    """The cell's result at the modal values of its inputs."""
+    """The homogenised stiffness of the cell at the modal values of its inputs."""
     return model([cell_at(modal_values(radius, cell), radius, cell)])[0]
 
 
@@ -221,7 +228,7 @@ def _young(bulk: float, shear: float) -> float:
 
 
 def document(result: HomogenisedStiffness) -> Document:
-    """The result for ``--json``; moduli and stresses in GPa."""
+    """The result of a cell as a JSON document; moduli and stresses in GPa."""
     s11, s12 = result.curve.mean
     return {
         "E_GPa": result.modulus / GPA,
@@ -289,7 +296,8 @@ def declared_errors(result: HomogenisedStiffness) -> Document | None:
         return None
     if isinstance(result, HomogenisedSpheres):
         modulus, nu = result.error_of(hill_average)
-        s11, s12 = result.error_of(lambda k: STRAIN * np.array([2 * k[0] + 2 / 3 * k[1], 2 * k[2]]))
+        # σ11 under ε11 = ε22 and σ12 under ε12, from the cubic moduli K, G1 (axes), G2 (diagonals)
+        s11, s12 = result.error_of(lambda m: STRAIN * np.array([2 * m[0] + 2 / 3 * m[1], 2 * m[2]]))
     else:
         modulus, nu = result.estimated_error * result.modulus, result.poisson_error
         s11, s12 = np.abs(result.curve.mean) * result.modulus_errors[[0, 2]]
@@ -314,15 +322,12 @@ def require_bounds(
     """
     if particles != "spheres" or "fraction_of_case" not in references:
         return
-    low, high = (GPA * bound for bound in references["hashin_shtrikman_E_GPa"])
+    low, high = references["hashin_shtrikman_E_GPa"]
     fraction = references["fraction_of_case"]
-    if modulus_bounds[1] < low * (1 - BOUNDS_SLACK) or modulus_bounds[0] > high * (
-        1 + BOUNDS_SLACK
-    ):
-        value = (
-            f"{modulus_bounds[0] / GPA:.5g} GPa, of a map that holds {references['fraction']:.4g}"
-        )
-        limits = f"Hashin–Shtrikman's {low / GPA:.5g} … {high / GPA:.5g} GPa at {fraction:g}"
+    young_low, young_high = (bound / GPA for bound in modulus_bounds)
+    if young_high < low * (1 - BOUNDS_SLACK) or young_low > high * (1 + BOUNDS_SLACK):
+        value = f"{young_low:.5g} GPa, of a map that holds {references['fraction']:.4g}"
+        limits = f"Hashin–Shtrikman's {low:.5g} … {high:.5g} GPa at {fraction:g}"
         cure = f"set cell.fraction = {fraction:g} in place of [microstructure] or [radius]"
         raise RefusedError("E of spheres", value, limits, cure)
 

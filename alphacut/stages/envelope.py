@@ -50,7 +50,7 @@ class EnvelopeTask:
     limited: tuple[str, ...] = ()
 
     def tolerance(self, structure: Structure) -> Tolerance:
-        """Error that is allowed, in the unit of some output or as a share.
+        """Error of the envelope that the case allows, in the unit of some output or relative.
 
         Raises:
             RefusedError: No output has that unit.
@@ -62,43 +62,48 @@ class EnvelopeTask:
         require(tolerance.unit in {"", *units}, "envelope.tolerance", value=value, allowed=allowed)
         return tolerance
 
-    def is_motion_of(self, section: EnvelopeSection) -> bool:
+    def has_motion_of(self, section: EnvelopeSection) -> bool:
         """True if it has the inputs and the duration of [envelope]."""
         same_inputs = set(self.fuzzy) == set(section.fuzzy)
         return same_inputs and self.duration == section.duration
 
     def options(self, structure: Structure) -> dict[str, Any]:
-        """Options of the method. Auto takes any gap that is proved where no tolerance is named."""
+        """Options of the method of [envelope]: its tolerance, if it has one.
+
+        Without a tolerance in the case, method auto takes any gap that is proved.
+        """
         method, tolerance = self.section.method, self.tolerance(structure).value
-        auto = method == "auto" and self.section.tolerance is None
-        if auto or not hasattr(frame.METHODS[method], "tolerance"):
+        takes_any_gap = method == "auto" and self.section.tolerance is None
+        if takes_any_gap or not hasattr(frame.METHODS[method], "tolerance"):
             return {}
         return {"tolerance": tolerance * (self.section.gain if method in FOLLOWERS else 1.0)}
 
     def compute(self, structure: Structure, work: Work) -> StageResult:
-        """The envelope, and the fuzzy peak of each output's magnitude in its document.
+        """Computes the envelope as a dataset, and the fuzzy peak of each output as a document.
 
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
         relative = not self.tolerance(structure).unit
-        result = frame.envelope(**self.arguments(structure), relative=relative, **_run(work))
+        result = frame.envelope(
+            **self.arguments(structure), relative=relative, **_store_and_progress(work)
+        )
         signed = [name for name in self.limited if name != output_of(name)]
-        of_envelope = peaks(result, [*map(str, result.outputs), *signed])
-        # a proof of many inputs ends by its parts, and asked again it is hardly closer
-        many = len(structure.inputs(self.fuzzy)) > MOST_PARAMETERS
-        wide = wide_peaks(of_envelope, self.limited, np.inf if many else PEAK_ERROR)
-        if wide:
-            closer = replace(self, limited=wide).close_peaks(structure, work)
-            of_envelope = tightest(of_envelope, closer)
-        return StageResult({"peak": by_output(of_envelope)}, result.to_dataset())
+        peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
+        # a second proof of many inputs is hardly tighter: the number of its parts ends it
+        has_many_inputs = len(structure.inputs(self.fuzzy)) > MOST_PARAMETERS
+        gap = np.inf if has_many_inputs else PEAK_ERROR
+        if loose := loose_peaks(peak_bounds, self.limited, gap):
+            tighter = replace(self, limited=loose).close_peaks(structure, work)
+            peak_bounds = tightest(peak_bounds, tighter)
+        return StageResult({"peak": peaks_document(peak_bounds)}, result.to_dataset())
 
     def compute_peaks(self, structure: Structure, work: Work, nodes: int = 1) -> StageResult:
-        """Peaks of the limited outputs alone, in the document, by the nodes in each step."""
-        return StageResult({"peak": by_output(self.close_peaks(structure, work, nodes))})
+        """Computes the peaks of the limited outputs alone, with some nodes in each step."""
+        return StageResult({"peak": peaks_document(self.close_peaks(structure, work, nodes))})
 
     def arguments(self, structure: Structure) -> dict[str, Any]:
-        """Arguments of `frame.envelope` and of `frame.require_envelope` that the case names."""
+        """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
         return {
             **self._motion(structure),
             "model": structure.model,
@@ -112,14 +117,16 @@ class EnvelopeTask:
 
         Args:
             structure: The structure.
-            work: Where parts of a proof and progress go.
-            nodes: Nodes in each step.
+            work: Folder of a proof's parts, and progress.
+            nodes: Nodes in each step of [envelope].
         """
         model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
         method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
         motion = self._motion(structure) | {"step": self.section.step / nodes}
-        result = frame.envelope(model, method=method, relative=True, **motion, **_run(work))
+        result = frame.envelope(
+            model, method=method, relative=True, **motion, **_store_and_progress(work)
+        )
         return peaks(result, self.limited)
 
     def _motion(self, structure: Structure) -> dict[str, Any]:
@@ -132,8 +139,8 @@ class EnvelopeTask:
         }
 
 
-def _run(work: Work) -> dict[str, Any]:
-    """Arguments of `frame.envelope` on progress, and on the folder from which a proof goes on."""
+def _store_and_progress(work: Work) -> dict[str, Any]:
+    """Arguments of `frame.envelope` on progress and on the folder of a proof's parts."""
     return {"store": work.parts, "interruptible": False, "progress": work.tick or False}
 
 
@@ -142,26 +149,26 @@ def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(map(output_of, peaks)))
 
 
-def wide_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, ...]:
-    """Outputs without a guaranteed peak that is known to within a gap.
+def loose_peaks(peaks: Peaks, outputs: Sequence[str], gap: float) -> tuple[str, ...]:
+    """Names of those peaks that are not guaranteed to within a gap, or not there at all.
 
     Args:
-        peaks: Peaks of an envelope.
-        outputs: Outputs that matter; those that `peaks` has not are among the result.
-        gap: Distance of proved and reached peak, as a share of the proved one.
+        peaks: Bounds of peaks.
+        outputs: Names of the peaks that matter, such as q3 and max q3.
+        gap: Largest distance between the proved and the reached peak, relative to the proved one.
     """
-    wide = []
+    loose = []
     for output in outputs:
         column = peaks.outputs.index(output) if output in peaks.outputs else None
         if column is not None and peaks.natures[column] is Nature.GUARANTEED:
             upper, reached = peaks.upper[:, column], peaks.reached[:, column]
             if (upper - reached <= gap * np.abs(upper)).all():
                 continue
-        wide.append(output)
-    return tuple(wide)
+        loose.append(output)
+    return tuple(loose)
 
 
-def by_output(peaks: Peaks) -> Document:
+def peaks_document(peaks: Peaks) -> Document:
     """Peaks of each output by its name, each with its bounds on all levels, in SI."""
     return {
         name: {bound: getattr(peaks, bound)[:, column] for bound in PEAK_BOUNDS}
@@ -170,8 +177,8 @@ def by_output(peaks: Peaks) -> Document:
     }
 
 
-def peaks_of(document: Document, alpha: Sequence[float]) -> Peaks:
-    """Peaks from the document of `by_output`, where an infinite bound is None."""
+def peaks_from_document(document: Document, alpha: Sequence[float]) -> Peaks:
+    """Peaks from the document of `peaks_document` on levels `alpha`; None is an infinite bound."""
     bounds: dict[str, Array] = {}
     for bound in PEAK_BOUNDS:
         infinite = -np.inf if bound in ("lower", "reached", "least_proved") else np.inf
@@ -196,7 +203,7 @@ def tasks(
         for study in studies
     ) or (EnvelopeTask("all", section.fuzzy, section.duration, section),)
     return tuple(
-        replace(task, limited=limited) if task.is_motion_of(section) else task for task in studied
+        replace(task, limited=limited) if task.has_motion_of(section) else task for task in studied
     )
 
 
@@ -209,7 +216,12 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage:
 
 
 def document(result: StageResult, fuzzy: Sequence[str]) -> Document:
-    """Extremes over time at the lowest level, peaks, errors, cost, in SI."""
+    """Numbers on an envelope in SI: extremes and errors at the lowest level, peaks, cost.
+
+    Args:
+        result: Result of the stage of a study.
+        fuzzy: Fuzzy inputs as the user names them.
+    """
     data = result.arrays
     lowest, facts = data.isel(alpha=0), ("trajectories", "seconds", "method", "nature")
     columns = {
@@ -231,10 +243,10 @@ def document(result: StageResult, fuzzy: Sequence[str]) -> Document:
 
 
 def require_tolerance(result: StageResult, task: EnvelopeTask, structure: Structure) -> None:
-    """Requires declared errors within the tolerance, where the case names one.
+    """Requires the declared errors of an envelope within the tolerance, where the case names one.
 
-    A Graph Follower takes the tolerance as the gain that it goes on for, and cannot promise it: its
-    error is declared, and a line says where it is above.
+    A larger error of a Graph Follower is a warning: it takes the tolerance only as the least gain
+    for which it computes a trajectory.
 
     Raises:
         FailedError: One is larger.

@@ -28,6 +28,8 @@ def identify_inputs(
 ) -> tuple[Document, Structure]:
     """Numbers of the inputs identified from measured modes, in SI, and the updated structure.
 
+    Where the measurement refutes the frame, the document says so and the structure is as before.
+
     Args:
         section: Measured modes, and the names of the inputs.
         structure: The frame with its prior inputs.
@@ -36,14 +38,14 @@ def identify_inputs(
     Raises:
         RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
-    rows, used, prior = require_learnable(section, structure, alpha)
+    rows, learned_modes, prior = require_learnable(section, structure, alpha)
     assert structure.frame is not None
     try:
-        posterior = identify(structure.frame, prior, used, alpha=alpha)
+        posterior = identify(structure.frame, prior, learned_modes, alpha=alpha)
     except RefutedError as error:
         return {"refuted": str(error)}, structure
     modes = sorted(mode for mode in section.held_out if mode <= structure.frame.floors)
-    predicted = [_predicted(rows[mode], posterior.predictions()) for mode in modes]
+    predicted = [_prediction(rows[mode], posterior.predictions()) for mode in modes]
     document = {**_document(posterior), "held_out": predicted}
     document["prior"] = {name: list(widest(number)) for name, number in prior.items()}
     return document, replace(structure, numbers={**structure.numbers, **posterior.numbers})
@@ -52,37 +54,36 @@ def identify_inputs(
 def require_learnable(
     section: Identify, structure: Structure, alpha: tuple[float, ...]
 ) -> tuple[dict[int, ModeRows], list[MeasuredMode], dict[str, FuzzyNumber]]:
-    """Measurements by mode, the measured modes that identify, and the prior inputs.
+    """Data of an identification, which are read and checked.
+
+    Returns:
+        Measurements by mode; the modes to learn from, without held-out ones; the prior inputs.
 
     Raises:
         RefusedError: The file of modes is wrong, or an input cannot be learned.
     """
     require(alpha[0] > 0, "envelope.alpha", value=list(alpha), allowed="levels above 0")
-    rows = {row.mode: row for row in _rows(section)}
+    rows = {row.mode: row for row in _measured_rows(section)}
     allowed, held_out = f"some of modes {[*rows]}, not all", section.held_out
-    require(
-        set(held_out) < set(rows),
-        "identify.held_out",
-        value=", ".join(map(str, held_out)),
-        allowed=allowed,
-    )
-    used = [_measured(section, row) for mode, row in rows.items() if mode not in held_out]
-    return rows, used, structure.inputs(section.learn, "identify.learn")
+    fits, value = set(held_out) < set(rows), ", ".join(map(str, held_out))
+    require(fits, "identify.held_out", value=value, allowed=allowed)
+    learned = [_measured_mode(section, row) for mode, row in rows.items() if mode not in held_out]
+    return rows, learned, structure.inputs(section.learn, "identify.learn")
 
 
-def _rows(section: Identify) -> tuple[ModeRows, ...]:
+def _measured_rows(section: Identify) -> tuple[ModeRows, ...]:
     """Measurements of all modes, from a CSV or a universal file."""
-    universal = section.measured.suffix.lower() in ENDINGS
-    allowed = "the floors of its unknowns" if universal else "left out beside a CSV file"
-    given = bool(section.floors)
-    require(given == universal, "identify.floors", value=section.floors or None, allowed=allowed)
-    if universal:
+    is_universal = section.measured.suffix.lower() in ENDINGS
+    allowed = "the floors of its unknowns" if is_universal else "left out beside a CSV file"
+    fits = bool(section.floors) == is_universal
+    require(fits, "identify.floors", value=section.floors or None, allowed=allowed)
+    if is_universal:
         return uff_mode_rows(section.measured, section.floors)
     return mode_rows(section.measured)
 
 
-def _measured(section: Identify, row: ModeRows) -> MeasuredMode:
-    """Mode as measured; the section's deviations where its file has none."""
+def _measured_mode(section: Identify, row: ModeRows) -> MeasuredMode:
+    """A measured mode; the section's standard deviations stand in where its file has none."""
     shapes = {floor: [*map(float, values)] for floor, values in row.amplitudes.items()}
     return measured_mode(
         row.mode,
@@ -94,7 +95,7 @@ def _measured(section: Identify, row: ModeRows) -> MeasuredMode:
 
 
 def _document(posterior: Identified) -> Document:
-    """Posterior inputs as numbers: their α-cuts in SI, each of shape (levels,)."""
+    """Numbers on the identified inputs: α-cuts in SI, and how much each is narrowed."""
     cuts = zip(posterior.names, posterior.lower.T, posterior.upper.T, strict=True)
     return {
         "alpha": posterior.alpha,
@@ -106,9 +107,9 @@ def _document(posterior: Identified) -> Document:
     }
 
 
-def _predicted(row: ModeRows, frequencies: Ends) -> Document:
+def _prediction(row: ModeRows, frequencies: Ends) -> Document:
     """Measured frequency of a mode, and its predicted bounds on the lowest level, in Hz."""
-    low, high = (float(bounds[0, row.mode - 1]) for bounds in frequencies)
+    low, high = (float(bounds[0, row.mode - 1]) for bounds in frequencies)  # (levels, modes)
     measured = float(row.frequencies.mean())
     inside = low <= measured <= high
     return {"mode": row.mode, "measured": measured, "predicted": [low, high], "inside": inside}

@@ -43,9 +43,9 @@ ACCURACY = 1e-5
 NATURE = "guaranteed"
 """Nature of all bounds: proved of the image as segmented, if it repeats itself."""
 AXES = ["11", "22", "12"]
-Level = float | None
+AlphaLevel = float | None
 """α-level, or None for the modal values alone."""
-Ranges = Callable[[Level], tuple[Rows, Rows]]
+PhaseRanges = Callable[[AlphaLevel], tuple[Rows, Rows]]
 """Least and greatest phase of each pixel at a level."""
 
 
@@ -59,13 +59,19 @@ def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage:
 def compute_cuts(
     cell: ImageCell, alpha: tuple[float, ...], average: str, work: Work
 ) -> StageResult:
-    """α-cuts of E and of the stiffness, the picture of the phases, and what widens E.
+    """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E.
+
+    Args:
+        cell: The image and its phases.
+        alpha: Levels.
+        average: Name of the average of the stiffness that gives E and ν.
+        work: Takes progress.
 
     Raises:
         RefusedError: The image cannot give what the case asks for.
     """
     start, tick = perf_counter(), work.tick or (lambda fraction: None)
-    study, aspect = study_of(cell), cell.pixel[-1] / cell.pixel[0]
+    study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
     modal = study.images(None, None)
     division, solver = usual_division(modal), ConjugateGradient(ACCURACY)
     model = ImageModel(aspect, division=division, solver=solver, average=average)
@@ -76,7 +82,8 @@ def compute_cuts(
     model.require_consistent(images, cuts)
     tick(0.8)
 
-    def width(threshold: Level, phases: Level) -> float:
+    def width(threshold: AlphaLevel, phases: AlphaLevel) -> float:
+        """Width of E in Pa at levels of the threshold and of the phases."""
         (cut,) = model.cuts([study.images(threshold, phases)], (modal, crisp))
         return float(cut.modulus[1] - cut.modulus[0])
 
@@ -91,19 +98,21 @@ def compute_cuts(
     }
     losses: dict[str, Array] = {}
     if cell.losses:
-        phase, count = study.ranges(None)[0], len(cell.pairs)
+        phase, count = study.phase_ranges(None)[0], len(cell.pairs)
         energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
-        bounds, errors = losses_of(energies, LossCuts.of_phases(cell.losses, alpha), average)
+        bounds, errors = image_loss_bounds(
+            energies, LossCuts.from_phases(cell.losses, alpha), average
+        )
         losses = {name: bounds[..., k] for k, name in enumerate(CONSTANTS)}
         of_constants = dict(zip(CONSTANTS, map(float, errors), strict=True))
         facts["loss"] = loss_document(losses, of_constants, Nature.ESTIMATED)
-    return StageResult(facts, _dataset(alpha, cuts, study.ranges(None)[0], losses))
+    return StageResult(facts, _dataset(alpha, cuts, study.phase_ranges(None)[0], losses))
 
 
 def _dataset(
     alpha: tuple[float, ...], cuts: Sequence[ImageCut], phase: Rows, losses: Mapping[str, Array]
 ) -> xarray.Dataset:
-    """Bounds on each level in SI, and the phase of each pixel."""
+    """Dataset of the bounds on each level, in SI, and of the phase of each pixel."""
     import xarray
 
     young, constants = (
@@ -121,7 +130,7 @@ def _dataset(
     return xarray.Dataset(variables, axes, {"nature": NATURE})
 
 
-def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
+def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Array, Array]:
     """Bounds of the loss factors of E, G, K at modal moduli, (levels, 2, 3), and errors, (3,)."""
 
     def constants_of(moduli: Array) -> Array:
@@ -137,9 +146,15 @@ def losses_of(energies: PhaseEnergies, cuts: LossCuts, average: str) -> tuple[Ar
 
 
 def _widths(
-    study: ImageStudy, lowest: float, width: Callable[[Level, Level], float]
+    study: ImageStudy, lowest: float, width: Callable[[AlphaLevel, AlphaLevel], float]
 ) -> dict[str, float]:
-    """Widths of E in Pa that the pixels, the threshold and the phases cause, the widest first."""
+    """Widths of E in Pa that each source causes, the largest first.
+
+    Args:
+        study: The image.
+        lowest: Lowest level.
+        width: Width of E at levels of the threshold and of the phases; None: modal values.
+    """
     base = width(None, None)
     widths = {"discretisation": base}
     if study.fuzzy_threshold:
@@ -150,11 +165,13 @@ def _widths(
 
 
 def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) -> Document:
-    """The bounds; moduli in GPa."""
-    top, sizes = cuts[-1], [1.0 if name == "nu_xy" else GPA for name in NAMES]
-    keys = [name if name == "nu_xy" else f"{name}_GPa" for name in NAMES]
-    constants = np.array([cut.constants for cut in cuts])
+    """Numbers on an image: bounds on the highest level, α-cuts of its constants; moduli in GPa."""
+    top, constants = cuts[-1], np.array([cut.constants for cut in cuts])  # (levels, constants, 2)
     young = np.array([cut.modulus for cut in cuts])
+    plane: Document = {}
+    for k, name in enumerate(NAMES):
+        size, key = (1.0, name) if name == "nu_xy" else (GPA, f"{name}_GPa")
+        plane[key] = as_cut(constants[:, k] / size)
     return {
         "lower_GPa": top.bounds.lower / GPA,
         "upper_GPa": top.bounds.upper / GPA,
@@ -162,16 +179,9 @@ def _document(alpha: tuple[float, ...], cuts: Sequence[ImageCut], average: str) 
         "nu": {"lower": top.poisson[0], "upper": top.poisson[1]},
         "G_T_GPa": _pair(top.bounds.shear(average)),
         "average": AVERAGES[average],
-        "plane": {
-            key: as_cut(constants[:, k] / size)
-            for k, (key, size) in enumerate(zip(keys, sizes, strict=True))
-        },
+        "plane": plane,
         "nature": NATURE,
-        "cuts": {
-            "alpha": alpha,
-            "E_GPa": as_cut(young / GPA),
-            "nature": [NATURE] * len(cuts),
-        },
+        "cuts": {"alpha": alpha, "E_GPa": as_cut(young / GPA), "nature": [NATURE] * len(cuts)},
     }
 
 
@@ -179,7 +189,7 @@ def _pair(bounds: Ends) -> dict[str, float]:
     return {"lower": bounds[0] / GPA, "upper": bounds[1] / GPA}
 
 
-def cut_at(number: FuzzyNumber, level: Level) -> tuple[float, float]:
+def cut_at(number: FuzzyNumber, level: AlphaLevel) -> tuple[float, float]:
     """The cut of a number at a level, or its modal value twice."""
     return (number.modal, number.modal) if level is None else number.cut(level)
 
@@ -190,12 +200,12 @@ class ImageStudy:
 
     Args:
         cell: The section of the case.
-        ranges: Phases that each pixel may be of, at a level.
+        phase_ranges: Phases that each pixel may be of, at a level.
         fuzzy_threshold: Whether the phases of the pixels depend on the level.
     """
 
     cell: ImageCell
-    ranges: Ranges
+    phase_ranges: PhaseRanges
     fuzzy_threshold: bool
 
     @property
@@ -203,13 +213,13 @@ class ImageStudy:
         """True if the moduli depend on the level."""
         return any(number.support.width > 0 for pair in self.cell.pairs for number in pair)
 
-    def images(self, threshold: Level, phases: Level) -> ModuliImages:
+    def images(self, threshold: AlphaLevel, phases: AlphaLevel) -> ModuliImages:
         """Least and greatest moduli of each pixel, at levels of threshold and phases."""
         moduli = [
             ModuliInterval.of_young(cut_at(young, phases), cut_at(poisson, phases))
             for young, poisson in self.cell.pairs
         ]
-        return moduli_images(*self.ranges(threshold), moduli)
+        return moduli_images(*self.phase_ranges(threshold), moduli)
 
     @property
     def isotropic_bounds(self) -> list[float]:
@@ -219,8 +229,8 @@ class ImageStudy:
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Area fraction of each phase at the modal values, dark first."""
-        phase = self.ranges(None)[0]
+        """Area fraction of each phase at the modal values by the phase's name, dark first."""
+        phase = self.phase_ranges(None)[0]
         shares = np.bincount(phase.ravel(), minlength=len(self.cell.pairs)) / phase.size
         if self.cell.labels is not None:
             names = [f"label {label:g}" for label in self.cell.labels]
@@ -231,18 +241,26 @@ class ImageStudy:
         return dict(zip(names, map(float, shares), strict=True))
 
 
-def study_of(cell: ImageCell) -> ImageStudy:
-    """The study of an image cell, whose segmentation is judged first.
+def image_study(cell: ImageCell) -> ImageStudy:
+    """The study of an image cell, by its labels or by thresholds.
 
     Raises:
-        RefusedError: Its image cannot be used.
+        RefusedError: The image cannot be read, or cannot be segmented into these phases.
     """
     grey = read_grey(cell.image, square=len(cell.pixel) == 1)
-    return _labelled(grey, cell, cell.labels) if cell.labels else _thresholds(grey, cell)
+    return (
+        _study_by_labels(grey, cell, cell.labels)
+        if cell.labels
+        else _study_by_thresholds(grey, cell)
+    )
 
 
-def _thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
-    """Phases by thresholds; what noise and light leave open is fuzzy, unless thresholds are."""
+def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
+    """The study of an image whose phases are told by thresholds of its greys.
+
+    Pixels that noise or uneven light leave undecided may be of two phases on every level; fuzzy
+    thresholds take the place of this.
+    """
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
     modal = [number.modal for number in numbers]
@@ -250,21 +268,21 @@ def _thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
         grey, modal, smooth="noise" in cell.remove, level="light" in cell.remove
     )
     segmentation.require()
-    moved = [new - old for new, old in zip(segmentation.thresholds, modal, strict=True)]
-    fuzzy = any(number.support.width > 0 for number in numbers)
+    shifts = [new - old for new, old in zip(segmentation.thresholds, modal, strict=True)]
+    is_fuzzy = any(number.support.width > 0 for number in numbers)
 
-    def ranges(level: Level) -> tuple[Rows, Rows]:
-        if level is not None and not fuzzy:
+    def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
+        if level is not None and not is_fuzzy:
             return segmentation.ranges()
         cuts = (cut_at(number, level) for number in numbers)
-        pairs = [(low + by, high + by) for (low, high), by in zip(cuts, moved, strict=True)]
+        pairs = [(low + by, high + by) for (low, high), by in zip(cuts, shifts, strict=True)]
         return threshold_ranges(segmentation.grey, pairs)
 
-    return ImageStudy(cell, ranges, fuzzy or segmentation.open > 0)
+    return ImageStudy(cell, phase_ranges, is_fuzzy or segmentation.open > 0)
 
 
-def _labelled(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageStudy:
-    """Phases of an image whose pixels hold labels."""
+def _study_by_labels(grey: Array, cell: ImageCell, labels: tuple[float, ...]) -> ImageStudy:
+    """The study of an image in which the value of a pixel is the label of its phase."""
     phase = np.full(grey.shape, -1)
     for number, label in enumerate(labels):
         phase[grey == label] = number

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from alphacut.fuzzy import FuzzyNumber
+from alphacut.fuzzy import Crisp, FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
@@ -36,16 +36,12 @@ class LossCuts:
     has_bulk: tuple[bool, ...]
 
     @classmethod
-    def of_phases(cls, losses: Sequence[Losses], alpha: Sequence[float]) -> Self:
-        """Cuts of fuzzy loss factors on some levels."""
-        none = (0.0, 0.0)
-        bounds = [
-            [[young.cut(level), bulk.cut(level) if bulk else none] for young, bulk in losses]
-            for level in alpha
-        ]
-        return cls(
-            np.moveaxis(np.array(bounds), -1, 1), tuple(bulk is not None for _, bulk in losses)
-        )
+    def from_phases(cls, losses: Sequence[Losses], alpha: Sequence[float]) -> Self:
+        """Cuts of the phases' fuzzy loss factors on some levels."""
+        pairs = [(young, bulk or Crisp(0.0)) for young, bulk in losses]
+        cuts = [[[young.cut(x), bulk.cut(x)] for young, bulk in pairs] for x in alpha]
+        has_bulk = tuple(bulk is not None for _, bulk in losses)
+        return cls(np.moveaxis(np.array(cuts), -1, 1), has_bulk)  # the ends after the levels
 
     def corners(self, shares: Array, to_moduli: Array) -> Array:
         """Phases' loss factors where those of E, G and K are least and greatest, to first order.

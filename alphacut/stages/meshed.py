@@ -46,7 +46,7 @@ def solve_samples(model: PrismModel, samples: Sequence[MeshedSample]) -> list[Ho
 
 
 def require_mesh(mesh: Mesh, law: ThetaSection, cell: MeshedCell) -> None:
-    """Refuses a file that is no cell of prisms, and phases or a law that are not its own.
+    """Refuses a mesh file that is no periodic cell of prisms, or that [cell.phases] does not fit.
 
     Raises:
         RefusedError: With the physical group, side or level, or DOLFINx is not installed.

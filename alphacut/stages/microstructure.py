@@ -19,7 +19,7 @@ from alphacut.stochastic.microstructure_summary import fragment, summary, to_dat
 
 
 def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -> Stage:
-    """The stage of some particles; in a folder it writes radius.toml and figures as well."""
+    """The stage that computes the radius map of particles, and writes radius.toml and figures."""
     file = section.sources[0].file
     inputs = [section, spheres, file and file_digest(file)]
     compute = partial(compute_map, section, spheres, figures)
@@ -29,18 +29,18 @@ def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -
 def compute_map(
     section: MicrostructureSection, spheres: bool, figures: bool, work: Work
 ) -> StageResult:
-    """The fuzzy radius map with its data; the same for any number of workers.
+    """Computes the fuzzy radius map of particles; the same for any number of workers.
 
     Raises:
         RefusedError: Measured data have no meaning.
         FailedError: The packing is too dense.
     """
     with pool(work.workers) as executor:
-        map_of = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
-    numbers = summary(map_of)
+        result = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
+    numbers = summary(result)
     if work.folder is not None:
-        write(map_of, numbers, work.folder, figures=figures)
-    return StageResult(numbers, to_dataset(map_of))
+        write_files(result, numbers, work.folder, figures=figures)
+    return StageResult(numbers, to_dataset(result))
 
 
 def radius_of(result: StageResult) -> RadiusMapSection:
@@ -48,18 +48,18 @@ def radius_of(result: StageResult) -> RadiusMapSection:
     return RadiusMapSection.model_validate(result.document["radius"])
 
 
-def write(map_of: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:
-    """Writes the fragment of a case, the circles of an image, and figures."""
+def write_files(result: Microstructure, numbers: Document, folder: Path, *, figures: bool) -> None:
+    """Writes radius.toml, a section of a case; figures if wanted, and circles.csv of an image."""
     from alphacut.stochastic.figures.all import draw
 
-    drawn = draw(map_of, folder / "figures") if figures else {}
+    drawn = draw(result, folder / "figures") if figures else {}
     write_text(folder / "radius.toml", fragment(numbers))
     if "image_circles" in drawn:
-        write_text(folder / "circles.csv", _circles(map_of))
+        write_text(folder / "circles.csv", _circles(result))
 
 
-def _circles(map_of: Microstructure) -> str:
+def _circles(result: Microstructure) -> str:
     """The circles seen in an image as a CSV file, lengths in m."""
-    discs = map_of.sections[0].particles
+    discs = result.sections[0].particles
     x, y = np.transpose(discs.centres)
     return columns_text({"x [m]": x, "y [m]": y, "r [m]": discs.radii})

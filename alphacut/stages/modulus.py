@@ -40,9 +40,9 @@ from alphacut.stages.cell import (
     AnyCell,
     Solve,
     as_cut,
+    average_name,
     cell_at,
     inputs_of,
-    meaning,
     model_of,
     references,
     solve,
@@ -107,7 +107,7 @@ class CellTask:
 
     @on_one_blas_thread
     def __call__(self, points: Sequence[Mapping[str, float]]) -> list[dict[str, float | Array]]:
-        """Outputs of each point: E, nu, stresses, curve, systems, errors and checks."""
+        """Outputs of the cell at each point of the fuzzy inputs, by name, in SI."""
         cells = [cell_at({**self.crisp, **point}, self.radius, self.cell) for point in points]
         return [self._outputs(result) for result in self.model(cells)]
 
@@ -157,15 +157,15 @@ class CellCampaign:
 
     @cached_property
     def inputs(self) -> dict[str, FuzzyNumber]:
-        """Fuzzy inputs by name, in SI; the material where none is fuzzy."""
+        """Fuzzy inputs by name, in SI; one crisp modulus where none is fuzzy."""
         numbers = inputs_of(self.radius, self.cell)
         names = ("inclusion_modulus", "matrix_modulus", *numbers)
-        material = next(name for name in names if name in numbers)
+        stand_in = next(name for name in names if name in numbers)
         fuzzy = {name: number for name, number in numbers.items() if number.support.width > 0}
-        return fuzzy or {material: numbers[material]}
+        return fuzzy or {stand_in: numbers[stand_in]}
 
     def model(self, *, estimate: bool = False) -> Solve:
-        """The model of the cell; it may declare its errors at an extra cost."""
+        """The function that solves cells; with `estimate`, prisms declare errors at extra cost."""
         support, modulus = None, self.cell.constants.get("inclusion_modulus")
         if modulus is not None:
             support = (modulus.support.lower, modulus.support.upper)
@@ -174,7 +174,7 @@ class CellCampaign:
 
     @property
     def identity(self) -> Document:
-        """What the outputs of a sample depend on besides its fuzzy inputs, for the store."""
+        """All but the fuzzy inputs that the outputs of a sample depend on: the key of its store."""
         crisp = {name: repr(x) for name, x in inputs_of(self.radius, self.cell).items()}
         sections = {
             "modulus": self.modulus.model_dump(exclude={"plan", "alpha"}),
@@ -203,7 +203,7 @@ class CellCampaign:
         return CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
 
     def run(self, work: Work) -> StageResult:
-        """The α-cuts with all samples; a store beside them goes on after an interruption."""
+        """Computes all samples and the α-cuts; stored samples of an interrupted run are taken."""
         result = self.propagation(
             self.inputs,
             PLANS[self.modulus.plan],
@@ -228,9 +228,9 @@ class CellCampaign:
         if result.nature_of("E") is not Nature.GUARANTEED:
             return
         modulus, size = self.modulus, min(2 * self.mesh.size, MAX_TEST_SIZE)
-        usual = SPHERE_TOLERANCE if self.cell.particles == "spheres" else SeriesModel.accuracy
-        tolerance = TEST_TOLERANCE_FACTOR * (modulus.tolerance or usual)
-        other_campaign = replace(
+        default = SPHERE_TOLERANCE if self.cell.particles == "spheres" else SeriesModel.accuracy
+        tolerance = TEST_TOLERANCE_FACTOR * (modulus.tolerance or default)
+        coarse_campaign = replace(
             self,
             mesh=self.mesh.model_copy(update={"size": size}),
             modulus=modulus.model_copy(update={"tolerance": tolerance}),
@@ -238,7 +238,7 @@ class CellCampaign:
         cuts, error = np.stack(result.bounds("E"), 1), sum(self.errors(result).values())
         levels = result.alpha[[-1, 0]]
         points = [{x: float(np.mean(n.cut(a))) for x, n in result.inputs.items()} for a in levels]
-        for alpha, sample in zip(levels, other_campaign.task(points), strict=True):
+        for alpha, sample in zip(levels, coarse_campaign.task(points), strict=True):
             value = float(np.asarray(sample["E"]))
             slack = value * (error + sample["error:space"] + sample["error:theta"])
             for low, high in cuts[result.alpha <= alpha]:
@@ -252,7 +252,7 @@ class CellCampaign:
         """Cuts of the phases' loss factors; None where the case has none."""
         if not self.cell.losses:
             return None
-        return LossCuts.of_phases(self.cell.losses, self.modulus.alpha)
+        return LossCuts.from_phases(self.cell.losses, self.modulus.alpha)
 
     @property
     def knowledge(self) -> Knowledge:
@@ -268,18 +268,21 @@ class CellCampaign:
         supports = {name: number.support for name, number in self.cell.constants.items()}
         matrix, inclusion = supports["matrix_modulus"], supports["inclusion_modulus"]
         poisson = supports["matrix_poisson"]
-        stiffer, softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
-        same = poisson == supports["inclusion_poisson"] and not poisson.width and poisson.lower >= 0
-        if not same or not (stiffer or softer):
+        is_stiffer, is_softer = inclusion.lower >= matrix.upper, inclusion.upper <= matrix.lower
+        is_same = poisson == supports["inclusion_poisson"] and not poisson.width
+        if not is_same or poisson.lower < 0 or not (is_stiffer or is_softer):
             return Knowledge()
-        effect = 1 if stiffer else -1
+        effect = 1 if is_stiffer else -1  # of more inclusion on E
         signs = {"a1": effect, "a2": effect, "a3": effect, "a4": -effect, "fraction": effect}
         signs |= {"matrix_modulus": 1, "inclusion_modulus": 1}
         of_inputs = {name: {"E": sign} for name, sign in signs.items() if name in self.inputs}
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
     def loss_errors(self, result: Bounds) -> dict[str, float]:
-        """Largest errors of the loss factors of E, G, K, or modal ones; none of a mesh."""
+        """Errors of the loss factors by `CONSTANTS`: the largest of all samples, or modal ones.
+
+        Prisms have modal ones, as their estimates are costly; a mesh from a file has none.
+        """
         assert self.losses is not None
         assert result.samples is not None
         if isinstance(self.cell, MeshedCell):
@@ -299,7 +302,7 @@ class CellCampaign:
 
 
 def stage(campaign: CellCampaign) -> Stage:
-    """The stage of a round cell's samples."""
+    """The stage that computes the α-cuts of a cell by samples."""
     plan, alpha = campaign.modulus.plan, campaign.modulus.alpha
     inputs = [campaign.identity, campaign.inputs, campaign.stated_fraction, plan, alpha]
     return Stage("modulus", inputs, ("stochastic", "rve", "fuzzy"), campaign.run, has_samples=True)
@@ -312,7 +315,10 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
 
 
 def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> xarray.Dataset:
-    """α-cuts over (alpha, bound), the inputs that reach them (NAME_at), and samples, in SI."""
+    """Dataset in SI of α-cuts over (alpha, bound), the inputs that reach them, and all samples.
+
+    Of quantity NAME they are the variables NAME, NAME_at and NAME_sample.
+    """
     import xarray
 
     samples = result.samples
@@ -320,25 +326,25 @@ def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array])
     variables: dict[str, Any] = {}
     for name, (unit, about) in QUANTITIES.items():
         if name in result.outputs:
-            words, column = {"units": unit, "long_name": about}, result.column(name)
+            attributes, column = {"units": unit, "long_name": about}, result.column(name)
             points = np.stack([result.lower_at[:, column], result.upper_at[:, column]], axis=1)
-            reached = {"long_name": f"inputs that reach the bounds of {name}, in SI"}
-            variables[name] = (CUT, np.stack(result.bounds(name), axis=1), words)
-            variables[f"{name}_at"] = ((*CUT, "parameter"), points, reached)
-            variables[f"{name}_sample"] = ("sample", samples.values.output(name), words)
+            about_points = {"long_name": f"inputs that reach the bounds of {name}, in SI"}
+            variables[name] = (CUT, np.stack(result.bounds(name), axis=1), attributes)
+            variables[f"{name}_at"] = ((*CUT, "parameter"), points, about_points)
+            variables[f"{name}_sample"] = ("sample", samples.values.output(name), attributes)
     for name, cut in losses.items():
         variables[f"loss_{name}"] = (CUT, cut, {"long_name": f"loss factor of {name}"})
     about_points = {"long_name": "inputs, in SI"}
     variables["point"] = (("sample", "parameter"), samples.points, about_points)
-    words = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
-    variables["curve11"] = (("sample", "theta"), samples.values.output("curve11"), words)
+    attributes = {"units": "Pa", "long_name": "homogenised stress 11 over θ"}
+    variables["curve11"] = (("sample", "theta"), samples.values.output("curve11"), attributes)
     coordinates = {"theta": theta_of(campaign.radius), "alpha": result.alpha}
     axes = {"bound": ["lower", "upper"], "parameter": list(result.inputs)}
     return xarray.Dataset(variables, coordinates | axes)
 
 
 def document(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> Document:
-    """α-cuts, moduli in GPa; their nature, errors, references and cost."""
+    """Numbers on a modulus: α-cuts, moduli in GPa; their nature, errors, references and cost."""
     assert result.samples is not None
     cuts = cut_documents(result, BOUNDS)
     numbers: Document = {
@@ -354,7 +360,7 @@ def document(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]
         "seconds": result.seconds,
         "nature": str(result.nature_of("E")),
         "particles": campaign.cell.particles,
-        "average": meaning(campaign.cell, campaign.modulus),
+        "average": average_name(campaign.cell, campaign.modulus),
         "error": campaign.errors(result),
         "checks": _largest(result, "check"),
         "references": references(campaign.radius, campaign.cell, campaign.stated_fraction),
@@ -387,7 +393,8 @@ def loss_outputs(result: HomogenisedStiffness, cuts: LossCuts) -> dict[str, Arra
 def loss_cuts(result: Bounds) -> dict[str, Array]:
     """α-cuts of the loss factors by the names of `CONSTANTS`, shape (levels, 2) each.
 
-    A sample has their bounds for the phases' cuts on every level; level k takes those of level k.
+    Each sample has bounds for the phases' cuts on every level k, as outputs loss_lower[k][…]; the
+    cut of level k spans those of its samples.
     """
     cuts: dict[str, Array] = {name: np.empty((len(result.alpha), 2)) for name in CONSTANTS}
     for (k, name), level in product(enumerate(CONSTANTS), range(len(result.alpha))):
@@ -413,15 +420,15 @@ def require_levels(alpha: tuple[float, ...], key: str) -> None:
     require(complete, key, value=list(alpha), allowed="levels from 0 to 1, or 1 alone")
 
 
-def loss_of(data: xarray.Dataset) -> FuzzyNumber | None:
+def fuzzy_loss(data: xarray.Dataset) -> FuzzyNumber | None:
     """The fuzzy loss factor of E; None where the phases have none."""
     if "loss_E" not in data:
         return None
     return _stepped(data, "loss_E")
 
 
-def number_of(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
-    """The fuzzy modulus in Pa.
+def fuzzy_modulus(data: xarray.Dataset, key: str = "modulus") -> FuzzyNumber:
+    """The fuzzy Young's modulus in Pa that stored α-cuts make.
 
     Raises:
         RefusedError: There is none, or it is not positive, or lacks the levels 0 and 1.

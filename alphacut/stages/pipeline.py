@@ -16,7 +16,7 @@ from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.io.files import as_json, say
 from alphacut.questions.all import questions_of
-from alphacut.questions.question import Motion, Question
+from alphacut.questions.question import FuzzyResponse, Question
 from alphacut.stages import (
     cell,
     envelope,
@@ -27,7 +27,7 @@ from alphacut.stages import (
     shares,
     suite,
 )
-from alphacut.stages.envelope import EnvelopeTask, peaks_of
+from alphacut.stages.envelope import EnvelopeTask, peaks_from_document
 from alphacut.stages.modulus import CellCampaign
 from alphacut.stages.readiness import campaign_of, cut_record_warnings
 from alphacut.stages.results import Results
@@ -61,24 +61,24 @@ class Pipeline:
         return self.results.content
 
     def run(self) -> Results:
-        """The results of every stage."""
+        """Computes every stage of the case; returns their results."""
         results, stages = self.results, self.content.stages
         if "microstructure" in stages:
-            results.microstructure = self.particles()
+            results.microstructure = self.compute_microstructure()
             radius = microstructure.radius_of(results.microstructure)
             results.content = self.content.model_copy(update={"radius": radius})
         if "modulus" in stages:
-            self.material()
+            self.compute_modulus()
         if "envelope" in stages:
             data = results.modulus if results.image is None else results.image
-            self._motion(self.structure(None if data is None else data.arrays))
-        samples = self.campaign if results.modulus is not None else None
-        task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
-        results.shares = self.store.take(shares.stage(samples, results.structure, task))
+            self._compute_motion(self.structure(None if data is None else data.arrays))
+        campaign = self.campaign if results.modulus is not None else None
+        richest_task = max(results.tasks, key=lambda x: (len(x.fuzzy), x.duration), default=None)
+        results.shares = self.store.take(shares.stage(campaign, results.structure, richest_task))
         return results
 
-    def particles(self) -> StageResult:
-        """The particles and their radius map."""
+    def compute_microstructure(self) -> StageResult:
+        """Result of stage microstructure: the radius map of the particles."""
         section = self.content.microstructure
         if section is None:
             raise RefusedError("microstructure", None, "a section [microstructure]")
@@ -90,8 +90,13 @@ class Pipeline:
         """Samples of a round cell."""
         return campaign_of(self.content, self.petsc)
 
-    def material(self) -> None:
-        """The modulus of the cell, round or an image."""
+    def compute_modulus(self) -> None:
+        """Computes stage modulus, of an image or of samples of a cell, into the results.
+
+        Raises:
+            FailedError: E has a larger error than the case allows.
+            RefusedError: E of spheres lies outside its bounds.
+        """
         results, section = self.results, self.content.modulus
         if self.content.picture is not None:
             stage = image.stage(self.content.picture, section.alpha, section.average)
@@ -104,49 +109,48 @@ class Pipeline:
         cell.require_bounds((young[0], young[1]), data.document["references"], particles)
 
     def structure(self, data: xarray.Dataset | None, key: str = "modulus") -> Structure:
-        """The structure with the modulus and the loss factor of a stage, None for its own.
+        """The structure of the case with the modulus and the loss factor of stage modulus.
 
         Args:
-            data: Result of stage modulus.
-            key: Where it comes from.
+            data: Arrays of stage modulus; None: those that the case states.
+            key: Option or key that names the data, for messages.
         """
-        content, number = self.content, None if data is None else modulus.number_of(data, key)
-        loss = None if data is None else modulus.loss_of(data)
-        section = content.structure_section
+        content, section = self.content, self.content.structure_section
+        young = None if data is None else modulus.fuzzy_modulus(data, key)
+        loss = None if data is None else modulus.fuzzy_loss(data)
         if section is None or content.envelope is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
-        require(
-            number is not None or content.has_own_modulus,
-            "frame.modulus",
-            value=None,
-            allowed="a modulus, or --modulus FILE.nc",
-        )
+        has_modulus = young is not None or content.has_own_modulus
+        allowed = "a modulus, or --modulus FILE.nc"
+        require(has_modulus, "frame.modulus", value=None, allowed=allowed)
         by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
-        allowed = "loss factors of the cell, or a number"
-        is_stated = loss is not None or not by_material
-        require(is_stated, "frame.damping_ratio", value="material", allowed=allowed)
-        return content.structure_of(number, loss)
+        has_damping, allowed = (
+            loss is not None or not by_material,
+            "loss factors of the cell, or a number",
+        )
+        require(has_damping, "frame.damping_ratio", value="material", allowed=allowed)
+        return content.structure_of(young, loss)
 
-    def motion(self, structure: Structure, studies: bool = True) -> None:
-        """Envelopes of the structure, of every study or of [envelope] alone."""
+    def compute_envelopes(self, structure: Structure, studies: bool = True) -> None:
+        """Computes the envelopes of all studies, or of [envelope] alone, into the results."""
         assert self.content.envelope is not None
         results = self.results
         results.structure = structure
-        for words in cut_record_warnings(self.content, structure):
-            say(f"warning: {words}")
+        for warning in cut_record_warnings(self.content, structure):
+            say(f"warning: {warning}")
         section, content = self.content.envelope, self.content
         limited = content.limited_outputs
         results.tasks = envelope.tasks(section, content.study if studies else (), limited)
-        longest = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
-        stages = [envelope.stage(structure, task) for task in longest]
+        longest_first = sorted(results.tasks, key=lambda task: -len(task.fuzzy) * task.duration)
+        stages = [envelope.stage(structure, task) for task in longest_first]
         outcomes = self.store.take_all(stages, self.executor)
         for task in results.tasks:
             data = outcomes[f"envelope_{task.name}"]
             envelope.require_tolerance(data, task, structure)
             results.envelopes[task.name] = data
 
-    def _motion(self, structure: Structure) -> None:
-        """Envelopes after what was identified, and the answers to what the case asks of them."""
+    def _compute_motion(self, structure: Structure) -> None:
+        """Computes identified inputs, then envelopes or a suite, then answers, into the results."""
         results, content = self.results, self.content
         assert content.envelope is not None
         (task,) = envelope.tasks(content.envelope, ())
@@ -154,52 +158,59 @@ class Pipeline:
             measured, alpha = content.identify, task.section.alpha
             results.learned, structure = identify.identify_inputs(measured, structure, alpha)
         if content.records is not None:
-            self._suite(content.records, structure, task)
+            self._compute_suite(content.records, structure, task)
             return
-        self.motion(structure)
-        peaks = self._peaks(replace(task, limited=content.limited_outputs), structure)
+        self.compute_envelopes(structure)
+        peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
         times = (task.section.alpha, task.duration, task.section.step)
-        self._answer(Motion(structure, task.fuzzy, *times, peaks))
+        self._answer(FuzzyResponse(structure, task.fuzzy, *times, peaks))
 
-    def _answer(self, motion: Motion) -> None:
-        """Answers to what the case asks of a motion."""
+    def _answer(self, response: FuzzyResponse) -> None:
+        """Answers all questions of the case about a response, into the results."""
         for question in questions_of(self.content.questions):
-            compute, inputs = partial(answer_of, question, motion), [question.section, motion]
+            compute, inputs = partial(answer_of, question, response), [question.section, response]
             stage = Stage(question.key, inputs, ("fuzzy", "frame", "alphacut"), compute)
             self.results.answers[question.key] = self.store.take(stage).document
 
-    def _suite(self, section: RecordsSection, structure: Structure, task: EnvelopeTask) -> None:
-        """Peaks under each record of a suite, and the answers to what the case asks of them."""
+    def _compute_suite(
+        self, section: RecordsSection, structure: Structure, task: EnvelopeTask
+    ) -> None:
+        """Computes peaks under each record of a suite, and answers about them, into the results."""
         results = self.results
         results.structure = structure
         mode = suite.nominal_mode(structure)
-        records = suite.suite(section, task.section, structure)
-        for words in suite.suite_warnings(records):
-            say(f"warning: {words}")
+        records = suite.suite_records(section, task.section, structure)
+        for warning in suite.suite_warnings(records):
+            say(f"warning: {warning}")
         limited = self.content.limited_outputs or structure.outputs
         stages = suite.stages(structure, replace(task, limited=limited), records)
         outcomes = self.store.take_all(stages, self.executor)
         peaks = suite.peaks_by_record(outcomes, records, task.section.alpha)
         results.suite = json.loads(as_json(suite.document(peaks, records, mode)))
         times = (task.section.alpha, task.duration, task.section.step)
-        moved = suite.motion(peaks, records, mode)
+        by_record = suite.suite_response(peaks, records, mode)
         worst = suite.with_means(suite.worst_peaks(peaks), peaks)
-        self._answer(Motion(structure, task.fuzzy, *times, worst, moved))
+        self._answer(FuzzyResponse(structure, task.fuzzy, *times, worst, by_record))
 
-    def _peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
-        """Peaks of the motion of [envelope]: of the study that has it, else of limited outputs."""
+    def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
+        """Peaks for questions: from the study with the motion of [envelope], else computed alone.
+
+        None where there is no such study, and no question limits an output.
+        """
         alpha = task.section.alpha
         for study in self.results.tasks:
-            if study.is_motion_of(task.section):
-                return peaks_of(self.results.envelopes[study.name].document["peak"], alpha)
+            if study.has_motion_of(task.section):
+                return peaks_from_document(
+                    self.results.envelopes[study.name].document["peak"], alpha
+                )
         if not task.limited:
             return None
         inputs = [structure.model, structure.numbers, task]
         compute = partial(task.compute_peaks, structure)
         result = self.store.take(Stage("peaks", inputs, ("fuzzy", "frame"), compute))
-        return peaks_of(result.document["peak"], alpha)
+        return peaks_from_document(result.document["peak"], alpha)
 
 
-def answer_of(question: Question, motion: Motion, work: Work) -> StageResult:
-    """The answer to a question about a motion."""
-    return StageResult(question.answer(replace(motion, progress=work.tick)))
+def answer_of(question: Question, response: FuzzyResponse, work: Work) -> StageResult:
+    """The answer to a question about a response."""
+    return StageResult(question.answer(replace(response, progress=work.tick)))

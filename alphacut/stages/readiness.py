@@ -9,7 +9,7 @@ from alphacut.case.content import Content
 from alphacut.case.structure import LOSS_STAND_IN, STAND_IN, Structure
 from alphacut.fuzzy import Crisp, FuzzyNumber, Triangular
 from alphacut.questions.all import questions_of
-from alphacut.questions.question import Motion
+from alphacut.questions.question import FuzzyResponse
 from alphacut.stages import envelope, identify, image, suite
 from alphacut.stages.cell import model_of
 from alphacut.stages.meshed import require_mesh
@@ -18,7 +18,7 @@ from alphacut.stochastic.sections import Simulated
 
 
 def require_runnable(content: Content) -> None:
-    """Builds everything that the stages of a case read, and the first steps of its motions.
+    """Reads and builds all that the stages of a case need, so that what they refuse is refused now.
 
     Raises:
         RefusedError: A stage would refuse a file, a model or a value.
@@ -35,13 +35,13 @@ def require_runnable(content: Content) -> None:
 
 
 def _require_material(content: Content) -> None:
-    """Builds the model of the cell, and the samples it is asked for, or judges its image."""
+    """Requires a mesh, an image or a model of the cell that stage modulus can use."""
     if "envelope" in content.stages and not content.has_own_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
     if content.meshed is not None:
         require_mesh(content.mesh, *content.meshed_cell)
     if content.picture is not None:
-        image.study_of(content.picture)
+        image.image_study(content.picture)
     elif "microstructure" not in content.stages:
         _ = campaign_of(content).propagation
     elif content.round is not None:
@@ -56,26 +56,29 @@ def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> Cel
 
 
 def _require_motion(content: Content) -> None:
-    """Requires an admissible motion of each study, and what questions ask of the structure."""
+    """Requires a structure of which each study and each question of the case can be computed."""
     if content.structure_section is None or content.envelope is None:
         return
-    number, alpha = _modulus(content), content.envelope.alpha
-    structure = content.structure_of(number, _loss(content, number))
+    number, alpha = _stand_in_modulus(content), content.envelope.alpha
+    structure = content.structure_of(number, _stand_in_loss(content, number))
     if content.identify is not None:
         identify.require_learnable(content.identify, structure, alpha)
     if content.records is not None:
-        records = suite.suite(content.records, content.envelope, structure)
+        records = suite.suite_records(content.records, content.envelope, structure)
         structure = suite.with_record(structure, records[0])
     for task in envelope.tasks(content.envelope, content.study):
         frame.require_envelope(**task.arguments(structure))
     (task,) = envelope.tasks(content.envelope, ())
-    motion = Motion(structure, task.fuzzy, alpha, task.duration, task.section.step)
+    response = FuzzyResponse(structure, task.fuzzy, alpha, task.duration, task.section.step)
     for question in questions_of(content.questions):
-        question.require_answerable(motion)
+        question.require_answerable(response)
 
 
-def _modulus(content: Content) -> FuzzyNumber | None:
-    """A modulus that stands in for that of a stage, fuzzy where that will be."""
+def _stand_in_modulus(content: Content) -> FuzzyNumber | None:
+    """Young's modulus that stands in for the one of stage modulus, fuzzy where that will be.
+
+    None without that stage.
+    """
     if "modulus" not in content.stages:
         return None
     value = STAND_IN.modal
@@ -87,8 +90,8 @@ def _modulus(content: Content) -> FuzzyNumber | None:
     return Crisp(value) if crisp else Triangular(0.99 * value, value, 1.01 * value)
 
 
-def _loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
-    """A loss factor that stands in for that of a stage, fuzzy where that will be."""
+def _stand_in_loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
+    """Loss factor that stands in for the one of stage modulus, fuzzy where that will be."""
     losses = [x for pair in content.cell.losses for x in pair if x] if content.cell else []
     widths = [x.support.width for x in (*losses, modulus) if x is not None]
     value = LOSS_STAND_IN.modal
@@ -97,11 +100,11 @@ def _loss(content: Content, modulus: FuzzyNumber | None) -> FuzzyNumber:
 
 
 def cut_record_warnings(content: Content, structure: Structure) -> Iterator[str]:
-    """Sentences on a record that goes on after the end of a motion."""
+    """Yields a warning if the structure's record goes on after the end of all motions."""
     linear = structure.linear
     if linear is None or linear.ground is None or content.envelope is None:
         return
-    lasts = linear.ground.step * (len(linear.ground.acceleration) - 1)
+    length = linear.ground.step * (len(linear.ground.acceleration) - 1)
     longest = max(task.duration for task in envelope.tasks(content.envelope, content.study))
-    if lasts > longest * (1 + 1e-9):
-        yield f"the record lasts {lasts:g} s, and the motion is computed for {longest:g} s"
+    if length > longest * (1 + 1e-9):
+        yield f"the record lasts {length:g} s, and the motion is computed for {longest:g} s"

@@ -69,7 +69,7 @@ class Results:
         return {str(name): self.structure.unit(name) for name in self.structure.outputs}
 
     def document(self) -> Document:
-        """Everything in numbers, for summary.json."""
+        """Numbers of all results, in the parts of summary.json."""
         results = {name: getattr(self, name) for name in NAMES}
         numbers = {name: result.document for name, result in results.items() if result is not None}
         if self.structure is not None and self.structure.frame is not None:
@@ -96,7 +96,7 @@ class Results:
 
 
 def frame_properties(structure: Structure, frame: StoreyFrame) -> Document:
-    """Frequencies, weight in N, and the height in m of the storey of each drift."""
+    """Natural frequencies, first period, weight, and the height of the storey of each drift."""
     omega, drifts = frequencies(frame), set(structure.outputs)
     return {
         "omega_rad_per_s": omega,

@@ -34,7 +34,10 @@ ACCURACY = 2e-3
 def stage(
     campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
 ) -> Stage:
-    """The stage of the shares of a cell's inputs, and of those of the richest study."""
+    """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks.
+
+    Each part may be None.
+    """
     cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
     motion = structure and [structure.model, structure.numbers, task]
     compute = partial(compute_shares, campaign, structure, task)
@@ -47,16 +50,16 @@ def compute_shares(
     task: EnvelopeTask | None,
     work: Work,
 ) -> StageResult:
-    """Shares of each input in the widths of E, ν and peaks, where there are two inputs or more.
+    """Computes each input's share in the widths of E, ν and peaks on the lowest level.
 
-    They are of the lowest level: by result, then by input.
+    The document has them by result, then by input; a result of one input has none.
     """
     shares: Document = {}
     if campaign is not None and len(campaign.inputs) > 1:
-        cell = of_cell(campaign)
+        cell = cell_shares(campaign)
         shares = {x: _by_input(cell, cell.share[:, 0, k]) for k, x in enumerate(("E", "ν"))}
     if structure is not None and task is not None and structure.frame and len(task.fuzzy) > 1:
-        peak = of_peaks(structure.frame, structure, task)
+        peak = peak_shares(structure.frame, structure, task)
         for column, name in enumerate(structure.outputs):
             shares[f"the peak of {name}"] = _by_input(peak, peak.share[:, column])
     return StageResult(shares)
@@ -66,15 +69,14 @@ def _by_input(shares: Shares, values: Array) -> dict[str, float]:
     return dict(zip(shares.names, map(float, values), strict=True))
 
 
-def of_cell(campaign: CellCampaign) -> Shares:
-    """Shares of the cell's inputs in the widths of E and ν, shape (inputs, levels, 2).
-
-    They are by the series where it has a formula.
-    """
+def cell_shares(campaign: CellCampaign) -> Shares:
+    """Shares of the cell's inputs in the widths of E and ν, shape (inputs, levels, 2)."""
+    # the series is cheap where it has a formula
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
     propagation = replace(campaign, modulus=modulus).propagation
 
     def bounds(inputs: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
+        """Lower and upper bounds of E and ν on each level, shape (levels, 2) each."""
         cell_bounds = propagation(inputs, Reduced(), progress=False)
         columns = [cell_bounds.column(name) for name in OUTPUTS]
         return cell_bounds.lower[:, columns], cell_bounds.upper[:, columns]
@@ -82,16 +84,14 @@ def of_cell(campaign: CellCampaign) -> Shares:
     return width_shares(bounds, campaign.inputs)
 
 
-def of_peaks(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
+def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
     """Shares of a study's inputs in the width of each output's peak, shape (inputs, outputs)."""
-    groups = {name: structure.members(name) for name in task.fuzzy}
-    step = (
-        task.section.step
-        if model.ground is None
-        else coarser_step(task.duration, task.section.step)
-    )
+    groups, step = {name: structure.members(name) for name in task.fuzzy}, task.section.step
+    if model.ground is not None:
+        step = coarser_step(task.duration, step)
 
     def bounds(numbers: Mapping[str, FuzzyNumber]) -> tuple[Array, Array]:
+        """Least and greatest peak of each output on the lowest level, shape (outputs,) each."""
         fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
         method = frame.Auto(ACCURACY, peaks=True)
         motion: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}

@@ -138,36 +138,36 @@ class StageStore:
 
     def take(self, stage: Stage) -> StageResult:
         """The result of a stage: from its files where these are up to date, else computed."""
-        return self._stored(stage) or self._computed(stage)
+        return self._read_if_current(stage) or self._compute(stage)
 
     def take_all(
         self, stages: Sequence[Stage], executor: Executor | None
     ) -> dict[str, StageResult]:
-        """The results of several stages by their names, computed side by side by an executor.
+        """The results of stages by name: from files that are up to date, else computed in parallel.
 
         Args:
-            stages: Those that take longest first; they write no further files.
-            executor: Processes; None where this one does everything.
+            stages: The stages, those that take longest first; they write no further files.
+            executor: Processes; None: this process computes all.
         """
-        stored = {stage.name: self._stored(stage) for stage in stages}
+        stored = {stage.name: self._read_if_current(stage) for stage in stages}
         results = {name: result for name, result in stored.items() if result is not None}
         stale = [stage for stage in stages if stage.name not in results]
         if executor is None or self.folder is None or len(stale) == 1:
-            return results | {stage.name: self._computed(stage) for stage in stale}
-        under_way = {executor.submit(stage.run, Work()): stage for stage in stale}
+            return results | {stage.name: self._compute(stage) for stage in stale}
+        stage_of_future = {executor.submit(stage.run, Work()): stage for stage in stale}
         with showing(self.shown) as tick:
-            for done, future in enumerate(as_completed(under_way), start=1):
-                stage = under_way[future]
-                with self._reported(stage):
+            for count, future in enumerate(as_completed(stage_of_future), start=1):
+                stage = stage_of_future[future]
+                with self._report_failures(stage):
                     result = future.result()
                 with TemporaryDirectory() as scratch:
-                    results[stage.name] = self._put(stage, result, Path(scratch))
+                    results[stage.name] = self._write(stage, result, Path(scratch))
                 if tick:
-                    tick(done / len(under_way))
+                    tick(count / len(stage_of_future))
         return results
 
-    def _stored(self, stage: Stage) -> StageResult | None:
-        """The result from the files of a stage; None where they are not up to date."""
+    def _read_if_current(self, stage: Stage) -> StageResult | None:
+        """The result in the files of a stage; None where these are missing, changed or outdated."""
         if self.folder is None or self.fresh or stage.name not in self.folder.parts:
             return None
         part = self.folder.parts[stage.name]
@@ -181,7 +181,7 @@ class StageStore:
         return self._read(stage.name)
 
     def _read(self, name: str) -> StageResult:
-        """The result in the files of a stage."""
+        """The result in the files of a stage, NAME.json and perhaps NAME.nc."""
         assert self.folder is not None
         part = self.folder.parts[name]
         document = json.loads(self.folder.content(f"{name}.json"))["result"]
@@ -189,8 +189,8 @@ class StageStore:
         data = dataset_of(self.folder.content(f"{name}.nc")) if has_data else None
         return StageResult(document, data, tuple(part.files), part.fingerprint)
 
-    def _computed(self, stage: Stage) -> StageResult:
-        """The result as it is computed now, and put into its files."""
+    def _compute(self, stage: Stage) -> StageResult:
+        """Computes the result of a stage, and writes it into its files if there is a folder."""
         LOG.info("stage %s is computed", stage.name)
         if self.folder is None:
             with showing(self.shown) as tick:
@@ -198,18 +198,18 @@ class StageStore:
             return replace(result, document=json.loads(as_json(result.document)))
         self.folder.require_free(f"{stage.name}.json")
         self.folder.require_free(f"{stage.name}.nc")
-        samples = self._samples(self.folder) if stage.has_samples else None
-        with TemporaryDirectory() as scratch, self._parts(self.folder, stage) as parts:
-            with showing(self.shown) as tick, self._reported(stage):
+        samples = self._sample_store(self.folder) if stage.has_samples else None
+        with TemporaryDirectory() as scratch, self._proof_folder(self.folder, stage) as parts:
+            with showing(self.shown) as tick, self._report_failures(stage):
                 result = stage.run(Work(Path(scratch), samples, self.workers, tick, parts))
-            return self._put(stage, result, Path(scratch))
+            return self._write(stage, result, Path(scratch))
 
     @contextmanager
-    def _parts(self, folder: ResultsFolder, stage: Stage) -> Iterator[Path | None]:
-        """Folder of the parts of a proof, which stays where the stage does not end.
+    def _proof_folder(self, folder: ResultsFolder, stage: Stage) -> Iterator[Path | None]:
+        """Yields the folder of the parts of a stage's proof, which is removed if the stage ends.
 
-        It is named by the stage's key, so that no other code or case takes what is in it, and not
-        used where somebody has put a link in its place.
+        It is named by the stage's fingerprint, so that no other code or case takes what is in it.
+        None where somebody has put a link in its place.
         """
         path = folder.path / PARTS / stage.key[:32]
         if path.is_symlink() or path.parent.is_symlink():
@@ -226,28 +226,22 @@ class StageStore:
                 with suppress(OSError):  # it holds parts
                     folder_of_parts.rmdir()
 
-    def _samples(self, folder: ResultsFolder) -> Path:
-        """The store of samples, which the manifest lists before it is made.
+    def _sample_store(self, folder: ResultsFolder) -> Path:
+        """Path of the store of samples, which the manifest lists before it is made.
 
         Raises:
-            RefusedError: A store that is not listed would be used by a run that is fresh.
+            RefusedError: The run is fresh, and there is a store that no manifest lists.
         """
-        path, listed = folder.path / SAMPLES, SAMPLES in folder.parts
-        there = os.path.lexists(path)
-        cure = "move it away, or leave out --fresh"
-        require(
-            listed or not (there and self.fresh),
-            str(path),
-            value="listed in no manifest",
-            allowed="none",
-            cure=cure,
-        )
-        if rank() == 0 and not listed and not there:
+        path, is_listed = folder.path / SAMPLES, SAMPLES in folder.parts
+        exists = os.path.lexists(path)
+        fits, cure = is_listed or not (exists and self.fresh), "move it away, or leave out --fresh"
+        require(fits, str(path), value="listed in no manifest", allowed="none", cure=cure)
+        if rank() == 0 and not is_listed and not exists:
             folder.list_files(SAMPLES, "", {SAMPLES: "", f"{SAMPLES}-journal": ""})
         return path
 
-    def _put(self, stage: Stage, result: StageResult, scratch: Path) -> StageResult:
-        """Writes a result into the files of its stage; returns it as it is read from there."""
+    def _write(self, stage: Stage, result: StageResult, scratch: Path) -> StageResult:
+        """Writes a result and the files in `scratch` into the folder; returns it as read again."""
         assert self.folder is not None
         document = {**origin(self.case_text, stage.key), "result": result.document}
         if rank() != 0:
@@ -259,11 +253,11 @@ class StageStore:
         return self._read(stage.name)
 
     @contextmanager
-    def _reported(self, stage: Stage) -> Iterator[None]:
-        """Names the stage where a process dies, and writes the motion that contradicts a proof.
+    def _report_failures(self, stage: Stage) -> Iterator[None]:
+        """Adds the stage to errors in the block, and writes a motion that contradicts a proof.
 
         Raises:
-            FailedError: A process died.
+            FailedError: A worker process died.
             ContradictionError: A motion contradicts a proof.
         """
         try:

@@ -19,10 +19,10 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.questions.question import SuiteMotion
+from alphacut.questions.question import SuiteResponse
 from alphacut.records.recording import arias_shares
 from alphacut.records.spectrum import spectral_acceleration
-from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, by_output, peaks_of
+from alphacut.stages.envelope import PEAK_BOUNDS, EnvelopeTask, peaks_document, peaks_from_document
 from alphacut.stages.store import Stage, StageResult
 
 FREE_PERIODS = 5
@@ -84,49 +84,52 @@ def nominal_mode(structure: Structure) -> Nominal:
     return Nominal(2 * pi / float(omega[0]), float(ratios[0]))
 
 
-def suite(
+def suite_records(
     section: RecordsSection, envelope: EnvelopeSection, structure: Structure
 ) -> tuple[SuiteRecord, ...]:
     """The records of a suite, in the order of the case."""
     mode = nominal_mode(structure)
-    return tuple(_record(section, envelope, recording, mode) for recording in section.recordings)
+    return tuple(
+        _suite_record(section, envelope, recording, mode) for recording in section.recordings
+    )
 
 
-def _record(
+def _suite_record(
     section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: Nominal
 ) -> SuiteRecord:
-    """A recording corrected, trimmed and scaled, with the duration of the motion under it."""
+    """A recording after correction, trimming and scaling, and the length of the motion under it.
+
+    Args:
+        section: Correction, trim and scale.
+        envelope: Largest duration, and the step.
+        named: The recording.
+        mode: First mode, for Sa(T1) and the free motion after the record.
+    """
     ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
     measures = {
         "PGA": ground.extremes[0],
         "Sa(T1)": spectral_acceleration(ground, mode.period, min(mode.ratio, 0.999)),
         "scale": 1.0,
     }
-    wanted = section.scale
-    size = measures.get(wanted.measure, 1.0)
-    require(
-        size > 0,
-        f"record {named.name}",
-        value="zero throughout",
-        allowed="a record that moves something",
-    )
-    factor = wanted.value / size
+    measure = measures.get(section.scale.measure, 1.0)
+    key, allowed = f"record {named.name}", "a record that moves something"
+    require(measure > 0, key, value="zero throughout", allowed=allowed)
+    factor = section.scale.value / measure
     length = (len(ground.acceleration) - 1) * ground.step
-    duration = length + FREE_PERIODS * mode.period
-    duration = min(envelope.duration, duration)
+    duration = min(envelope.duration, length + FREE_PERIODS * mode.period)
     steps = max(1, ceil(duration / envelope.step - 1e-9))
     envelope.require_steps(f"envelope.duration of {named.name}", steps * envelope.step)
     shares = arias_shares(ground.acceleration, ground.step)
     end = min(int(duration / ground.step + 1e-9), len(shares) - 1)
-    scaled = Accelerogram(ground.step, factor * ground.acceleration)
-    sizes = {name: size * (factor if name != "scale" else 1.0) for name, size in measures.items()}
     cut_share = 0.0 if duration >= length else float(1 - shares[end])
     offset = float(ground.samples.mean()) / ground.extremes[0]
-    return SuiteRecord(named.name, scaled, steps * envelope.step, sizes, cut_share, offset)
+    scaled = Accelerogram(ground.step, factor * ground.acceleration)
+    measures |= {name: factor * measures[name] for name in ("PGA", "Sa(T1)")}
+    return SuiteRecord(named.name, scaled, steps * envelope.step, measures, cut_share, offset)
 
 
 def suite_warnings(records: Sequence[SuiteRecord]) -> Iterator[str]:
-    """Sentences on records that are not centred, or are cut."""
+    """Yields warnings on records with a large mean, and on those that outlast their motion."""
     for record in records:
         if abs(record.offset_share) > MAX_OFFSET:
             yield (
@@ -147,19 +150,16 @@ def with_record(structure: Structure, record: SuiteRecord) -> Structure:
 def stages(structure: Structure, task: EnvelopeTask, records: Sequence[SuiteRecord]) -> list[Stage]:
     """A stage for each record, the longest first."""
     longest = sorted(records, key=lambda record: -record.duration)
-    return [_stage(structure, task, record) for record in longest]
+    return [_record_stage(structure, task, record) for record in longest]
 
 
-def _stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stage:
-    moved = with_record(structure, record)
-    of_record = replace(task, name=record.name, duration=record.duration)
-    inputs = [moved.model, moved.numbers, of_record]
-    return Stage(
-        stage_name(record),
-        inputs,
-        ("fuzzy", "frame"),
-        partial(of_record.compute_peaks, moved, nodes=NODES),
-    )
+def _record_stage(structure: Structure, task: EnvelopeTask, record: SuiteRecord) -> Stage:
+    """The stage that computes the peaks of a structure under a record."""
+    loaded = with_record(structure, record)
+    record_task = replace(task, name=record.name, duration=record.duration)
+    inputs = [loaded.model, loaded.numbers, record_task]
+    compute = partial(record_task.compute_peaks, loaded, nodes=NODES)
+    return Stage(stage_name(record), inputs, ("fuzzy", "frame"), compute)
 
 
 def stage_name(record: SuiteRecord) -> str:
@@ -172,23 +172,23 @@ def peaks_by_record(
 ) -> dict[str, Peaks]:
     """Peaks under each record by its name."""
     return {
-        record.name: peaks_of(results[stage_name(record)].document["peak"], alpha)
+        record.name: peaks_from_document(results[stage_name(record)].document["peak"], alpha)
         for record in records
     }
 
 
-def motion(
+def suite_response(
     peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal
-) -> SuiteMotion:
+) -> SuiteResponse:
     """Motions under all records, to which questions are put."""
     measures = {record.name: record.measures for record in records}
-    return SuiteMotion(mode.period, mode.ratio, measures, peaks)
+    return SuiteResponse(mode.period, mode.ratio, measures, peaks)
 
 
 def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
-    """Peaks under whichever record is the worst for each structure.
+    """Bounds of the largest of a structure's peaks over all records.
 
-    The peak of a structure is the largest over the records, so that each end is.
+    The largest peak rises with the peak under each record, so that its bounds are the largest ones.
     """
     first = next(iter(peaks.values()))
     bounds = {
@@ -199,12 +199,16 @@ def worst_peaks(peaks: Mapping[str, Peaks]) -> Peaks:
 
 
 def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
-    """The peaks of any record, and beside them "mean q3", the mean over the records.
+    """The worst peaks, and beside them "mean q3" …, bounds of the mean over the records.
 
-    The mean of each structure lies between the means of the least and of the greatest peaks. That a
-    structure reaches the mean of greatest peaks is not known, as each record has its own worst one;
-    but one of a higher cut has at least the mean of its least peaks, and at most that of its
-    greatest.
+    The mean of each structure lies between the means of the least and of the greatest peaks. No
+    structure is known to reach the latter, as each record has its own worst one. But a structure of
+    any higher cut has at least the mean of that cut's least peaks, and at most that of its
+    greatest: these are reached.
+
+    Args:
+        worst: As of `worst_peaks`.
+        peaks: Peaks under each record by its name.
     """
     plain = [name for name in worst.outputs if name == output_of(name)]
     columns = {f"mean {name}": name for name in plain}
@@ -221,7 +225,7 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
 
 
 def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal) -> Document:
-    """Measures and peaks of each record, and mean, median and 84 % of each output's peaks."""
+    """Numbers on a suite: measures and peaks of each record, statistics of peaks, and spectra."""
     first = next(iter(peaks.values()))
     outputs = {
         name: {
@@ -239,7 +243,7 @@ def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: N
                 "duration_s": record.duration,
                 "cut_share": record.cut_share,
                 "measures": dict(record.measures),
-                "peak": by_output(peaks[record.name]),
+                "peak": peaks_document(peaks[record.name]),
             }
             for record in records
         },

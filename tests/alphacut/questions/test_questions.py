@@ -17,7 +17,7 @@ from alphacut.fuzzy.result import Nature
 from alphacut.questions.all import QUESTIONS
 from alphacut.questions.decision import DecisionQuestion
 from alphacut.questions.probability import shaped_like
-from alphacut.stages.envelope import wide_peaks
+from alphacut.stages.envelope import loose_peaks
 
 ROOT = Path(__file__).parents[3]
 
@@ -40,8 +40,8 @@ def test_peaks_are_wide_where_the_gap_is_or_nothing_is_proved():
         least_reached=cuts,
         natures=(Nature.GUARANTEED, Nature.GUARANTEED, Nature.ESTIMATED),
     )
-    assert wide_peaks(bounds, ("q1", "q2", "q3", "max q1"), 0.05) == ("q2", "q3", "max q1")
-    assert wide_peaks(bounds, ("q1", "q2"), 0.1) == ()
+    assert loose_peaks(bounds, ("q1", "q2", "q3", "max q1"), 0.05) == ("q2", "q3", "max q1")
+    assert loose_peaks(bounds, ("q1", "q2"), 0.1) == ()
 
 
 def test_decision_and_probability_agree(summary):

@@ -15,7 +15,7 @@ from alphacut.report.page import render_page
 from alphacut.report.results import (
     answers,
     drivers,
-    motion,
+    peak_table,
 )
 from alphacut.report.tables import run_text, write_tables
 from alphacut.stages.store import put_text
@@ -92,7 +92,7 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
         "base_shear": ([1e4, 1e4, 2e4], [4e4, 3e4, 2e4]),
     }
     limits = {"drift1": {"limit": 0.02, "verdict": "not exceeded"}}
-    head, rows = motion({**peaks_of(**ends), "decision": {"limits": limits}})
+    head, rows = peak_table({**peaks_of(**ends), "decision": {"limits": limits}})
     assert head == ("peak of", "nominal", "α = 0.5", "α = 0", "± error", "limit", "exceeded")
     assert rows[0][:5] == ("drift1, mm", "11.00", "10.5 … 11.5", "10.37 … 12.01", "0.2")
     assert rows[0][5:] == ("20", "no")
@@ -104,7 +104,7 @@ def test_peaks_are_stated_in_the_units_that_engineers_compare():
 def test_a_proved_peak_stands_beside_the_reached_one_and_their_gap():
     case = peaks_of(q1=([0.001, 0.0015, 0.002], [0.004, 0.003, 0.002]))
     case["envelopes"]["all"]["peak"]["q1"] |= {"nature": "guaranteed", "reached": [0.0039, 0, 0]}
-    head, rows = motion(case)
+    head, rows = peak_table(case)
     assert head[-2:] == ("reached", "gap")
     assert rows[0][-2:] == ("3.9", "2.5%")
 
@@ -129,7 +129,7 @@ def test_a_printed_bound_is_no_narrower_than_it_was_and_an_attained_one_no_wider
 
 def test_the_first_tables_have_a_row_for_every_result(results):
     summary = summary_of(results)
-    assert [row[0] for row in motion(summary)[1]] == ["q2, m", "drift1, m", "  % of storey"]
+    assert [row[0] for row in peak_table(summary)[1]] == ["q2, m", "drift1, m", "  % of storey"]
     shares = summary["shares"]["the peak of q2"]
     assert set(shares) == {"E", "m1"}
     assert 0.5 < sum(shares.values()) < 1.5

@@ -159,7 +159,7 @@ def test_a_modulus_is_handed_to_the_structure(tmp_path):
     )
     content = load(written(tmp_path, text)).content
     results = Pipeline(Results(content), store_in(tmp_path / "out")).run()
-    number = modulus.number_of(results.modulus.arrays)
+    number = modulus.fuzzy_modulus(results.modulus.arrays)
     assert results.structure.numbers["E"] == number
     assert results.document()["envelopes"]["all"]["fuzzy"] == ["E", "m"]
 
@@ -231,7 +231,7 @@ def test_peaks_pass_through_a_document_with_their_infinite_bounds():
         least_reached=np.array([[1.5, np.inf]]),
         natures=(Nature.GUARANTEED, Nature.ATTAINED),
     )
-    document = json.loads(as_json(envelope.by_output(peaks)))
-    again = envelope.peaks_of(document, [0.0])
+    document = json.loads(as_json(envelope.peaks_document(peaks)))
+    again = envelope.peaks_from_document(document, [0.0])
     for name in ("lower", "upper", "error", "reached", "least_proved", "least_reached"):
         assert getattr(again, name).tolist() == getattr(peaks, name).tolist(), name

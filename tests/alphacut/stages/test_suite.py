@@ -9,7 +9,7 @@ from alphacut.case.load import load
 from alphacut.entry import main
 from alphacut.io.problem import BadInput
 from alphacut.records.spectrum import spectral_acceleration
-from alphacut.stages.suite import nominal_mode, suite
+from alphacut.stages.suite import nominal_mode, suite_records
 
 CASE = """
 title = "One storey under two records"
@@ -44,7 +44,7 @@ def written(folder, text=CASE):
 
 def records_of(folder, old="", new=""):
     content = load(written(folder, CASE.replace(old, new))).content
-    return suite(content.records, content.envelope, content.structure), content.structure
+    return suite_records(content.records, content.envelope, content.structure), content.structure
 
 
 @pytest.mark.parametrize(
