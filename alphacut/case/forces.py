@@ -67,13 +67,9 @@ def _parse_history(value: object, info: ValidationInfo) -> ForceHistory:
 
 
 def _file_history(name: str, start: float, is_static: bool, info: ValidationInfo) -> ForceHistory:
-    """Time history in a file of the case; samples with a unit are scaled to a magnitude of 1.
+    """Time history in a file, from `start` in s on; samples with a unit are scaled to at most 1.
 
-    Args:
-        name: Name of the file in the case.
-        start: Time at which the file's history begins, in s.
-        is_static: Whether the first value has acted for ever, so that the structure starts at rest.
-        info: Context of the validation, with the folder of the case.
+    `is_static`: the first value has acted for ever, so that the structure starts at rest.
     """
     try:
         path = case_file(name, info)
@@ -181,13 +177,9 @@ NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
 def _with_forces_on_unknowns(
     model: MatrixStructure, forces: NodalForces, names: Sequence[str], unknowns: Sequence[str]
 ) -> MatrixStructure:
-    """The structure with forces on its degrees of freedom.
+    """The structure with forces on its degrees of freedom `unknowns`, whose amplitudes are `names`.
 
-    Args:
-        model: The structure from matrices.
-        forces: Degree of freedom, fuzzy amplitude and time history of each force.
-        names: Parameter that the amplitude of each force is, as F1.
-        unknowns: Names of all degrees of freedom, in the order of the matrices.
+    The amplitudes become parameters of the structure, at their modal values.
     """
     loads: list[Force] = []
     modal: dict[str, float] = {}

@@ -30,10 +30,9 @@ def sections() -> dict[str, SectionModels]:
 
 
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
-    """Walks all keys and sections below a section's class, depth first.
+    """Yields the full name, Pydantic's field and, of a section, classes of each key below a class.
 
-    Yields:
-        Full name; field of Pydantic; classes if it is a section, else an empty list.
+    A key that is no section has an empty list of classes.
     """
     for key, info in model.model_fields.items():
         name, parts = f"{prefix}{key}", [info.annotation, *_parts(info.annotation)]

@@ -46,10 +46,6 @@ class Limit:
     def value_in_si(self, structure: Structure, key: str) -> float:
         """The limit in the SI unit of its output; a fraction is of the storey's least height.
 
-        Args:
-            structure: The structure, with the heights of its storeys.
-            key: Key of the case, for messages.
-
         Raises:
             RefusedError: The limit is a fraction, and the structure has no height of the storey.
         """

@@ -76,11 +76,7 @@ def load(path: Path | str, changes: Sequence[str] = ()) -> Case:
 
 
 def _parse_toml(path: Path, text: str) -> dict[str, object]:
-    """The top table of a TOML text.
-
-    Raises:
-        BadInput: The text is not TOML; the problem names the file and the line.
-    """
+    """The top table of a TOML text; an error of syntax is raised with the file and the line."""
     try:
         return tomllib.loads(text.replace("\r\n", "\n"))
     except (RecursionError, ValueError) as error:
@@ -129,12 +125,7 @@ def _suggested_key(key: str) -> str:
 
 
 def _problem(key: str, detail: ErrorDetails) -> InputProblem:
-    """The problem of a key whose value is wrong or missing, with the values allowed.
-
-    Args:
-        key: Full name of the key.
-        detail: The error as Pydantic reports it.
-    """
+    """The problem of a key whose value is wrong or missing, from the error of Pydantic."""
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, RefusedError):
         return replace(InputProblem.from_error(cause), key=cause.key or key)

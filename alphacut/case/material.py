@@ -83,10 +83,8 @@ class RadiusMapSection(ThetaSection):
 
     @model_validator(mode="after")
     def _check_range(self) -> Self:
-        """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ.
-
-        The corners of the supports suffice, as the map is linear in a1 … a4.
-        """
+        """Refuses supports of a1 … a4 for which the radius leaves (0, 1) at some θ."""
+        # corners of the supports suffice, as the map is linear in a1 … a4
         for corner in itertools.product(*({*x.support} for x in self.numbers.values())):
             values = dict(zip(self.numbers, corner, strict=True))
             try:
@@ -232,13 +230,10 @@ class RoundCell(Section):
 
     @model_validator(mode="after")
     def _check_interphase(self) -> Self:
-        """Refuses an interphase with a key missing, around non-circular particles or with losses.
-
-        Without all three keys there is no interphase.
-        """
+        """Refuses an interphase with a key missing, around spheres or ellipses, or with losses."""
         names = [f"interphase_{name}" for name in ("thickness", "modulus", "poisson")]
         missing = [name for name in names if getattr(self, name) is None]
-        if len(missing) == len(names):
+        if len(missing) == len(names):  # there is no interphase
             return self
         allowed = f"all of {', '.join(names)}"
         require(not missing, f"cell.{(missing or names)[0]}", value=None, allowed=allowed)
@@ -268,16 +263,10 @@ class RoundCell(Section):
 def _require_bulk_loss(
     key: str, loss: FuzzyNumber, bulk: FuzzyNumber, ratio: FuzzyNumber | None
 ) -> None:
-    """Refuses a loss factor of the bulk modulus K with which the shear modulus G gained energy.
+    """Refuses a loss factor `bulk` of the bulk modulus K for which that of G would be negative.
 
-    By 1/E = 1/(9K) + 1/(3G), η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, so that η_G >= 0 needs
-    η_K <= 3 η_E/(1 − 2ν).
-
-    Args:
-        key: Key of the case, for messages.
-        loss: Loss factor η_E of Young's modulus.
-        bulk: Loss factor η_K.
-        ratio: Poisson's ratio ν; None beside a stiffness.
+    With `loss` η_E, `bulk` η_K and `ratio` ν: η_E = (1 − 2ν)/3 η_K + 2(1 + ν)/3 η_G, by
+    1/E = 1/(9K) + 1/(3G), so that η_G >= 0 needs η_K <= 3 η_E/(1 − 2ν).
     """
     if ratio is None:
         raise RefusedError(key, "there", "none beside a stiffness")

@@ -156,16 +156,10 @@ class MatricesSection(Section):
     def _material_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Damping ratios by the material whose Young's modulus is parameter E.
+        """Damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
 
-        Args:
-            damping: Damping by the material.
-            model: The structure at modal values.
-            loss: Loss factor of E.
-
-        Returns:
-            "zeta" of all modes where every term of the stiffness has the factor E, else "zeta1",
-            "zeta2" … of each mode, by the share of its strain energy in the terms with E.
+        They are of each mode where some terms of the stiffness are without E, whose loss factor is
+        `loss`: by the share of the mode's strain energy in the terms with E.
         """
         has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
         allowed = "a term of the stiffness with E"

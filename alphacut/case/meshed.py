@@ -48,16 +48,13 @@ class MeshedCell(Section):
 
     @property
     def constants(self) -> dict[str, FuzzyNumber]:
-        """Young's moduli by input, as steel_modulus; {"scale": 1} where all phases are anisotropic.
-
-        A campaign needs one input at least.
-        """
+        """Young's moduli by input, as steel_modulus; "scale" = 1 where no phase is isotropic."""
         moduli = {
             f"{name}_modulus": phase.modulus
             for name, phase in self.phases.items()
             if isinstance(phase.modulus, FuzzyNumber)
         }
-        return moduli or {"scale": Crisp(1.0)}
+        return moduli or {"scale": Crisp(1.0)}  # a campaign needs an input
 
     @property
     def losses(self) -> tuple[tuple[FuzzyNumber, FuzzyNumber | None], ...]:

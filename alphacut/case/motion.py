@@ -58,9 +58,8 @@ def _parse_tolerance(value: object, info: ValidationInfo) -> Tolerance:
             continue
         if 0 < number < (1 if unit == "" else float("inf")):
             return Tolerance(number, unit)
-    raise RefusedError(
-        "", value, 'a length, a force or a fraction of each peak, as "0.2 mm", "0.05 N", "0.1 %"'
-    )
+    allowed = 'a length, a force or a fraction of each peak, as "0.2 mm", "0.05 N", "0.1 %"'
+    raise RefusedError("", value, allowed)
 
 
 def _file_name(value: str) -> str:

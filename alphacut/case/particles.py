@@ -46,13 +46,10 @@ class PackingSection(Section):
         else:
             radii = MeasuredRadii.read(self.file)
         shape = SPHERES if spheres else DISCS
-        require(
-            self.fraction <= shape.densest,
-            "microstructure.packing.fraction",
-            value=self.fraction,
-            allowed=f"shares up to {shape.densest:g} of {shape.particles} packed at random",
-            cure=f"set cell.fraction = {self.fraction:g} in place of [microstructure]",
-        )
+        fits, key = self.fraction <= shape.densest, "microstructure.packing.fraction"
+        allowed = f"shares up to {shape.densest:g} of {shape.particles} packed at random"
+        cure = f"set cell.fraction = {self.fraction:g} in place of [microstructure]"
+        require(fits, key, value=self.fraction, allowed=allowed, cure=cure)
         packing = Packing(self.particles, self.fraction, radii, shape=shape)
         return Simulated(packing, self.packings)
 

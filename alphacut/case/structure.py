@@ -137,10 +137,6 @@ class Structure:
     def members(self, name: str, key: str = "envelope.fuzzy") -> tuple[str, ...]:
         """Fuzzy parameters that a name stands for: "m" for all masses of a frame, "m1" for itself.
 
-        Args:
-            name: Name of a parameter, or of a group of a frame's parameters.
-            key: Key of the case, for messages.
-
         Raises:
             RefusedError: The name stands for no parameter, or for crisp ones alone.
         """
@@ -173,11 +169,7 @@ class Structure:
     def model_with_outputs(
         self, key: str, outputs: tuple[str, ...]
     ) -> StoreyFrame | MatrixStructure | LagrangianSystem:
-        """The model, which observes these outputs alone if it is linear.
-
-        Args:
-            key: Key of the case, for messages.
-            outputs: Names of the outputs.
+        """The model, which observes these outputs alone if it is linear; `key` is for messages.
 
         Raises:
             RefusedError: It has no such output.
@@ -213,9 +205,7 @@ def ratios_of(
 ) -> dict[str, FuzzyNumber]:
     """Damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
 
-    Args:
-        ratio: One of all modes, one of each, by the material, or none.
-        loss: Loss factor of the material; None: a stand-in.
+    `loss` is the loss factor of the material, for damping by it; None: a stand-in.
     """
     if ratio is None:
         return {}

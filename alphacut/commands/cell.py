@@ -59,9 +59,8 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     document = {**cell.document(result), "references": references}
     if options.cross_check:
         method, methods = options.cross_check, {*phases.methods} - {"auto", result.method}
-        require(
-            method in methods, "--cross-check", value=method, allowed=", ".join(sorted(methods))
-        )
+        allowed = ", ".join(sorted(methods))
+        require(method in methods, "--cross-check", value=method, allowed=allowed)
         modulus = content.modulus.model_copy(update={"method": method})
         second = cell.solve(radius, phases, cell.model_of(phases, content.mesh, modulus))
         document["difference"] = difference(result, second, content.modulus.tolerance or 1e-4)
@@ -114,8 +113,8 @@ def summary(result: HomogenisedStiffness, document: Document) -> str:
         values = (errors["E_GPa"], errors["nu"], *errors["stress_GPa"].values())
         error_texts = [f"{value:.1e}" for value in values]
     names = ("E, GPa", "ν", "mean σ11, GPa", "mean σ12, GPa")
-    value_texts = (f"{document['E_GPa']:#.8g}", f"{document['nu']:.6f}")
-    value_texts += (f"{stress['s11']:#.9g}", f"{stress['s12']:#.9g}")
+    value_texts = [f"{document['E_GPa']:#.8g}", f"{document['nu']:.6f}"]
+    value_texts += [f"{stress['s11']:#.9g}", f"{stress['s12']:#.9g}"]
     rows = [*zip(names, value_texts, error_texts, strict=True)]
     for key, number in document["fibres"].items():
         rows.append((fibre_label(key), *_value_and_error(number)))

@@ -53,10 +53,9 @@ class Parser(argparse.ArgumentParser):
 
 
 def split_petsc(arguments: Sequence[str]) -> tuple[list[str], dict[str, str]]:
-    """Separates the options of PETSc, as ``-rve_ksp_rtol 1e-10`` or ``-log_view``, from all others.
+    """Words of the program's own, and values of PETSc's options by their names without ``-rve_``.
 
-    Returns:
-        The words that are not PETSc's; values of its options by their names without ``-rve_``.
+    PETSc's are as ``-rve_ksp_rtol 1e-10`` or ``-log_view``.
     """
     words: list[str] = []
     petsc: dict[str, str] = {}
@@ -142,9 +141,8 @@ def open_results(
         BadInput: The case has problems.
         RefusedError: There are fewer than one worker, or the folder is not this program's.
     """
-    require(
-        options.workers >= 1, "--workers", value=options.workers, allowed="a whole number 1 or more"
-    )
+    allowed = "a whole number 1 or more"
+    require(options.workers >= 1, "--workers", value=options.workers, allowed=allowed)
     case, path = read_case(options), options.out or folder
     fresh = getattr(options, "fresh", False)
     store = StageStore(None, case.text, fresh, options.quiet, options.workers)

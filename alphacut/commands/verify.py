@@ -35,10 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def verify(options: argparse.Namespace, out: TextIO) -> int:
-    """Tests all proved envelopes in a folder by exact motions, and writes motions at their peaks.
-
-    Envelopes that are not proved are listed as such. Returns exit status 0.
-    """
+    """Tests all proved envelopes in a folder by exact motions; returns exit status 0."""
     path = Path(options.folder)
     folder = ResultsFolder.opened(path)
     document: Document = {}

@@ -99,10 +99,7 @@ def draw_mesh(cell: Cell, mesh: Mesh, path: Path) -> bool:
 
 
 def draw_wedges(file: str, picture: str) -> None:
-    """Draws the phases of a mesh file with their edges to a PNG file, the matrix cut open in front.
-
-    Through the cut the cone of the particle shows.
-    """
+    """Draws the phases of a mesh file with their edges to a PNG file, the matrix cut open."""
     import pyvista
 
     grid = pyvista.read(file)

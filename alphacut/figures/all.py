@@ -139,10 +139,7 @@ def file_stem(name: str, results: Results) -> str:
 def _submit_mesh(
     results: Results, folder: Path, executor: Executor | None
 ) -> dict[str, Future[bool]]:
-    """Submits the drawing of the mesh (Fig. 15), if it has prisms; its future by the file's name.
-
-    The future is true if the picture was drawn.
-    """
+    """Future of drawing the mesh (Fig. 15) by its file: true if drawn; empty without prisms."""
     prisms = results.content.round is not None and results.content.modulus.method == "prism"
     if results.modulus is None or not prisms:
         return {}

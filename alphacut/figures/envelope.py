@@ -55,10 +55,7 @@ def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Fig
 
 
 def draw_error_band(axes: Axes, time: Array, lowest: xarray.Dataset, nature: str, unit: str) -> str:
-    """Draws the declared error around the band of the lowest level; returns it as a text.
-
-    Guaranteed bounds contain their error: nothing is drawn, and the text is empty.
-    """
+    """Draws the declared error around a band; returns it as text, empty for guaranteed bounds."""
     if "error" not in lowest or nature == "guaranteed":
         return ""
     error = lowest["error"]
@@ -75,13 +72,7 @@ def time_axes(axes: Axes, time: Array, output: Output) -> None:
 
 
 def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figure:
-    """Fig. 20: motions of random inputs inside the lowest cut, and the envelope around them.
-
-    Args:
-        results: Results of the run; the first study with two fuzzy inputs is shown.
-        count: Number of motions.
-        duration: Largest time shown, in s.
-    """
+    """Fig. 20: `count` motions of random inputs in the lowest cut, and the envelope around them."""
     task = next((x for x in results.tasks if len(x.fuzzy) > 1), results.tasks[0])
     dataset, structure = results.envelopes[task.name].arrays.isel(alpha=0), results.structure
     assert structure is not None

@@ -77,10 +77,7 @@ def draw_density(axes: Axes, cell: Cell, levels: Array) -> None:
 def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
     """Product domain: faces of prisms on the front sides of the cell, and on the particle's cone.
 
-    Args:
-        axes: Axes in three dimensions.
-        grid: Mesh of prisms.
-        levels: Positions (x1, x2, θ) of the plane nodes at each level of θ, (levels, nodes, 3).
+    `levels` are positions (x1, x2, θ) of the nodes at each level of θ, (levels, nodes, 3).
     """
     from matplotlib.colors import to_rgb
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
@@ -118,10 +115,7 @@ def boundary_edges(grid: PrismGrid) -> Rows:
 def layer_faces(levels: Array, edges: Rows, nodes: Mask) -> Array:
     """Side faces of the prisms over the edges between chosen nodes, shape (n, 4, 3).
 
-    Args:
-        levels: Positions of the plane nodes at each level of θ, shape (levels, nodes, 3).
-        edges: Nodes of each plane edge, shape (edges, 2).
-        nodes: True for a node that is chosen, shape (nodes,).
+    `levels` are positions of the nodes at each θ, (levels, nodes, 3); edges have shape (edges, 2).
     """
     first, second = edges[nodes[edges].all(axis=1)].T
     below, above = levels[:-1], levels[1:]
@@ -153,10 +147,7 @@ def stages(results: Results) -> Figure:
 
 
 def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], list[str]]:
-    """Title and lines of the box of each stage of a run, and a text for the arrow after each box.
-
-    The last box has no arrow.
-    """
+    """Title and lines of each box, one a stage of the run; text of each arrow between boxes."""
     content = results.content
     boxes: list[tuple[str, list[str]]] = []
     arrows: list[str] = []

@@ -76,13 +76,9 @@ def title(axes: Axes, text: str) -> None:
 
 
 def prefix_axis(axes: Axes, label: str, si: str, *, across: bool = False) -> None:
-    """Labels an axis, and scales its tick labels to a prefixed unit such as mm; data stay in SI.
+    """Labels the vertical axis, or the horizontal one if `across`, in a unit with a prefix.
 
-    Args:
-        axes: Axes whose limits are set.
-        label: Name of the quantity.
-        si: Its SI unit.
-        across: Whether the axis is the horizontal one; else the vertical one.
+    The data stay in SI: the labels of ticks are scaled.
     """
     limits = axes.get_xlim() if across else axes.get_ylim()
     factor, unit = axis_prefix(max(map(abs, limits)), si)

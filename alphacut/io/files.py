@@ -132,13 +132,7 @@ def check_destinations(parser: argparse.ArgumentParser, options: argparse.Namesp
 
 
 def require_writable(option: str, value: str, *, folder: bool) -> None:
-    """Refuses a file or folder that an option names where nothing can be written.
-
-    Args:
-        option: The option, for messages.
-        value: Path of the file or folder, which need not exist.
-        folder: Whether it is a folder.
-    """
+    """Refuses the path of a file or folder, given by an option, where nothing can be written."""
     path, kind, reason = Path(value), "a folder" if folder else "a file", ""
     fits = bool(value.strip()) and (not path.exists() or path.is_dir() == folder)
     existing = path if folder else path.parent
@@ -154,11 +148,7 @@ def require_writable(option: str, value: str, *, folder: bool) -> None:
 
 @contextmanager
 def locked(option: str, folder: Path) -> Iterator[None]:
-    """Locks a folder during the block against other runs, if the file system can lock.
-
-    Args:
-        option: Option that names the folder, for messages.
-        folder: The folder; made if it does not exist.
+    """Makes a folder, and locks it during the block against other runs, if the file system can.
 
     Raises:
         RefusedError: Another run is writing into it.

@@ -104,13 +104,10 @@ class ResultsFolder:
         Raises:
             RefusedError: The file is not listed, missing, changed, or a link.
         """
-        files = {
-            name: digest for part in self.parts.values() for name, digest in part.files.items()
-        }
+        files = {x: digest for part in self.parts.values() for x, digest in part.files.items()}
         if name not in files:
-            raise RefusedError(
-                str(self.path), f"without {name} in its manifest", COMPLETE, RUN_AGAIN
-            )
+            what = f"without {name} in its manifest"
+            raise RefusedError(str(self.path), what, COMPLETE, RUN_AGAIN)
         return self._read_checked(name, files[name])
 
     def _read_checked(self, name: str, digest: str) -> bytes:

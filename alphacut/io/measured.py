@@ -79,14 +79,7 @@ def _columns(path: Path, head: list[str]) -> dict[str, int]:
 
 
 def _mode(path: Path, mode: int, values: Array, columns: dict[str, int]) -> ModeRows:
-    """The measurements of one mode.
-
-    Args:
-        path: The file, for messages.
-        mode: Number of the mode.
-        values: Its rows, shape (rows, columns); NaN where nothing was measured.
-        columns: Index of each column by its name.
-    """
+    """The measurements of one mode from its rows, (rows, columns), NaN where none was made."""
     floors = {int(name[1:]): k for name, k in columns.items() if name.startswith("q")}
     amplitudes = {floor: values[:, column] for floor, column in floors.items()}
     missing = {floor: np.isnan(x) for floor, x in amplitudes.items()}

@@ -78,10 +78,7 @@ def file_digest(path: Path) -> str:
 
 
 def _canonical(value: object) -> object:
-    """What stands for an object in the JSON text of a fingerprint: its type and values, or a name.
-
-    It must be the same in every process: no addresses, no whole paths.
-    """
+    """What stands for an object in the text of a fingerprint, and is the same in every process."""
     if isinstance(value, BaseModel):
         return [type(value).__name__, {x: getattr(value, x) for x in type(value).model_fields}]
     if is_dataclass(value) and not isinstance(value, type):

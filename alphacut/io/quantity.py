@@ -109,19 +109,14 @@ def parse_number(text: str, si: str) -> Decimal:
 
 
 def interval_of_spread(match: re.Match[str], si: str) -> tuple[Decimal, Decimal]:
-    """Both ends of "20 t ± 5 %" or "20 t ± 1 t", in `si`.
-
-    Args:
-        match: Match of `SPREAD`: middle, its unit, half-width, its unit.
-        si: SI unit; empty for a number without a unit.
-    """
-    middle = parse_number(f"{match[1]} {match[2]}", si)
-    # "2 % ± 1 %" is 1 % to 3 %: there the half-width is no share of the middle
-    is_share = match[4].strip() == "%" and (si or match[2].strip() != "%")
-    if is_share:
-        half_width = abs(middle) * decimal(match[3]) / 100
+    """Both ends of "20 t ± 5 %" or "20 t ± 1 t", which matched `SPREAD`, in the SI unit `si`."""
+    number, unit, spread, spread_unit = (text.strip() for text in match.groups())
+    middle = parse_number(f"{number} {unit}", si)
+    # "2 % ± 1 %" is 1 % to 3 %: there the spread is no share of the middle
+    if spread_unit == "%" and (si or unit != "%"):
+        half_width = abs(middle) * decimal(spread) / 100
     else:
-        half_width = parse_number(f"{match[3]} {match[4]}", si)
+        half_width = parse_number(f"{spread} {spread_unit}", si)
     return middle - half_width, middle + half_width
 
 
@@ -219,14 +214,11 @@ def _exponent(largest: float) -> int:
 
 
 def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
-    """Texts of both ends of a range, rounded outwards or inwards as its nature demands.
-
-    Digits are added where ends rounded inwards would cross.
-    """
+    """Texts of both ends of a range, rounded outwards or inwards as its nature demands."""
     is_crisp = high - low <= 1e-9 * abs(high)
     lower = low if is_crisp else rounded(low, "lower", nature, digits)
     upper = low if is_crisp else rounded(high, "upper", nature, digits)
-    if lower > upper:
+    if lower > upper:  # rounded inwards past each other
         return ends(low, high, nature, digits + 1)
     low_text, high_text = (f"{end:#.{digits}g}".rstrip(".") for end in (lower, upper))
     return low_text.replace("-", MINUS), high_text.replace("-", MINUS)

@@ -21,13 +21,9 @@ from alphacut.questions.question import (
 
 
 def _limit_document(name: str, answer: Passing, limit: float, peaks: Peaks) -> Document:
-    """Numbers on one limit: degrees, margins, verdict, and the peak on each level.
+    """Numbers on a limit in SI: degrees, margins, verdict, and its peak on each level.
 
-    Args:
-        name: Name of the limit, or `ANY`, which has no peak.
-        answer: Possibility and necessity that the limit is exceeded, and its margins.
-        limit: The limit, in SI.
-        peaks: Peaks by the names of the limits.
+    The event that any limit is exceeded has no peak.
     """
     peak = {} if name == ANY else peak_document(peaks, name) | {"proved": peaks.most(name).upper}
     return {

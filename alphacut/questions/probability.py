@@ -18,11 +18,7 @@ from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row,
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
-    """A function of a generator and a count that draws values with the membership as density.
-
-    Args:
-        number: The fuzzy number, whose membership function is scaled to an integral of 1.
-    """
+    """A function that draws random values with a density proportional to the membership."""
     grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
     membership = number.membership(grid)
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2

@@ -24,13 +24,10 @@ PEAK_ERROR = 5e-3
 
 
 def limit_words(peak: str, limit: float, unit: str) -> str:
-    """Text of a limit, such as "|drift1| ≤ 40.00 mm"; `peak` alone without a unit ("any of them").
-
-    The limit of "min q3" is given with the opposite sign, as that of −q3.
-    """
+    """Text of a limit, as "|drift1| ≤ 40.00 mm"; without a unit `peak` alone, as "any of them"."""
     if not unit:
         return peak
-    if peak.startswith("min "):
+    if peak.startswith("min "):  # whose limit is that of −q
         return f"{peak} ≥ {engineering(-limit, unit)}"
     if peak.startswith("max "):
         return f"{peak} ≤ {engineering(limit, unit)}"

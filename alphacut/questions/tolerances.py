@@ -25,14 +25,8 @@ from alphacut.questions.question import (
 
 
 def _row(name: str, support: Document, document: Document) -> Row:
-    """Row of an input: its support with no limit exceeded, the nature, and the relative support.
-
-    Args:
-        name: Name of the input.
-        support: Entry of the input in the answer.
-        document: The answer; its "kept" is None where limits are exceeded at any scale.
-    """
-    if document["kept"] is None:
+    """Row of an input: its support with no limit exceeded, the nature, and the relative support."""
+    if document["kept"] is None:  # a limit is exceeded at any scale
         return f"tolerance of {name}", "–", document["nature"], ""
     ends, modal = support["kept"], support["modal"]
     relative = f"about {modal:g}"
@@ -55,11 +49,7 @@ class TolerancesQuestion(Question):
     head = ("quantity", "no limit exceeded", "nature", "limit exceeded, or relative")
 
     def require_answerable(self, response: FuzzyResponse) -> None:
-        """Refuses limits that do not fit, and a largest scale at which an input is inadmissible.
-
-        Raises:
-            RefusedError: As of `Question.require_answerable`, or a mass is negative, for example.
-        """
+        """Refuses limits that do not fit, and a largest scale at which an input is inadmissible."""
         super().require_answerable(response)
         largest = self.section.most
         try:
@@ -67,13 +57,13 @@ class TolerancesQuestion(Question):
             require_admissible(response.structure.model, widest)
         except RefusedError as error:
             value = f"{largest:g} times the supports: {error.key} is {error.value}"
-            raise RefusedError("tolerances.most", value, error.allowed, "a smaller scale") from None
+            key, cure = "tolerances.most", "a smaller scale"
+            raise RefusedError(key, value, error.allowed, cure) from None
 
     def answer(self, response: FuzzyResponse) -> Document:
-        """Largest scale of all supports at which no limit is exceeded, and the supports there.
+        """Largest scale of all supports with no limit exceeded, and the supports there ("kept").
 
-        "kept" is that scale, or None; "passed" the least scale known to exceed a limit, or None;
-        "supports" holds each input's modal value and its support in the case and at that scale.
+        "passed" is the least scale known to exceed a limit; "own" is a support in the case.
         """
         assert response.peaks is not None
         limits = self.section.in_si(response.structure)

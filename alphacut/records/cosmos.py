@@ -82,14 +82,7 @@ def _read_channel(file: TextFile, channel: _Channel) -> Recording:
 
 
 def _step(file: TextFile, channel: _Channel, count: int, duration: float) -> float:
-    """Step between samples in s: entry 34 of the real header, which has s or ms.
-
-    Args:
-        file: The file.
-        channel: The channel.
-        count: Number of its samples.
-        duration: Their duration in s as the file states it, by which the unit of the step is known.
-    """
+    """Step in s, from entry 34 of the real header in s or ms: whichever fits the duration in s."""
     match = REALS.fullmatch(file.lines[channel.reals]) if channel.reals >= 0 else None
     allowed = "a real header whose entry 34 is the step, and agrees with the duration"
     if match is None:

@@ -44,11 +44,7 @@ def table_rows(file: TextFile) -> list[tuple[int, list[str]]]:
 
 
 def _parse_head(file: TextFile, head: list[str]) -> tuple[float, str, float]:
-    """Units in a head such as ``time [s],acceleration [g]``.
-
-    Returns:
-        Factor of times to s; unit of acceleration as it is written; its factor to m/s².
-    """
+    """Factor of times to s; unit of acceleration as the head states it; its factor to m/s²."""
     matches = [HEAD.fullmatch(cell.strip()) for cell in head]
     if len(matches) == 2 and matches[0] and matches[0][2] and matches[1] and matches[1][4]:
         time_unit, unit = matches[0][2], matches[1][4]
@@ -78,16 +74,7 @@ def _number(file: TextFile, row: int, cells: Sequence[str], column: int) -> floa
 
 
 def even_step(file: TextFile, time: Array, lines: list[int]) -> float:
-    """The step in s of times that rise evenly from 0, to within `UNEVEN`.
-
-    Args:
-        file: The file, for messages.
-        time: Times in s, shape (n,).
-        lines: Line of each time in the file, from 0.
-
-    Raises:
-        RefusedError: Times are not even.
-    """
+    """The step of times in s, which must rise evenly from 0; `lines` are theirs in the file."""
     even = np.linspace(0, time[-1], len(time))
     deviation = np.abs(time - even)
     worst = int(deviation.argmax())

@@ -42,10 +42,7 @@ def read_knet(file: TextFile) -> Recording:
 
 
 def _field(file: TextFile, name: str, end: int) -> tuple[re.Match[str], int]:
-    """Match of the value that a line of the head gives a name of `NAMES`, and that line from 0.
-
-    The head has `end` lines.
-    """
+    """Match of the value of a name in the head, which has `end` lines, and its line from 0."""
     for row, line in enumerate(file.lines[:end]):
         if line.startswith(name):
             match = NAMES[name].fullmatch(line[min(LABEL, len(line)) :])

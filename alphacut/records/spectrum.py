@@ -56,10 +56,7 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
 
 
 def _substep_accelerations(ground: Accelerogram, substeps: int, n_free: int) -> tuple[Array, Array]:
-    """Ground's acceleration at the start and at the end of each substep, in m/s².
-
-    A step of the record has `substeps`; `n_free` of zero acceleration follow its end.
-    """
+    """Ground's acceleration at the start and at the end of each substep, then of `n_free` zeros."""
     samples = ground.acceleration
     positions = np.arange((len(samples) - 1) * substeps + 1) / substeps
     values = np.interp(positions, np.arange(len(samples)), samples)

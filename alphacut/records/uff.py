@@ -100,11 +100,7 @@ def phase_collinearity(shape: Array) -> float:
 
 
 def _datasets(path: Path, kind: int) -> list[dict[str, Any]]:
-    """Data sets of a kind (55 or 58) in a universal file, as pyuff reads them.
-
-    Raises:
-        RefusedError: The file cannot be read.
-    """
+    """Data sets of a kind (55 or 58) in a universal file, as pyuff reads them."""
     import pyuff
 
     try:
@@ -120,11 +116,7 @@ def _datasets(path: Path, kind: int) -> list[dict[str, Any]]:
 def _mode_rows(
     path: Path, dataset: dict[str, Any], number: int, floors: Mapping[str, int]
 ) -> ModeRows:
-    """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`.
-
-    Raises:
-        RefusedError: An unknown is missing, or the shape is too complex.
-    """
+    """Frequency of a mode, and its real amplitudes on the floors of the unknowns in `floors`."""
     key = f"{path.name}, mode {number}"
     nodes = [int(node) for node in dataset["node_nums"]]
     values: dict[str, complex] = {}  # amplitude of each unknown

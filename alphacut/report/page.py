@@ -109,10 +109,7 @@ def render_template(**parts: object) -> str:
 
 
 def plot(name: str, study: Document, folder: ResultsFolder) -> Document:
-    """Data of a study for the interactive plot; "lower", "upper" and "error" by level and output.
-
-    Each of these is a text of base64 over time.
-    """
+    """Data of a study for the interactive plot: by level and output, base64 of values over time."""
     dataset = dataset_of(folder.content(f"envelope_{name}.nc"))
     time = dataset["time"].values
     outputs = [str(output) for output in dataset["output"].values]
@@ -161,11 +158,12 @@ class Page:
         summary = self.summary
         key_tables = (material(summary), peak_table(summary), (ANSWERS, answers(summary)))
         remarks = [*natures(summary), *drivers(summary)]
-        key_pieces = [("text", f"{MEANING}."), *(("table", *table) for table in key_tables)]
+        key_pieces: list[Piece] = [("text", f"{MEANING}.")]
+        key_pieces += [("table", *table) for table in key_tables]
         yield "Key results", [*key_pieces, *_texts(remarks)]
-        for name, (title, table, figures) in PARTS.items():
+        for name, (title, table, drawn) in PARTS.items():
             if part := summary.get(name):
-                yield title, [*self._figure_pieces(figures), *self._part_pieces(name, part, table)]
+                yield title, [*self._figure_pieces(drawn), *self._part_pieces(name, part, table)]
         yield "Terms", [("glossary", TERMS.items())]
         figures = [*self._figure_pieces(tuple(self.unshown))]
         yield "More", [("folded", "All other figures", figures), *self._origin_pieces()]
@@ -264,10 +262,7 @@ def in_words(name: str) -> str:
 
 
 def caption(stem: str, *, paper: bool) -> str:
-    """Caption of a figure by its file's name without ending, as "fig21-25-graph-follower".
-
-    The paper's number stands before it where `paper` is true.
-    """
+    """Caption of a figure such as "fig16-stress-curves"; with the paper's number if `paper`."""
     parts = re.fullmatch(r"(?:fig)?(\d+(?:-\d+)?)[-_](.+)", stem)
     number, name = (parts[1], parts[2]) if parts else ("", stem)
     if match := re.fullmatch(r"envelope-(.+)-([^-]+)", name):

@@ -154,10 +154,7 @@ def unit_of(part: Document, output: str) -> str:
 
 
 def reached_and_gap(peak: Document, factor: float) -> tuple[str, str]:
-    """Texts of the peak that a motion reaches on the lowest level, and of its gap to the bound.
-
-    Both are empty where the peak is not proved.
-    """
+    """Texts of the peak that a motion reaches, and of its gap to a proved bound; else empty."""
     if Nature(peak["nature"]) is not Nature.GUARANTEED:
         return "", ""
     value = rounded(factor * float(peak["reached"][0]), "upper", Nature.ATTAINED)

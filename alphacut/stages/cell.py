@@ -96,11 +96,7 @@ def _model_of_particle(
 ) -> Callable[..., list[HomogenisedStiffness]]:
     """Method `solve` of the model of a cell with one particle: series, slices or prisms.
 
-    Args:
-        cell: Phases and shape of the particle.
-        mesh: Resolution of elements.
-        modulus: Method, and tolerance of E, of which each source of error gets a part.
-        elements: Options of the prisms.
+    `elements` are options of the prisms.
     """
     tolerance, method = modulus.tolerance, modulus.method
     if cell.particles == "spheres":

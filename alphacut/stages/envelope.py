@@ -68,11 +68,9 @@ class EnvelopeTask:
         return same_inputs and self.duration == section.duration
 
     def options(self, structure: Structure) -> dict[str, Any]:
-        """Options of the method of [envelope]: its tolerance, if it has one.
-
-        Without a tolerance in the case, method auto takes any gap that is proved.
-        """
+        """Options of the method of [envelope]: its tolerance, if it has one."""
         method, tolerance = self.section.method, self.tolerance(structure).value
+        # without a tolerance in the case, method auto takes any gap that is proved
         takes_any_gap = method == "auto" and self.section.tolerance is None
         if takes_any_gap or not hasattr(frame.METHODS[method], "tolerance"):
             return {}
@@ -84,10 +82,8 @@ class EnvelopeTask:
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
-        relative = not self.tolerance(structure).unit
-        result = frame.envelope(
-            **self.arguments(structure), relative=relative, **_store_and_progress(work)
-        )
+        arguments = self.arguments(structure) | _store_and_progress(work)
+        result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         signed = [name for name in self.limited if name != output_of(name)]
         peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
         # a second proof of many inputs is hardly tighter: the number of its parts ends it
@@ -123,10 +119,9 @@ class EnvelopeTask:
         model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
         method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
-        motion = self._motion(structure) | {"step": self.section.step / nodes}
-        result = frame.envelope(
-            model, method=method, relative=True, **motion, **_store_and_progress(work)
-        )
+        arguments = self._motion(structure) | _store_and_progress(work)
+        arguments["step"] = self.section.step / nodes
+        result = frame.envelope(model, method=method, relative=True, **arguments)
         return peaks(result, self.limited)
 
     def _motion(self, structure: Structure) -> dict[str, Any]:
@@ -216,12 +211,7 @@ def stage(structure: Structure, task: EnvelopeTask) -> Stage:
 
 
 def document(result: StageResult, fuzzy: Sequence[str]) -> Document:
-    """Numbers on an envelope in SI: extremes and errors at the lowest level, peaks, cost.
-
-    Args:
-        result: Result of the stage of a study.
-        fuzzy: Fuzzy inputs as the user names them.
-    """
+    """Numbers on an envelope in SI: extremes and errors at the lowest level, peaks, cost."""
     data = result.arrays
     lowest, facts = data.isel(alpha=0), ("trajectories", "seconds", "method", "nature")
     columns = {

@@ -61,12 +61,6 @@ def compute_cuts(
 ) -> StageResult:
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E.
 
-    Args:
-        cell: The image and its phases.
-        alpha: Levels.
-        average: Name of the average of the stiffness that gives E and ν.
-        work: Takes progress.
-
     Raises:
         RefusedError: The image cannot give what the case asks for.
     """
@@ -148,12 +142,9 @@ def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> 
 def _widths(
     study: ImageStudy, lowest: float, width: Callable[[AlphaLevel, AlphaLevel], float]
 ) -> dict[str, float]:
-    """Widths of E in Pa that each source causes, the largest first.
+    """Widths of E in Pa on the lowest level by what causes them, the largest first.
 
-    Args:
-        study: The image.
-        lowest: Lowest level.
-        width: Width of E at levels of the threshold and of the phases; None: modal values.
+    `width` gives that at levels of the threshold and of the phases; None: at modal values.
     """
     base = width(None, None)
     widths = {"discretisation": base}
@@ -248,18 +239,15 @@ def image_study(cell: ImageCell) -> ImageStudy:
         RefusedError: The image cannot be read, or cannot be segmented into these phases.
     """
     grey = read_grey(cell.image, square=len(cell.pixel) == 1)
-    return (
-        _study_by_labels(grey, cell, cell.labels)
-        if cell.labels
-        else _study_by_thresholds(grey, cell)
-    )
+    if cell.labels:
+        return _study_by_labels(grey, cell, cell.labels)
+    return _study_by_thresholds(grey, cell)
 
 
 def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     """The study of an image whose phases are told by thresholds of its greys.
 
-    Pixels that noise or uneven light leave undecided may be of two phases on every level; fuzzy
-    thresholds take the place of this.
+    Of crisp thresholds, pixels that noise or light leave undecided may be of two phases.
     """
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))
@@ -272,6 +260,7 @@ def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     is_fuzzy = any(number.support.width > 0 for number in numbers)
 
     def phase_ranges(level: AlphaLevel) -> tuple[Rows, Rows]:
+        """Least and greatest phase of each pixel at a level."""
         if level is not None and not is_fuzzy:
             return segmentation.ranges()
         cuts = (cut_at(number, level) for number in numbers)

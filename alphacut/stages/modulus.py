@@ -279,9 +279,9 @@ class CellCampaign:
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
     def loss_errors(self, result: Bounds) -> dict[str, float]:
-        """Errors of the loss factors by `CONSTANTS`: the largest of all samples, or modal ones.
+        """Errors of the loss factors by `CONSTANTS`: the largest of samples, or, of prisms, modal.
 
-        Prisms have modal ones, as their estimates are costly; a mesh from a file has none.
+        A mesh from a file has none.
         """
         assert self.losses is not None
         assert result.samples is not None
@@ -315,10 +315,7 @@ def stage_result(result: Bounds, campaign: CellCampaign) -> StageResult:
 
 
 def dataset(result: Bounds, campaign: CellCampaign, losses: Mapping[str, Array]) -> xarray.Dataset:
-    """Dataset in SI of α-cuts over (alpha, bound), the inputs that reach them, and all samples.
-
-    Of quantity NAME they are the variables NAME, NAME_at and NAME_sample.
-    """
+    """Dataset in SI: α-cuts NAME, inputs NAME_at that reach them, and samples NAME_sample."""
     import xarray
 
     samples = result.samples

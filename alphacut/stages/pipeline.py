@@ -91,12 +91,7 @@ class Pipeline:
         return campaign_of(self.content, self.petsc)
 
     def compute_modulus(self) -> None:
-        """Computes stage modulus, of an image or of samples of a cell, into the results.
-
-        Raises:
-            FailedError: E has a larger error than the case allows.
-            RefusedError: E of spheres lies outside its bounds.
-        """
+        """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
         results, section = self.results, self.content.modulus
         if self.content.picture is not None:
             stage = image.stage(self.content.picture, section.alpha, section.average)
@@ -124,10 +119,8 @@ class Pipeline:
         allowed = "a modulus, or --modulus FILE.nc"
         require(has_modulus, "frame.modulus", value=None, allowed=allowed)
         by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
-        has_damping, allowed = (
-            loss is not None or not by_material,
-            "loss factors of the cell, or a number",
-        )
+        has_damping = loss is not None or not by_material
+        allowed = "loss factors of the cell, or a number"
         require(has_damping, "frame.damping_ratio", value="material", allowed=allowed)
         return content.structure_of(young, loss)
 
@@ -193,16 +186,12 @@ class Pipeline:
         self._answer(FuzzyResponse(structure, task.fuzzy, *times, worst, by_record))
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
-        """Peaks for questions: from the study with the motion of [envelope], else computed alone.
-
-        None where there is no such study, and no question limits an output.
-        """
+        """Peaks for questions, from the study with [envelope]'s motion or else computed alone."""
         alpha = task.section.alpha
         for study in self.results.tasks:
             if study.has_motion_of(task.section):
-                return peaks_from_document(
-                    self.results.envelopes[study.name].document["peak"], alpha
-                )
+                document = self.results.envelopes[study.name].document
+                return peaks_from_document(document["peak"], alpha)
         if not task.limited:
             return None
         inputs = [structure.model, structure.numbers, task]

@@ -75,10 +75,7 @@ def _require_motion(content: Content) -> None:
 
 
 def _stand_in_modulus(content: Content) -> FuzzyNumber | None:
-    """Young's modulus that stands in for the one of stage modulus, fuzzy where that will be.
-
-    None without that stage.
-    """
+    """Young's modulus that stands in for the one of stage modulus, fuzzy where that will be."""
     if "modulus" not in content.stages:
         return None
     value = STAND_IN.modal

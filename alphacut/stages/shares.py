@@ -34,10 +34,7 @@ ACCURACY = 2e-3
 def stage(
     campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
 ) -> Stage:
-    """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks.
-
-    Each part may be None.
-    """
+    """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks."""
     cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
     motion = structure and [structure.model, structure.numbers, task]
     compute = partial(compute_shares, campaign, structure, task)

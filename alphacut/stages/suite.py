@@ -89,22 +89,13 @@ def suite_records(
 ) -> tuple[SuiteRecord, ...]:
     """The records of a suite, in the order of the case."""
     mode = nominal_mode(structure)
-    return tuple(
-        _suite_record(section, envelope, recording, mode) for recording in section.recordings
-    )
+    return tuple(_suite_record(section, envelope, named, mode) for named in section.recordings)
 
 
 def _suite_record(
     section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: Nominal
 ) -> SuiteRecord:
-    """A recording after correction, trimming and scaling, and the length of the motion under it.
-
-    Args:
-        section: Correction, trim and scale.
-        envelope: Largest duration, and the step.
-        named: The recording.
-        mode: First mode, for Sa(T1) and the free motion after the record.
-    """
+    """A recording after correction, trimming and scaling, and the length of the motion under it."""
     ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
     measures = {
         "PGA": ground.extremes[0],
@@ -205,10 +196,6 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
     structure is known to reach the latter, as each record has its own worst one. But a structure of
     any higher cut has at least the mean of that cut's least peaks, and at most that of its
     greatest: these are reached.
-
-    Args:
-        worst: As of `worst_peaks`.
-        peaks: Peaks under each record by its name.
     """
     plain = [name for name in worst.outputs if name == output_of(name)]
     columns = {f"mean {name}": name for name in plain}
