@@ -38,11 +38,11 @@ class CellForm:
         points: Values at quadrature points, or in cells.
         parts: Measures of the phases in their order, which can be assembled one by one; with
             `mixed` one measure of all.
-        mixed: Whether `share` mixes two phases at the points, where a mesh ignores the interface.
+        mixed: Whether `in_particle` tells the phase of points, where a mesh ignores the interface.
 
     Attributes:
         density: f_Θ of eq. 1 at the points; 1 where there is no θ.
-        share: Part of the particle at the points, 0 or 1 (eq. 13), if mixed.
+        in_particle: Indicator of the particle at the points, 0 or 1 (eq. 13), if mixed.
     """
 
     def __init__(
@@ -54,14 +54,14 @@ class CellForm:
         mixed: bool = False,
     ) -> None:
         mesh, count = space.mesh, 2 if mixed else len(parts)
-        self.density, self.share = fem.Function(points), fem.Function(points)
+        self.density, self.in_particle = fem.Function(points), fem.Function(points)
         self._phases = [fem.Constant(mesh, np.zeros((3, 3))) for _ in range(count)]
         self._uniform = fem.Constant(mesh, np.zeros(3))
         u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
         density, of_parts = self.density, list[Any](self._phases)
         if mixed:
             matrix, inclusion = self._phases
-            of_parts = [matrix + self.share * (inclusion - matrix)]  # eq. 13
+            of_parts = [matrix + self.in_particle * (inclusion - matrix)]  # eq. 13
         self._stiffness, self._load = [], []
         for stiffness, dx in zip(of_parts, parts, strict=True):
             stress = stiffness * strain(u)  # eq. 6

@@ -113,11 +113,12 @@ class HomogenisedStiffness:
     average: str = AXES
     energies: PhaseEnergies | None = None
 
-    def averaged(self, average: str) -> HomogenisedStiffness:
-        """The same result with E and ν of another average.
+    def with_average(self, average: str) -> HomogenisedStiffness:
+        """Copy of the result whose E and ν are those of another average over directions.
 
         Raises:
-            RefusedError: The name is unknown, or the average needs a stiffness not computed.
+            RefusedError: The name is not in `anisotropy.AVERAGES`, or the average needs C11 − C12,
+                which was not computed.
         """
         require_average(average)
         if average != AXES and self.stiffness is None:
@@ -131,7 +132,7 @@ class HomogenisedStiffness:
         return AVERAGES[self.average]
 
     def __repr__(self) -> str:
-        """E and ν with the declared error, the model and its cost."""
+        """One line with E, ν, the declared error of E, the model and its wall time."""
         cost = self.seconds.get("total", 0.0)
         return (
             f"HomogenisedStiffness(E = {self.modulus:.7g} Pa, ν = {self.poisson:.5g}"
@@ -180,7 +181,7 @@ class HomogenisedStiffness:
 
     @property
     def modulus_errors(self) -> Array:
-        """Declared relative errors of the three mean moduli, shape (3,).
+        """Declared relative errors of the mean C11 + C12, C11 − C12 and C33, shape (3,).
 
         All sources together; nan where unknown.
         """
@@ -192,17 +193,17 @@ class HomogenisedStiffness:
     def stiffness_errors(self) -> Array | None:
         """Declared absolute errors of the entries of the mean plane stiffness, (3, 3), in Pa.
 
-        Those of the diagonal follow from C11 + C12 and C11 − C12, also with C22 in place of C11.
         Approximate fields can only have more energy: the error is a positive semidefinite matrix,
-        whose entries are at most √(δC_ii δC_jj).
+        whose entries are at most √(δC_ii δC_jj). None without a plane stiffness.
         """
-        C, (bulk, deviator, shear) = self.stiffness, self.modulus_errors
+        C, (sum_error, difference_error, shear_error) = self.stiffness, self.modulus_errors
         if C is None or C.shape != (3, 3):
             return None
-        axial = [
-            (bulk * abs(C[k, k] + C[0, 1]) + deviator * abs(C[k, k] - C[0, 1])) / 2 for k in (0, 1)
-        ]
-        diagonal = np.array([*axial, shear * C[2, 2]])
+        diagonal = [shear_error * C[2, 2]]
+        for axis in (1, 0):  # C_kk is half of (C_kk + C12) + (C_kk − C12)
+            by_sum = sum_error * abs(C[axis, axis] + C[0, 1])
+            by_difference = difference_error * abs(C[axis, axis] - C[0, 1])
+            diagonal.insert(0, (by_sum + by_difference) / 2)
         return np.asarray(np.sqrt(np.outer(diagonal, diagonal)))
 
     def error_of(self, function: Callable[[Array], Array | float]) -> Array:
@@ -210,7 +211,7 @@ class HomogenisedStiffness:
 
         The function must not depend on a modulus that was not computed.
         """
-        return spread(function, self.moduli, self._known_errors(self.modulus_errors))
+        return largest_change(function, self.moduli, self._known_errors(self.modulus_errors))
 
     def _known_errors(self, errors: Array) -> Array:
         return np.where(np.isnan(self.moduli), 0.0, errors)
@@ -234,42 +235,46 @@ class HomogenisedStiffness:
 
     @property
     def largest_error(self) -> float:
-        """Largest declared error of the printed and exported constants; nan if none was declared.
+        """Largest of the declared relative errors of E and the moduli and the absolute one of ν.
 
-        The largest of the relative errors of E and the moduli (so of the mean stresses) and the
-        absolute error of ν.
+        nan if none was declared.
         """
         if not self.errors:
             return float("nan")
         return float(np.nanmax([*self.modulus_errors, self.estimated_error, self.poisson_error]))
 
     def _error_of_modulus(self, errors: Array) -> float:
-        """Relative error of E from relative errors of the three moduli, shape (3,)."""
+        """Relative error of E from relative errors of C11 + C12, C11 − C12 and C33, shape (3,).
+
+        The larger of E/E₀ − 1 and E₀/E − 1 over the box of the moduli, with E₀ at its centre.
+        """
         modulus = self.modulus
 
-        def ratio(moduli: Array) -> Array:
+        def ratios(moduli: Array) -> Array:
             changed = float(self.constants_of(moduli)[0])
             return np.array([changed / modulus, modulus / changed if changed > 0 else np.inf])
 
-        return float(spread(ratio, self.moduli, self._known_errors(errors)).max())
+        return float(largest_change(ratios, self.moduli, self._known_errors(errors)).max())
 
 
-def spread(function: Callable[[Array], Array | float], values: Array, errors: Array) -> Array:
-    """Largest absolute change of `function` over a box of its arguments, at the corners.
+def largest_change(
+    function: Callable[[Array], Array | float], values: Array, errors: Array
+) -> Array:
+    """Largest absolute change of a function at the corners of a box around its arguments.
 
     Each value runs from value/(1 + error) to value·(1 + error).
 
     Args:
         function: Takes an array like `values`; monotone in each of them over the box.
-        values: Middle of the box, positive, shape (n,).
-        errors: Relative errors, shape (n,).
+        values: Arguments, positive, shape (n,).
+        errors: Relative errors of the arguments, shape (n,).
 
     Returns:
         Array shaped like the function's value; nan if an error is.
     """
+    value = np.asarray(function(values))
     if not np.isfinite(errors).all():
-        return np.full(np.shape(function(values)), np.nan)
-    centre = np.asarray(function(values))
+        return np.full(value.shape, np.nan)
     corners = product(*((1 / (1 + error), 1 + error) for error in errors))
-    changes = [abs(np.asarray(function(values * factors)) - centre) for factors in corners]
+    changes = [abs(np.asarray(function(values * factors)) - value) for factors in corners]
     return np.asarray(np.max(changes, axis=0))

@@ -20,7 +20,7 @@ STIFFEST = 0.45
 
 
 def require_mesh_size(size: float) -> None:
-    """Refuse an edge length outside (0, 1].
+    """Refuse an edge length outside (0, 1], in halves of the cell's side.
 
     Raises:
         RefusedError: It lies outside.
@@ -30,7 +30,7 @@ def require_mesh_size(size: float) -> None:
 
 
 def require_points(points: int | None) -> None:
-    """Refuse a rule in θ of fewer than two nodes; None leaves their number to the model.
+    """Refuse a quadrature rule in θ of fewer than two points; None means the model's choice.
 
     Raises:
         RefusedError: There are fewer.
@@ -40,10 +40,10 @@ def require_points(points: int | None) -> None:
 
 
 def require_continuous(radius_map: RadiusMap) -> Array:
-    """Refuse a map that jumps, of which no rule in θ tells its error; a narrow peak is not seen.
+    """Refuse a radius map with a jump over θ, for which no quadrature rule can tell its error.
 
     Returns:
-        Radii at even steps over the support, shape (2049,).
+        Radii at 2049 even steps over the support of θ.
 
     Raises:
         RefusedError: The map jumps, or gives radii outside (0, 1), or its law of θ is none.
@@ -60,7 +60,7 @@ def require_continuous(radius_map: RadiusMap) -> Array:
 
 
 def require_compressible(*phases: AnyPhase) -> None:
-    """Refuse phases in which quadratic elements lock.
+    """Refuse phases that are so incompressible that quadratic elements lock.
 
     Raises:
         RefusedError: A Poisson's ratio is above 0.45.
@@ -75,7 +75,7 @@ def require_interphase(interphase: Interphase | None, outline: Outline) -> None:
     """Refuse an interphase in which elements lock, or around a particle that is not round.
 
     Raises:
-        RefusedError: It is one.
+        RefusedError: Its Poisson's ratio is above 0.45, or the outline is no circle.
     """
     if interphase is None:
         return
@@ -87,20 +87,27 @@ def require_interphase(interphase: Interphase | None, outline: Outline) -> None:
 def require_parts(
     radius_map: object, matrix: object, inclusions: object, *, isotropic: bool = True
 ) -> None:
-    """Refuse parts in another order, no inclusions, or phases that a model has no formula for.
+    """Refuse arguments of `solve` that are no radius map, no phase and no sequence of phases.
+
+    Args:
+        radius_map: Should be a map θ ↦ r(θ) with the law of θ.
+        matrix: Should be a phase.
+        inclusions: Should be a sequence of one phase or more.
+        isotropic: Whether all phases must be isotropic.
 
     Raises:
-        RefusedError: The first is no radius map, the second no phase, or the third no sequence of
-            phases, one at least.
+        RefusedError: An argument is of another kind.
     """
     kinds = (Phase,) if isotropic else (Phase, VoigtPhase)
-    rows = inclusions if isinstance(inclusions, Sequence) else ()
-    right = callable(radius_map) and hasattr(radius_map, "distribution")
-    if not (right and rows and all(isinstance(phase, kinds) for phase in (matrix, *rows))):
+    phases = (matrix, *inclusions) if isinstance(inclusions, Sequence) else ()
+    has_phases = len(phases) > 1 and all(isinstance(phase, kinds) for phase in phases)
+    is_map = callable(radius_map) and hasattr(radius_map, "distribution")
+    if not (is_map and has_phases):
         parts = ", ".join(type(part).__name__ for part in (radius_map, matrix, inclusions))
+        empty = " (empty)" if inclusions in ([], ()) else ""
         raise RefusedError(
             "parts of the cell",
-            f"{parts}{' (empty)' if inclusions in ([], ()) else ''}",
+            f"{parts}{empty}",
             "the radius map, the matrix's phase and a list of the inclusions' phases",
             "any stiffness is for slices and prism; write solve(radius, Phase(3e9), [Phase(70e9)])",
         )

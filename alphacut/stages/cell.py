@@ -47,7 +47,7 @@ AVERAGES = {"axes": "eq. 16", "isotropic": "isotropic"}
 
 def solve_and_average(model: Solve, cells: Sequence[AnySample]) -> list[HomogenisedStiffness]:
     """Results whose E and ν are those of the isotropic average of the plane stiffness."""
-    return [result.averaged("isotropic") for result in model(cells)]
+    return [result.with_average("isotropic") for result in model(cells)]
 
 
 def solve_cells(

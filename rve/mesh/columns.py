@@ -40,7 +40,7 @@ def extrude(
     thickness: float = 0.0,
     comm: MPI.Intracomm | None = None,
 ) -> PrismGrid:
-    """Gmsh's prisms over triangles of about `size`, opposite sides matching.
+    """Mesh the cell by Gmsh's triangles, opposite sides matching, and extrude them over θ.
 
     Args:
         size: Wanted edge length, in halves of the cell's side, in (0, 1].
@@ -54,15 +54,15 @@ def extrude(
     """
     sizes = None
     if radius and not is_round(outline):
-        sizes = partial(_at_most, size, bend_grading(outline, radius, refinement))
-    make = partial(extruded, size, radius, outline, layers, sizes, thickness)
-    prisms = make() if comm is None else from_first_rank(comm, make)
+        sizes = partial(_capped_size, size, bend_grading(outline, radius, refinement))
+    make_prisms = partial(extruded, size, radius, outline, layers, sizes, thickness)
+    prisms = make_prisms() if comm is None else from_first_rank(comm, make_prisms)
     grid = grid_of(prisms, radius, outline)
     return replace(grid, plane=replace(grid.plane, ring=_ring(grid, thickness)))
 
 
 def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
-    """What the first rank makes, on all ranks; its error is raised on all."""
+    """Result of `make` on the first rank, sent to all ranks; its exception is raised on all."""
     result: T | Exception | None = None
     if comm.rank == 0:
         try:
@@ -76,7 +76,7 @@ def from_first_rank(comm: MPI.Intracomm, make: Callable[[], T]) -> T:
 
 
 def _ring(grid: PrismGrid, thickness: float) -> Ring | None:
-    """The interphase of a mesh; None where it has none."""
+    """Interphase of a mesh with the mask of its planar nodes; None if the thickness is 0."""
     if not thickness:
         return None
     plane = grid.plane
@@ -89,7 +89,7 @@ def _ring(grid: PrismGrid, thickness: float) -> Ring | None:
 def grid_of(
     prisms: Prisms, radius: float, outline: Outline = circle, *, is_fixed: bool = False
 ) -> PrismGrid:
-    """The prisms numbered level by level, with the planar mesh below them.
+    """Grid of prisms with nodes numbered level by level, and the planar mesh below them.
 
     Args:
         prisms: Of any numbering; their planar positions are those of the planar mesh.
@@ -100,32 +100,33 @@ def grid_of(
     Raises:
         MeshError: They do not lie in columns, or a column does not pass all levels.
     """
-    heights, level = _levels(prisms)
-    column, count = _columns(prisms)
+    thetas, level = _levels(prisms)
+    column, num_columns = _columns(prisms)
     layer = level[prisms.cells[:, 0]]
     lowest = prisms.cells[layer == 0]
-    corners = np.unique(column[lowest[:, :3]])
-    planar: Rows = np.full(count, -1)
-    planar[corners] = np.arange(len(corners))
-    middles = np.setdiff1d(column[lowest[:, BELOW]], corners)
-    planar[middles] = len(corners) + np.arange(len(middles))
-    number = _numbers(prisms, level, planar[column], len(heights) - 1, len(corners))
-    triangle = _triangles(planar[column[prisms.cells[:, :3]]], layer)
+    # planar nodes are the columns, vertices before edge midpoints
+    vertices = np.unique(column[lowest[:, :3]])
+    midpoints = np.setdiff1d(column[lowest[:, BELOW]], vertices)
+    planar_of_column: Rows = np.full(num_columns, -1)
+    planar_of_column[vertices] = np.arange(len(vertices))
+    planar_of_column[midpoints] = len(vertices) + np.arange(len(midpoints))
+    planar = planar_of_column[column]
+    number = _number_nodes(prisms, level, planar, len(thetas) - 1, len(vertices))
+    triangle = _triangles(planar[prisms.cells[:, :3]], layer)
     order = np.lexsort((triangle, layer))
-    cells = number[prisms.cells[order]]
-    phase = prisms.phase[order]
-    positions: Array = np.empty((count, 2))
-    lowest_nodes = np.flatnonzero(number < count)
+    cells, phase = number[prisms.cells[order]], prisms.phase[order]
+    positions: Array = np.empty((num_columns, 2))
+    lowest_nodes = np.flatnonzero(number < num_columns)
     positions[number[lowest_nodes]] = prisms.points[lowest_nodes, :2]
-    triangles = int(triangle.max()) + 1
-    inside = phase[:triangles] == (prisms.names.index(INCLUSION) if radius else -1)
-    plane = _plane(positions, cells[:triangles], inside, radius, outline)
-    shares = (heights - heights[0]) / (heights[-1] - heights[0])
+    num_triangles = int(triangle.max()) + 1
+    inside = phase[:num_triangles] == (prisms.names.index(INCLUSION) if radius else -1)
+    plane = _plane(positions, cells[:num_triangles], inside, radius, outline)
+    heights = (thetas - thetas[0]) / (thetas[-1] - thetas[0])
     fixed = None
     if is_fixed:
         fixed = np.empty_like(prisms.points)
         fixed[number] = prisms.points
-    return PrismGrid(plane, cells, shares, phase, prisms.names, radius > 0 or is_fixed, fixed)
+    return PrismGrid(plane, cells, heights, phase, prisms.names, radius > 0 or is_fixed, fixed)
 
 
 def _levels(prisms: Prisms) -> tuple[Array, Rows]:
@@ -133,19 +134,19 @@ def _levels(prisms: Prisms) -> tuple[Array, Rows]:
     on_levels = np.unique(prisms.cells[:, BELOW + ABOVE])
     theta = prisms.points[:, 2]
     rising = np.sort(theta[on_levels])
-    heights = rising[np.append(True, np.diff(rising) > SAME_PLACE)]
+    thetas = rising[np.append(True, np.diff(rising) > SAME_PLACE)]
     level: Rows = np.full(len(theta), -1)
-    level[on_levels] = np.searchsorted(heights, theta[on_levels] + SAME_PLACE, side="right") - 1
+    level[on_levels] = np.searchsorted(thetas, theta[on_levels] + SAME_PLACE, side="right") - 1
     below, above = level[prisms.cells[:, BELOW]], level[prisms.cells[:, ABOVE]]
-    if (below != below[:, :1]).any() or (above != below[:, :1] + 1).any():
-        wrong = (below != below[:, :1]).any(axis=1) | (above != below[:, :1] + 1).any(axis=1)
-        x, y, z = prisms.points[prisms.cells[np.argmax(wrong), 0]]
+    is_tilted = (below != below[:, :1]).any(axis=1) | (above != below[:, :1] + 1).any(axis=1)
+    if is_tilted.any():
+        x, y, z = prisms.points[prisms.cells[np.argmax(is_tilted), 0]]
         raise MeshError(
             f"the prism at ({x:.4g}, {y:.4g}, θ = {z:.4g}) does not stand on one level with its top"
             " on the next",
             "extrude the plane along θ, all columns by the same layers",
         )
-    return np.asarray(heights), level
+    return np.asarray(thetas), level
 
 
 def _columns(prisms: Prisms) -> tuple[Rows, int]:
@@ -158,21 +159,34 @@ def _columns(prisms: Prisms) -> tuple[Rows, int]:
     return np.asarray(column), int(count)
 
 
-def _numbers(prisms: Prisms, level: Rows, planar: Rows, layers: int, corners: int) -> Rows:
-    """Number of each node: level by level, then half-way by half-way, shape (n,)."""
+def _number_nodes(prisms: Prisms, level: Rows, planar: Rows, layers: int, vertices: int) -> Rows:
+    """New number of each node, shape (n,): all levels, then the planes half-way between them.
+
+    Args:
+        prisms: Their nodes in any order.
+        level: Level of each node, −1 half-way between two.
+        planar: Number of each node in the planar mesh, vertices first.
+        layers: Number of layers.
+        vertices: Number of planar vertices, all that is half-way between levels.
+    """
     per_level = int(planar.max()) + 1
     number = level * per_level + planar
     half = prisms.cells[:, HALF_WAY]
     below = level[prisms.cells[:, :3]]
-    number[half] = (layers + 1) * per_level + below * corners + planar[half]
-    expected = (layers + 1) * per_level + layers * corners
+    number[half] = (layers + 1) * per_level + below * vertices + planar[half]
+    expected = (layers + 1) * per_level + layers * vertices
     if (planar < 0).any() or not np.array_equal(np.sort(number), np.arange(expected)):
         raise MeshError("columns of prisms do not pass all levels", "extrude the whole plane")
     return np.asarray(number)
 
 
 def _triangles(vertices: Rows, layer: Rows) -> Rows:
-    """Triangle below each prism, numbered as those of the lowest layer by their vertices."""
+    """Number of the planar triangle below each prism, shape (prisms,).
+
+    Args:
+        vertices: Planar numbers of the lower vertices of each prism, shape (prisms, 3).
+        layer: Layer of each prism.
+    """
     triangle = np.unique(np.sort(vertices, axis=1), axis=0, return_inverse=True)[1].ravel()
     counts = np.bincount(triangle)
     if (counts != layer.max() + 1).any():
@@ -213,5 +227,5 @@ def _rows_in(rows: Rows, candidates: Rows) -> Mask:
     return np.isin(rows @ [size, 1], candidates @ [size, 1])
 
 
-def _at_most(size: float, bend: Sizes, x: float, y: float) -> float:
+def _capped_size(size: float, bend: Sizes, x: float, y: float) -> float:
     return size * min(1.0, bend(x, y))

@@ -67,13 +67,13 @@ def plane_mesh(
     """
     require_mesh_size(size)
     require_fit(outline, radius + thickness, CLOSEST)
-    size, local = min(size, COARSEST), particle_grading(outline, radius, thickness)
+    size, near_particle = min(size, COARSEST), particle_grading(outline, radius, thickness)
     if is_round(outline):
-        return _graded(radius, size, outline, local, thickness)
+        return _graded_mesh(radius, size, outline, near_particle, thickness)
     for refinement in REFINEMENTS:
         bend = bend_grading(outline, radius, refinement)
-        sizes = partial(_smaller, local, bend)
-        mesh = _graded(radius, size, outline, sizes)
+        sizes = partial(_smaller_size, near_particle, bend)
+        mesh = _graded_mesh(radius, size, outline, sizes)
         if all(is_sound(mesh, order) for order in ORDERS):
             return mesh
     raise RefusedError(
@@ -90,29 +90,27 @@ def is_sound(mesh: PlaneMesh, order: int) -> bool:
     return bool((ratios > LEAST_RATIO).all())
 
 
-def _smaller(first: Sizes, second: Sizes, x: float, y: float) -> float:
+def _smaller_size(first: Sizes, second: Sizes, x: float, y: float) -> float:
     return min(first(x, y), second(x, y))
 
 
-def _graded(
+def _graded_mesh(
     radius: float, size: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
 ) -> PlaneMesh:
-    """Mesh with edges of `size` times `sizes`, the vertices of the interface on the outline."""
+    """Mesh with edges of length size · sizes(x1, x2), the interface's vertices on the outline."""
     points, triangles, phase = square.triangles(
         size, radius, outline, lambda x, y: size * sizes(x, y), thickness
     )
     inside = phase == PARTICLE
-    shared = np.intersect1d(triangles[inside], triangles[~inside])
-    x, y = points[shared].T  # Gmsh's splines are near the outline only
-    points[shared] *= (radius * outline(np.arctan2(y, x)) / np.hypot(x, y))[:, None]
+    on_interface = np.intersect1d(triangles[inside], triangles[~inside])
+    x, y = points[on_interface].T  # Gmsh's splines are near the outline only
+    on_outline = radius * outline(np.arctan2(y, x))
+    points[on_interface] *= (on_outline / np.hypot(x, y))[:, None]
     return PlaneMesh(points, np.sort(triangles, axis=1), phase, radius, outline, thickness)
 
 
 def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
     """Nodes of Lagrange triangles of `order`, the interface's edges bent onto the outline.
-
-    Inside a triangle the bend fades with the bubble of its edge, so the map stays smooth and the
-    elements keep their order.
 
     Returns:
         Positions (n, 2) and the nodes of each triangle (m, (order + 1)(order + 2)/2).
@@ -123,32 +121,37 @@ def curved_nodes(mesh: PlaneMesh, order: int) -> tuple[Array, Rows]:
     lattice: Array = np.asarray(element.points, float)
     barycentric = np.column_stack([1 - lattice.sum(axis=1), lattice])
     ends, edges, _ = square.edges(mesh.triangles, mesh.inside)
-    places = np.einsum("nl,eld->end", barycentric, mesh.points[mesh.triangles])
+    positions = np.einsum("nl,eld->end", barycentric, mesh.points[mesh.triangles])
     for mask, radius in _interfaces(mesh):
         on_interface = square.edges(mesh.triangles, mask)[2]
         for k, (a, b) in enumerate(square.EDGES):
             bent = np.flatnonzero(on_interface[edges[:, k]])
-            pairs = mesh.triangles[bent][:, [a, b]]
-            places[bent] += _bend(mesh, radius, pairs, barycentric[:, [a, b]])
+            edge_ends = mesh.triangles[bent][:, [a, b]]
+            positions[bent] += _bend_onto_outline(mesh, radius, edge_ends, barycentric[:, [a, b]])
     ring = mesh.phase == INTERPHASE
-    places[ring] = _polar_places(mesh.points[mesh.triangles[ring]], barycentric)
-    cells = _number_nodes(
-        mesh.triangles, edges, vertices=len(mesh.points), edge_count=len(ends), order=order
-    )
+    positions[ring] = _polar_positions(mesh.points[mesh.triangles[ring]], barycentric)
+    cells = _lagrange_nodes(mesh.triangles, edges, (len(mesh.points), len(ends)), order)
     points = np.empty((cells.max() + 1, 2))
-    points[cells] = places
+    points[cells] = positions
     return points, cells
 
 
-def _number_nodes(
-    triangles: Rows, edges: Rows, *, vertices: int, edge_count: int, order: int
-) -> Rows:
-    on_edge, within = order - 1, (order - 1) * (order - 2) // 2
-    along = [vertices + edges[:, [k]] * on_edge + np.arange(on_edge) for k in range(3)]
-    first = vertices + edge_count * on_edge
-    return np.hstack(
-        [triangles, *along, first + np.arange(len(triangles))[:, None] * within + np.arange(within)]
-    )
+def _lagrange_nodes(triangles: Rows, edges: Rows, counts: tuple[int, int], order: int) -> Rows:
+    """Nodes of each Lagrange triangle of an order, (m, (order + 1)(order + 2)/2), in Basix's order.
+
+    Numbers are those of the vertices, then of the nodes inside edges, then inside triangles.
+
+    Args:
+        triangles: Vertices of each triangle, shape (m, 3).
+        edges: Edges of each triangle, shape (m, 3).
+        counts: Numbers of vertices and of edges.
+        order: Polynomial degree.
+    """
+    vertices, edge_count = counts
+    per_edge, per_triangle = order - 1, (order - 1) * (order - 2) // 2
+    on_edges = [vertices + edges[:, [k]] * per_edge + np.arange(per_edge) for k in range(3)]
+    first = vertices + edge_count * per_edge + np.arange(len(triangles)) * per_triangle
+    return np.hstack([triangles, *on_edges, first[:, None] + np.arange(per_triangle)])
 
 
 def _interfaces(mesh: PlaneMesh) -> list[tuple[Mask, float]]:
@@ -159,33 +162,43 @@ def _interfaces(mesh: PlaneMesh) -> list[tuple[Mask, float]]:
     return [*inner, (mesh.phase != MATRIX, mesh.radius + mesh.thickness)]
 
 
-def _polar_places(corners: Array, barycentric: Array) -> Array:
-    """Nodes of triangles in a ring: radius and angle are linear in them, shape (k, nodes, 2).
+def _polar_positions(corners: Array, barycentric: Array) -> Array:
+    """Nodes of triangles in a ring, interpolated in polar coordinates, shape (k, nodes, 2).
 
-    Both circles are copies of one curve at other scales, which do not meet however thin the ring.
+    Both circles are then the same curve at two scales, which do not meet however thin the ring.
 
     Args:
-        corners: Of the triangles, shape (k, 3, 2).
-        barycentric: Of the nodes, shape (nodes, 3).
+        corners: Vertices of the triangles, shape (k, 3, 2).
+        barycentric: Barycentric coordinates of the nodes, shape (nodes, 3).
     """
     angle = np.arctan2(corners[..., 1], corners[..., 0])
-    turn = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi
-    angles = (angle[:, :1] + turn) @ barycentric.T
+    difference = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi  # across ±π too
+    angles = (angle[:, :1] + difference) @ barycentric.T
     distance = np.hypot(corners[..., 0], corners[..., 1]) @ barycentric.T
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return np.asarray(distance[..., None] * unit)
 
 
-def _bend(mesh: PlaneMesh, radius: float, ends: Rows, weights: Array) -> Array:
-    """Displacement of all nodes of triangles with the edge `ends` (k, 2) on the outline."""
+def _bend_onto_outline(mesh: PlaneMesh, radius: float, ends: Rows, weights: Array) -> Array:
+    """Displacements that bend one edge of triangles onto the outline, shape (k, nodes, 2).
+
+    Inside a triangle they fade with the bubble of the edge, so the map stays smooth and the
+    elements keep their order.
+
+    Args:
+        mesh: Vertices and outline.
+        radius: Radius of the outline.
+        ends: Vertices of the edge, shape (k, 2).
+        weights: Barycentric coordinates of the nodes at these vertices, shape (nodes, 2).
+    """
     a, b = mesh.points[ends[:, 0]], mesh.points[ends[:, 1]]
-    start, stop = (np.arctan2(p[:, 1], p[:, 0]) for p in (a, b))
-    turn = (stop - start + np.pi) % (2 * np.pi) - np.pi
-    along = (1 + weights[:, 1] - weights[:, 0]) / 2
-    angle = start[:, None] + turn[:, None] * along
+    angle_a, angle_b = (np.arctan2(p[:, 1], p[:, 0]) for p in (a, b))
+    difference = (angle_b - angle_a + np.pi) % (2 * np.pi) - np.pi  # across ±π too
+    along = (1 + weights[:, 1] - weights[:, 0]) / 2  # from 0 at a to 1 at b
+    angle = angle_a[:, None] + difference[:, None] * along
     distance = radius * np.asarray(mesh.outline(angle))
     arc = distance[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     chord = a[:, None] + (b - a)[:, None] * along[:, None]
     bubble = weights.prod(axis=1)
-    share = np.divide(bubble, along * (1 - along), out=np.zeros_like(bubble), where=bubble > 1e-14)
-    return np.asarray((arc - chord) * share[:, None])
+    fade = np.divide(bubble, along * (1 - along), out=np.zeros_like(bubble), where=bubble > 1e-14)
+    return np.asarray((arc - chord) * fade[:, None])

@@ -26,7 +26,7 @@ MIRRORED = [0, 2, 1, 3, 5, 4, 7, 6, 8, 9, 11, 10, 13, 12, 14]
 
 
 def read_grid(path: Path | str) -> PrismGrid:
-    """The prisms of a file of Gmsh, numbered level by level; nodes stay where the file has them.
+    """Read the extruded prisms of a Gmsh file; nodes keep their positions, numbered by level.
 
     Raises:
         RefusedError: The file is none of Gmsh.
@@ -39,53 +39,49 @@ def read_grid(path: Path | str) -> PrismGrid:
         except Exception as error:  # Gmsh raises nothing else
             allowed = "files of Gmsh with 15-node prisms"
             raise RefusedError("mesh.file", path, allowed, str(error)) from None
-        prisms = upright(gmsh_prisms.read(gmsh))
+        prisms = orient(gmsh_prisms.read(gmsh))
     grid = grid_of(prisms, 0.0, is_fixed=True)
-    _require_cell(grid)
+    _require_periodic_square(grid)
     return grid
 
 
-def upright(prisms: Prisms) -> Prisms:
-    """The same prisms with θ rising from their first triangle, which is counterclockwise."""
+def orient(prisms: Prisms) -> Prisms:
+    """Reorder the nodes of prisms so that the first triangle is the lower one, counterclockwise."""
     cells, points = prisms.cells.copy(), prisms.points
-    falling = points[cells[:, 3], 2] < points[cells[:, 0], 2]
-    cells[falling] = cells[falling][:, UPSIDE_DOWN]
+    is_falling = points[cells[:, 3], 2] < points[cells[:, 0], 2]
+    cells[is_falling] = cells[is_falling][:, UPSIDE_DOWN]
     first, second, third = (points[cells[:, k], :2] for k in range(3))
     a, b = second - first, third - first
-    clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
-    cells[clockwise] = cells[clockwise][:, MIRRORED]
+    is_clockwise = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
+    cells[is_clockwise] = cells[is_clockwise][:, MIRRORED]
     return replace(prisms, cells=cells)
 
 
-def _require_cell(grid: PrismGrid) -> None:
-    """Refuse meshes of another square, and sides that do not match on a level."""
+def _require_periodic_square(grid: PrismGrid) -> None:
+    """Refuse levels that do not fill [−1, 1]², or whose opposite sides do not match.
+
+    Raises:
+        MeshError: A level does not, or a node's partner is in another column than on the lowest.
+    """
     assert grid.fixed is not None
-    count, levels = len(grid.plane.points), grid.layers + 1
-    lowest: list[tuple[Rows, Rows]] = []
-    for level in range(levels):
-        points = grid.fixed[level * count : (level + 1) * count]
-        theta = points[0, 2]
-        ends = np.array([points[:, :2].min(axis=0), points[:, :2].max(axis=0)])
-        if abs(ends - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
-            shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in ends.T)
+    per_level = len(grid.plane.points)
+    lowest_partners: list[dict[int, int]] = []
+    for level in range(grid.layers + 1):
+        points = grid.fixed[level * per_level : (level + 1) * per_level]
+        xy, theta = points[:, :2], points[0, 2]
+        box = np.array([xy.min(axis=0), xy.max(axis=0)])
+        if abs(box - [[-1, -1], [1, 1]]).max() > SAME_PLACE:
+            shown = " × ".join(f"{low:.6g} … {high:.6g}" for low, high in box.T)
             raise MeshError(f"the level θ = {theta:.4g} spans {shown}, not −1 … 1 × −1 … 1")
-        on_side = abs(abs(points[:, :2]) - 1) <= SAME_PLACE
+        on_side = abs(abs(xy) - 1) <= SAME_PLACE
         try:
-            pairs = [partners(points[:, :2], on_side[:, axis], axis) for axis in (0, 1)]
+            pairs = [partners(xy, on_side[:, axis], axis) for axis in (0, 1)]
         except MeshError as error:
             raise MeshError(f"{error.what}, on the level θ = {theta:.4g}", error.cure) from None
-        if lowest and not _same(pairs, lowest):
+        level_partners = [dict(zip(a.tolist(), b.tolist(), strict=True)) for a, b in pairs]
+        if lowest_partners and level_partners != lowest_partners:
             raise MeshError(f"a column changes its partner at the level θ = {theta:.4g}")
-        lowest = lowest or pairs
-
-
-def _same(pairs: list[tuple[Rows, Rows]], expected: list[tuple[Rows, Rows]]) -> bool:
-    """True if nodes have the same partners, in whatever order."""
-    return all(
-        dict(zip(*map(np.ndarray.tolist, nodes), strict=True))
-        == dict(zip(*map(np.ndarray.tolist, two), strict=True))
-        for nodes, two in zip(pairs, expected, strict=True)
-    )
+        lowest_partners = lowest_partners or level_partners
 
 
 def write(
@@ -96,13 +92,13 @@ def write(
     names: Sequence[str],
     fields: Mapping[str, Array] | None = None,
 ) -> None:
-    """Write prisms as a file of Gmsh, each phase a physical group, bit for bit.
+    """Write prisms to a binary file of Gmsh, each phase a physical group.
 
     Args:
         path: A name that ends in .msh.
         points: (x1, x2, θ), shape (n, 3).
         cells: Nodes in Basix's order, shape (m, 15).
-        phase: Place of each prism's phase in `names`, shape (m,).
+        phase: Index in `names` of each prism's phase, shape (m,).
         names: Names of the phases.
         fields: Values at the nodes of the prisms by name, shape (m, 15, components).
     """
@@ -121,12 +117,11 @@ def write(
             gmsh.model.addPhysicalGroup(3, [volume], name=name)
         gmsh.write(str(path))
         for name, values in (fields or {}).items():
-            _append(gmsh, str(path), (model, name), values)
+            _append_field(gmsh, str(path), model, name, values)
 
 
-def _append(gmsh: Any, path: str, names: tuple[str, str], values: Array) -> None:
-    """Append a field at the nodes of the elements to a file that has its mesh."""
-    model, name = names
+def _append_field(gmsh: Any, path: str, model: str, name: str, values: Array) -> None:
+    """Append a field at the nodes of the elements, (m, 15, components), to a file with the mesh."""
     view = gmsh.view.add(name)
     elements = np.arange(1, len(values) + 1)
     components = values.shape[-1]

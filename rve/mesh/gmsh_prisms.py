@@ -50,7 +50,7 @@ def extruded(
     sizes: square.Sizes | None = None,
     thickness: float = 0.0,
 ) -> Prisms:
-    """Prisms over the triangulation of the cell, θ from 0 to 1 in equal layers.
+    """Mesh the cell by Gmsh and extrude the triangles to prisms, θ from 0 to 1 in equal layers.
 
     Args:
         size: Edge length in the plane, in halves of the cell's side.
@@ -61,14 +61,14 @@ def extruded(
         thickness: Thickness of the interphase around the particle, 0 for none.
     """
     with square.model() as gmsh:
-        parts = square.surfaces(size, radius, outline, thickness)
-        planes = [(2, surface) for surfaces in parts.values() for surface in surfaces]
+        surfaces = square.surfaces(size, radius, outline, thickness)
+        planes = [(2, tag) for phase_surfaces in surfaces.values() for tag in phase_surfaces]
         extrusion = gmsh.model.geo.extrude(planes, 0, 0, 1, numElements=[layers], recombine=True)
         gmsh.model.geo.synchronize()
         volumes = iter([tag for dimension, tag in extrusion if dimension == 3])
-        groups = {phase: [next(volumes) for _ in surfaces] for phase, surfaces in parts.items()}
-        for phase in sorted(groups):
-            gmsh.model.addPhysicalGroup(3, groups[phase], name=NAMES[phase])
+        phase_volumes = {phase: [next(volumes) for _ in tags] for phase, tags in surfaces.items()}
+        for phase in sorted(phase_volumes):
+            gmsh.model.addPhysicalGroup(3, phase_volumes[phase], name=NAMES[phase])
         _name_surfaces(gmsh)
         if sizes:
             square.grade(gmsh, sizes)
@@ -80,7 +80,7 @@ def extruded(
 
 
 def _name_surfaces(gmsh: Any) -> None:
-    """Give the surfaces of Gmsh's model on the sides and on both ends of θ physical groups."""
+    """Make physical groups of the surfaces of Gmsh's model on each side and at both ends of θ."""
     ends = {LEVELS[0]: (2, 0.0), LEVELS[1]: (2, 1.0)}
     for name, (axis, coordinate) in (SIDES | ends).items():
         tags = []
@@ -93,39 +93,44 @@ def _name_surfaces(gmsh: Any) -> None:
 
 
 def read(gmsh: Any) -> Prisms:
-    """The prisms of Gmsh's current model by their physical groups.
+    """All prisms of Gmsh's current model, each physical group of volumes a phase.
 
     Raises:
-        MeshError: A volume has no physical group or two, or a mesh of other elements.
+        MeshError: A volume is in no physical group or in two, or has other elements.
     """
     tags, xyz, _ = gmsh.model.mesh.getNodes()
-    number = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
-    number[tags] = np.arange(len(tags))
+    number_of_tag = np.zeros(int(tags.max(initial=0)) + 1, np.int64)
+    number_of_tag[tags] = np.arange(len(tags))
     names: list[str] = []
     cells: list[Rows] = []
     phases: list[Rows] = []
-    seen: set[int] = set()
+    grouped: set[int] = set()
     for _, group in gmsh.model.getPhysicalGroups(3):
         name = gmsh.model.getPhysicalName(3, group) or f"group {group}"
         volumes = gmsh.model.getEntitiesForPhysicalGroup(3, group).tolist()
-        if seen & set(volumes):
+        if grouped & set(volumes):
             raise MeshError(f"prisms of the physical group {name!r} are in another one too")
-        seen |= set(volumes)
+        grouped |= set(volumes)
         for volume in volumes:
             cells.append(_cells_of(gmsh, volume, name))
             phases.append(np.full(len(cells[-1]), len(names)))
         names.append(name)
-    lone = [tag for _, tag in gmsh.model.getEntities(3) if tag not in seen]
-    if lone or not names:
-        what = f"volume {lone[0]}" if lone else "the mesh"
+    ungrouped = [tag for _, tag in gmsh.model.getEntities(3) if tag not in grouped]
+    if ungrouped or not names:
+        what = f"volume {ungrouped[0]}" if ungrouped else "the mesh"
         raise MeshError(f"{what} has no physical group that names its phase")
-    used, numbers = np.unique(number[np.concatenate(cells)], return_inverse=True)
+    # nodes of curves and surfaces alone belong to no prism
+    used, compact = np.unique(number_of_tag[np.concatenate(cells)], return_inverse=True)
     points: Array = np.asarray(xyz, float).reshape(-1, 3)[used]
-    return Prisms(points, numbers.reshape(-1, 15), np.concatenate(phases), tuple(names))
+    return Prisms(points, compact.reshape(-1, 15), np.concatenate(phases), tuple(names))
 
 
 def _cells_of(gmsh: Any, volume: int, name: str) -> Rows:
-    """Node tags of the prisms of a volume, shape (m, 15)."""
+    """Node tags of the prisms of a volume, shape (m, 15), in Basix's order.
+
+    Raises:
+        MeshError: The volume, of the physical group `name`, has other elements.
+    """
     kinds, _, nodes = gmsh.model.mesh.getElements(3, volume)
     if list(kinds) != [PRISM_15]:
         found = ", ".join(gmsh.model.mesh.getElementProperties(kind)[0] for kind in kinds)

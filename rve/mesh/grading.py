@@ -20,19 +20,20 @@ REFINEMENTS = (0.5, 0.75, 1.1, 1.7, 2.5, 4.0)
 
 
 def particle_grading(outline: Outline, radius: float, thickness: float = 0.0) -> Sizes:
-    """Edge length near a small particle and in gaps over the nominal one, at (x1, x2).
+    """Function of (x1, x2): edge length near a particle and in gaps, over the nominal one.
 
     Args:
         outline: Of the particle.
         radius: Its radius.
         thickness: Of a ring around it.
     """
-    wide, high, least = (radius * extent for extent in extents(outline))
-    return lambda x, y: _around(x, y, wide + thickness, high + thickness, least)
+    half_width, half_height, least = (radius * extent for extent in extents(outline))
+    outer = half_width + thickness, half_height + thickness
+    return lambda x, y: _size_near_particle(x, y, *outer, least)
 
 
 def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
-    """Edge length that follows the bends of an outline over the nominal one, at (x1, x2).
+    """Function of (x1, x2): edge length by the bends of an outline, over the nominal one.
 
     On the outline its ratio to the bend radius is that of edge and radius on a circle, divided by
     `refinement`; off the outline it grows as around a circle.
@@ -49,20 +50,23 @@ def bend_grading(outline: Outline, radius: float, refinement: float) -> Sizes:
     return lambda x, y: factor * float((radii + np.hypot(px - x, py - y)).min())
 
 
-def _around(x: float, y: float, wide: float, high: float, least: float) -> float:
-    """Edge length near the particle and in the gaps between it and its images.
+def _size_near_particle(
+    x: float, y: float, half_width: float, half_height: float, least: float
+) -> float:
+    """Edge length at (x, y), over the nominal one, near a particle and between it and its images.
 
     Gmsh calls this for each point, hence no NumPy.
 
     Args:
         x: First coordinate.
         y: Second coordinate.
-        wide: Greatest |x1| of the particle.
-        high: Greatest |x2|.
+        half_width: Greatest |x1| of the particle.
+        half_height: Greatest |x2|.
         least: Least distance of its outline from the centre.
     """
     x, y = abs(x), abs(y)
-    near = _PER_RADIUS * max(hypot(x, y), least)
-    beside = 1 - wide + y * y / (2 * wide) + max(0.0, wide - x)
-    above = 1 - high + x * x / (2 * high) + max(0.0, high - y)
-    return min(1.0, near, 4 * beside, 4 * above)
+    by_distance = _PER_RADIUS * max(hypot(x, y), least)
+    # width of the gap to the cell's side, which grows along it as beside a circle
+    gap_beside = 1 - half_width + y * y / (2 * half_width) + max(0.0, half_width - x)
+    gap_above = 1 - half_height + x * x / (2 * half_height) + max(0.0, half_height - y)
+    return min(1.0, by_distance, 4 * gap_beside, 4 * gap_above)

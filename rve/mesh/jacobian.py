@@ -29,8 +29,8 @@ def jacobian_ratios(nodes: Array, cells: Rows, order: int) -> Array:
         basix.ElementFamily.P, basix.CellType.triangle, order, basix.LagrangeVariant.gll_warped
     )
     points, weights = basix.make_quadrature(basix.CellType.triangle, quadrature_degree(order))
-    along_x, along_y = np.asarray(element.tabulate(1, points))[1:, :, :, 0]
+    d_xi, d_eta = np.asarray(element.tabulate(1, points))[1:, :, :, 0]  # of the shape functions
     x, y = nodes[cells].transpose(2, 1, 0)
-    determinants = (along_x @ x) * (along_y @ y) - (along_y @ x) * (along_x @ y)
+    determinants = (d_xi @ x) * (d_eta @ y) - (d_eta @ x) * (d_xi @ y)
     means = weights @ determinants / weights.sum()
     return np.asarray((determinants / means).min(axis=0))

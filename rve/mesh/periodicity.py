@@ -52,7 +52,7 @@ def identify(plane: Triangulation) -> Periodicity:
 
 
 def unknowns(points: Array) -> Rows:
-    """Unknown of each node of the cell, in the order of the nodes, −1 at the corners, shape (n,).
+    """Number of each node's unknown, the same for periodic partners, −1 at corners, shape (n,).
 
     Args:
         points: Positions, shape (n, 2).
@@ -72,9 +72,9 @@ def unknowns(points: Array) -> Rows:
 
 
 def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
-    """Periodic pairs of nodes: those of the side x = −1 and their partners on x = 1, each (k,).
+    """Nodes of the side x = −1 and their periodic partners on x = 1, shape (k,) each.
 
-    Sorted along the side, partners have the same rank: a side has one coordinate.
+    Both are sorted along the side, so that partners have the same rank.
 
     Args:
         points: Positions, shape (n, 2).
@@ -85,18 +85,18 @@ def partners(points: Array, on_side: Mask, axis: int) -> tuple[Rows, Rows]:
         MeshError: A node has no partner within `SAME_PLACE`.
     """
     tangential = points[:, 1 - axis]
-    sides = [
-        nodes[np.argsort(tangential[nodes])]
-        for nodes in (np.flatnonzero(on_side & (sign * points[:, axis] > 0)) for sign in (-1, 1))
-    ]
-    count = min(map(len, sides))
-    gaps = abs(tangential[sides[0][:count]] - tangential[sides[1][:count]])
-    if len(sides[0]) != len(sides[1]) or (gaps > SAME_PLACE).any():
+    is_first = points[:, axis] < 0
+    first, second = (np.flatnonzero(on_side & mask) for mask in (is_first, ~is_first))
+    first = first[np.argsort(tangential[first])]
+    second = second[np.argsort(tangential[second])]
+    count = min(len(first), len(second))
+    gaps = abs(tangential[first[:count]] - tangential[second[:count]])
+    if len(first) != len(second) or (gaps > SAME_PLACE).any():
         unpaired = int(np.argmax(np.append(gaps > SAME_PLACE, True)))
-        coordinate = tangential[max(sides, key=len)[unpaired]]
+        coordinate = tangential[max(first, second, key=len)[unpaired]]
         side = f"x{axis + 1} = ±1 at x{2 - axis} = {coordinate:.6g}"
         raise MeshError(
             f"a node of the sides {side} has no partner on the opposite side",
             "mesh opposite sides alike",
         )
-    return sides[0], sides[1]
+    return first, second

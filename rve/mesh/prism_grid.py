@@ -44,7 +44,7 @@ class LevelSet(FixedCell):
     z: LevelFunction
 
     def is_inside(self, points: Array) -> Mask:
-        """Whether points (…, 3) lie in a particle, shape (…).
+        """Mask of the points (x1, x2, θ), shape (…, 3), that lie in a particle, shape (…).
 
         Raises:
             RefusedError: The function does not give a number at each point.
@@ -56,8 +56,8 @@ class LevelSet(FixedCell):
         return np.asarray(values < 0)
 
 
-def moved(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
-    """Positions of all nodes at k radii, shape (k, n, 2), curved edges on the outline.
+def nodes_at_radii(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
+    """Positions of all nodes of a planar mesh at k radii of its particle, shape (k, n, 2).
 
     Nodes slide along rays from the centre: inside the particle in proportion, outside between the
     outline and the side of the square. Edge midpoints slide too, so that the layers between a large
@@ -65,21 +65,22 @@ def moved(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
     has a kink, stays straight. Nodes of an interphase of some thickness slide inside it.
     """
     radius, (x, y) = radii[:, None], mesh.points.T
-    distance, shape = np.hypot(x, y), np.asarray(mesh.outline(np.arctan2(y, x)))
-    inner = np.zeros(len(distance), bool)
-    inner[mesh.triangles[mesh.inside]] = True
-    old, new = mesh.radius * shape, radius * shape
+    distance, outline = np.hypot(x, y), np.asarray(mesh.outline(np.arctan2(y, x)))
+    in_particle = np.zeros(len(distance), bool)
+    in_particle[mesh.triangles[mesh.inside]] = True
+    old_edge, new_edge = mesh.radius * outline, radius * outline
     if mesh.ring is not None:
-        old, new = old + mesh.ring.thickness, new + thickness
+        old_edge, new_edge = old_edge + mesh.ring.thickness, new_edge + thickness
     with np.errstate(divide="ignore", invalid="ignore"):  # at the centre
-        side = distance / abs(mesh.points).max(axis=1)
-        outer = (new + (distance - old) * (side - new) / (side - old)) / distance
-        scale = np.where(inner, radius / mesh.radius, outer)
-        scale = np.where(mesh.arc, radius * shape / distance, scale)  # z = 0 of eq. 14
+        side = distance / abs(mesh.points).max(axis=1)  # distance of the square's side on the ray
+        stretch = (side - new_edge) / (side - old_edge)
+        outer_scale = (new_edge + (distance - old_edge) * stretch) / distance
+        scale = np.where(in_particle, radius / mesh.radius, outer_scale)
+        scale = np.where(mesh.arc, radius * outline / distance, scale)  # z = 0 of eq. 14
     points = mesh.points * scale[..., None]
     x, y = mesh.points[mesh.ends].transpose(2, 1, 0)
-    across = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
-    straight = np.flatnonzero(across & ~mesh.arc[mesh.vertices :])
+    crosses_diagonal = ((x - y).prod(axis=0) < -1e-12) | ((x + y).prod(axis=0) < -1e-12)
+    straight = np.flatnonzero(crosses_diagonal & ~mesh.arc[mesh.vertices :])
     points[:, mesh.vertices + straight] = points[:, mesh.ends[straight]].mean(axis=2)
     if mesh.ring is not None:
         points[:, mesh.ring.nodes] = _ring_positions(mesh, mesh.ring, radii, thickness)
@@ -87,20 +88,19 @@ def moved(mesh: Triangulation, radii: Array, thickness: float = 0.0) -> Array:
 
 
 def _ring_positions(mesh: Triangulation, ring: Ring, radii: Array, thickness: float) -> Array:
-    """Positions of the nodes of an interphase, shape (k, nodes of it, 2).
+    """Positions of the nodes of an interphase at k radii of the particle, shape (k, nodes, 2).
 
-    Middles of edges have the mean radius and the mean angle of their ends. So both circles and all
-    that lies between are copies of one curve at other scales, which do not meet however thin the
-    ring and however long the edges are.
+    Middles of edges have the mean radius and the mean angle of their ends. So both circles are
+    copies of one curve at two scales, which do not meet however thin the ring.
     """
     x, y = mesh.points[: mesh.vertices].T
-    share = (np.hypot(x, y) - mesh.radius) / ring.thickness
+    depth = (np.hypot(x, y) - mesh.radius) / ring.thickness  # 0 at the particle, 1 at the matrix
     angle = np.arctan2(y, x)
     first, second = mesh.ends.T
-    turn = (angle[second] - angle[first] + np.pi) % (2 * np.pi) - np.pi
-    shares = np.concatenate([share, (share[first] + share[second]) / 2])[ring.nodes]
-    angles = np.concatenate([angle, angle[first] + turn / 2])[ring.nodes]
-    distance = radii[:, None] + thickness * shares
+    difference = (angle[second] - angle[first] + np.pi) % (2 * np.pi) - np.pi  # across ±π too
+    depths = np.concatenate([depth, (depth[first] + depth[second]) / 2])[ring.nodes]
+    angles = np.concatenate([angle, angle[first] + difference / 2])[ring.nodes]
+    distance = radii[:, None] + thickness * depths
     unit = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     return np.asarray(distance[..., None] * unit)
 
@@ -113,7 +113,7 @@ class PrismGrid:
         plane: The planar mesh.
         cells: Nodes of each prism in Basix's order, shape (prisms, 15), layer by layer, in each in
             the order of the triangles.
-        heights: Levels of θ as shares of its support, from 0 to 1, shape (layers + 1,).
+        heights: Positions of the levels in the support of θ, from 0 to 1, shape (layers + 1,).
         phase: Phase of each prism, an index of `names`, shape (prisms,).
         names: Names of the phases.
         conforming: Whether the phases are those of the prisms and the nodes follow the cone; if not
@@ -144,31 +144,35 @@ class PrismGrid:
         """Number of nodes in all."""
         return (self.layers + 1) * len(self.plane.points) + self.layers * self.plane.vertices
 
-    def levels(self, law: ThetaLaw) -> Array:
-        """θ of all levels, shape (layers + 1,)."""
+    def level_thetas(self, law: ThetaLaw) -> Array:
+        """θ of all levels over the support of a law, shape (layers + 1,)."""
         return np.asarray(law.lower + self.heights * (law.upper - law.lower))
 
     def positions(self, radius: RadiusMap, thickness: float = 0.0) -> Array:
         """(x1, x2, θ) of all nodes at a map and a thickness of the interphase, shape (nodes, 3)."""
         if self.fixed is not None:
             return self.fixed
-        theta = self.levels(radius.distribution)
-        middle = (theta[1:] + theta[:-1]) / 2
-        above = self._at(radius, middle, thickness)[:, : self.plane.vertices]
-        planes = self._at(radius, theta, thickness), above
-        stacked = [
-            np.dstack([xy, np.broadcast_to(t[:, None, None], (*xy.shape[:2], 1))])
-            for xy, t in zip(planes, (theta, middle), strict=True)
-        ]
-        return np.concatenate([s.reshape(-1, 3) for s in stacked])
+        levels = self.level_thetas(radius.distribution)
+        half_levels = (levels[1:] + levels[:-1]) / 2
+        on_levels = self._planar_positions(radius, levels, thickness)
+        on_half_levels = self._planar_positions(radius, half_levels, thickness)
+        blocks = []
+        for theta, xy in (
+            (levels, on_levels),
+            (half_levels, on_half_levels[:, : self.plane.vertices]),
+        ):
+            heights = np.broadcast_to(theta[:, None, None], (*xy.shape[:2], 1))
+            blocks.append(np.dstack([xy, heights]).reshape(-1, 3))
+        return np.concatenate(blocks)
 
-    def _at(self, radius: RadiusMap, theta: Array, thickness: float) -> Array:
+    def _planar_positions(self, radius: RadiusMap, theta: Array, thickness: float) -> Array:
+        """Positions of the planar nodes at each θ, shape (k, planar nodes, 2)."""
         if not self.conforming:
             return np.broadcast_to(self.plane.points, (len(theta), *self.plane.points.shape))
-        return moved(self.plane, radius(theta), thickness)
+        return nodes_at_radii(self.plane, radius(theta), thickness)
 
-    def sign(self, points: Array, radius: RadiusMap) -> Array:
-        """1 where z < 0 in eq. 14, at points (…, 3), else 0; shape (…)."""
+    def particle_indicator(self, points: Array, radius: RadiusMap) -> Array:
+        """1 at points (x1, x2, θ), (…, 3), in the particle (z < 0 in eq. 14), else 0; shape (…)."""
         if isinstance(radius, LevelSet):
             return radius.is_inside(points).astype(float)
         x, y, theta = np.moveaxis(points, -1, 0)

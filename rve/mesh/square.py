@@ -25,7 +25,9 @@ so that the spline keeps lobes apart. Vertices are put on the outline itself aft
 def triangles(
     size: float, radius: float, outline: Outline, sizes: Sizes, thickness: float = 0.0
 ) -> Triangles:
-    """Vertices (n, 2), triangles (m, 3) and their phases (m,): matrix 0, particle 1, interphase 2.
+    """Mesh the cell by Gmsh: vertices (n, 2), triangles (m, 3) and their phases (m,).
+
+    Phases are matrix 0, particle 1, interphase 2.
 
     Args:
         size: Edge length, in halves of the cell's side.
@@ -35,22 +37,21 @@ def triangles(
         thickness: Thickness of the interphase around it, 0 for none.
     """
     with model() as gmsh:
-        parts = surfaces(size, radius, outline, thickness, sizes)
-        phases = [phase for phase, tags in parts.items() for _ in tags]
+        phase_surfaces = surfaces(size, radius, outline, thickness, sizes)
         grade(gmsh, sizes)
         gmsh.model.mesh.generate(2)
-        tags, xyz, _ = gmsh.model.mesh.getNodes()
-        number = np.zeros(int(tags.max()) + 1, np.int64)
-        number[tags] = np.arange(len(tags))
-        blocks = [
-            number[gmsh.model.mesh.getElementsByType(2, s)[1].astype(np.int64)].reshape(-1, 3)
-            for tags in parts.values()
-            for s in tags
-        ]
-    phase = np.repeat(phases, [len(block) for block in blocks])
+        node_tags, xyz, _ = gmsh.model.mesh.getNodes()
+        number = np.zeros(int(node_tags.max()) + 1, np.int64)
+        number[node_tags] = np.arange(len(node_tags))
+        cells, phases = [], []
+        for phase, surface_tags in phase_surfaces.items():
+            for surface in surface_tags:
+                vertex_tags = gmsh.model.mesh.getElementsByType(2, surface)[1].astype(np.int64)
+                cells.append(number[vertex_tags].reshape(-1, 3))
+                phases.append(np.full(len(cells[-1]), phase))
     # the centres of arcs are points without triangles
-    used, numbers = np.unique(np.concatenate(blocks), return_inverse=True)
-    return xyz.reshape(-1, 3)[used, :2], numbers.reshape(-1, 3), phase
+    used, compact = np.unique(np.concatenate(cells), return_inverse=True)
+    return xyz.reshape(-1, 3)[used, :2], compact.reshape(-1, 3), np.concatenate(phases)
 
 
 def surfaces(
@@ -85,21 +86,23 @@ def surfaces(
 
 
 def edges(triangles: Rows, inside: Mask) -> tuple[Rows, Rows, Mask]:
-    """Edges of a mesh: their ends, those of each triangle, and which lie on the interface.
+    """Edges of a triangulation and which of them lie between the inside and the outside.
 
     Returns:
-        Shapes (k, 2), (m, 3) in the order of `EDGES`, and (k,).
+        Vertices of each edge, (k, 2); edges of each triangle, (m, 3), in the order of `EDGES`; and
+        the mask of the edges on the interface, (k,).
     """
-    pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
-    ends, number = np.unique(pairs, axis=0, return_inverse=True)
+    vertex_pairs = np.sort(triangles[:, EDGES].reshape(-1, 2), axis=1)
+    ends, number = np.unique(vertex_pairs, axis=0, return_inverse=True)
     number = number.reshape(-1, 3)
-    sides = [np.isin(np.arange(len(ends)), number[inside == flag]) for flag in (False, True)]
-    return ends, number, sides[0] & sides[1]
+    all_edges = np.arange(len(ends))
+    is_interface = np.isin(all_edges, number[inside]) & np.isin(all_edges, number[~inside])
+    return ends, number, is_interface
 
 
 @contextmanager
 def model() -> Iterator[Any]:
-    """Gmsh with an empty model, quiet, on one thread."""
+    """Context of Gmsh with an empty model, quiet, on one thread."""
     import gmsh
 
     gmsh.initialize(["", "-v", "1"], readConfigFiles=False, interruptible=False)
@@ -119,14 +122,15 @@ def grade(gmsh: Any, sizes: Sizes) -> None:
     gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, lc: sizes(x, y))
 
 
-def _sides(geo: Any, size: float) -> int:
-    """Curve loop of the square with opposite sides periodic."""
+def _square_loop(geo: Any, size: float) -> int:
+    """Add the boundary of the square, opposite sides periodic; tag of its curve loop."""
     import gmsh
 
     corners = [geo.addPoint(x, y, 0, size) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     sides = [geo.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
     geo.synchronize()
-    for first, second, shift in ((sides[3], sides[1], (2, 0)), (sides[0], sides[2], (0, 2))):
+    bottom, right, top, left = sides
+    for first, second, shift in ((left, right, (2, 0)), (bottom, top, (0, 2))):
         affine = np.eye(4)
         affine[:2, 3] = shift
         gmsh.model.mesh.setPeriodic(1, [second], [first], affine.ravel().tolist())
@@ -135,7 +139,7 @@ def _sides(geo: Any, size: float) -> int:
 
 def _square(geo: Any, size: float) -> list[int]:
     """Tag of the surface of a cell without a particle, in a list."""
-    surface = geo.addPlaneSurface([_sides(geo, size)])
+    surface = geo.addPlaneSurface([_square_loop(geo, size)])
     geo.synchronize()
     return [surface]
 
@@ -150,22 +154,26 @@ def _quarter_steps(inner: float, outer: float, sizes: Sizes) -> int:
 def _particle_in_ring(
     geo: Any, size: float, radii: tuple[float, float], steps: int
 ) -> dict[int, list[int]]:
-    """Surface tags by phase of a round particle (1), the matrix (0) and a structured ring (2)."""
+    """Add a round particle in a ring with a structured mesh of `steps` elements a quarter.
+
+    Returns:
+        Surface tags by phase: matrix 0, particle 1, ring 2.
+    """
     import gmsh
 
-    axes, centre = ((1, 0), (0, 1), (-1, 0), (0, -1)), geo.addPoint(0, 0, 0, size)
-    poles = [[geo.addPoint(r * x, r * y, 0, size) for x, y in axes] for r in radii]
-    turns = [(k, (k + 1) % 4) for k in range(4)]
-    arcs = [[geo.addCircleArc(circle[a], centre, circle[b]) for a, b in turns] for circle in poles]
-    spokes = [geo.addLine(*ends) for ends in zip(*poles, strict=True)]
-    loops = [geo.addCurveLoop(circle) for circle in arcs]
-    particle = geo.addPlaneSurface([loops[0]])
-    matrix = geo.addPlaneSurface([_sides(geo, size), loops[1]])
-    ring = [
-        geo.addPlaneSurface([geo.addCurveLoop([spokes[a], arcs[1][a], -spokes[b], -arcs[0][a]])])
-        for a, b in turns
-    ]
-    for curve in (*arcs[0], *arcs[1]):
+    centre, quarters = geo.addPoint(0, 0, 0, size), [(k, (k + 1) % 4) for k in range(4)]
+    inner, outer = (_poles(geo, size, radius) for radius in radii)
+    inner_arcs = [geo.addCircleArc(inner[a], centre, inner[b]) for a, b in quarters]
+    outer_arcs = [geo.addCircleArc(outer[a], centre, outer[b]) for a, b in quarters]
+    spokes = [geo.addLine(*ends) for ends in zip(inner, outer, strict=True)]
+    inner_loop, outer_loop = geo.addCurveLoop(inner_arcs), geo.addCurveLoop(outer_arcs)
+    particle = geo.addPlaneSurface([inner_loop])
+    matrix = geo.addPlaneSurface([_square_loop(geo, size), outer_loop])
+    ring = []
+    for a, b in quarters:
+        sector = geo.addCurveLoop([spokes[a], outer_arcs[a], -spokes[b], -inner_arcs[a]])
+        ring.append(geo.addPlaneSurface([sector]))
+    for curve in (*inner_arcs, *outer_arcs):
         geo.mesh.setTransfiniteCurve(curve, steps + 1)
     for curve in spokes:
         geo.mesh.setTransfiniteCurve(curve, RING_LAYERS + 1)
@@ -176,6 +184,12 @@ def _particle_in_ring(
     return {1: [particle], 0: [matrix], 2: ring}
 
 
+def _poles(geo: Any, size: float, radius: float) -> list[int]:
+    """Add the points of a circle on the axes, exact, so that meshes are the same everywhere."""
+    axes = ((1, 0), (0, 1), (-1, 0), (0, -1))
+    return [geo.addPoint(radius * x, radius * y, 0, size) for x, y in axes]
+
+
 def _spline_steps(outline: Outline) -> int:
     """Steps of the spline through a quarter of an outline."""
     points, radii = bend_radii(outline)
@@ -184,26 +198,25 @@ def _spline_steps(outline: Outline) -> int:
 
 
 def _particle(geo: Any, size: float, radius: float, outline: Outline) -> tuple[int, int]:
-    """Surface tags of a particle bounded by four curves, and of the matrix around it."""
+    """Add a particle bounded by four curves and the matrix around it; tags of both surfaces."""
     import gmsh
 
-    def point(angle: float) -> int:
+    def add_point(angle: float) -> int:
         distance = radius * float(outline(np.array(angle)))
         return int(geo.addPoint(distance * np.cos(angle), distance * np.sin(angle), 0, size))
 
     centre, quarters = geo.addPoint(0, 0, 0, size), np.arange(4) * np.pi / 2
-    if is_round(outline):  # exact zeros, so that meshes are the same everywhere
-        axes = ((1, 0), (0, 1), (-1, 0), (0, -1))
-        r = radius * float(outline(np.array(0.0)))
-        poles = [geo.addPoint(r * x, r * y, 0, size) for x, y in axes]
-        arcs = [geo.addCircleArc(poles[k], centre, poles[(k + 1) % 4]) for k in range(4)]
+    if is_round(outline):
+        poles = _poles(geo, size, radius * float(outline(np.array(0.0))))
+        curves = [geo.addCircleArc(poles[k], centre, poles[(k + 1) % 4]) for k in range(4)]
     else:
-        poles = [point(angle) for angle in quarters]
-        turns = np.linspace(0, np.pi / 2, _spline_steps(outline) + 1)[1:-1]
-        between = [[point(angle + turn) for turn in turns] for angle in quarters]
-        arcs = [geo.addSpline([poles[k], *between[k], poles[(k + 1) % 4]]) for k in range(4)]
-    loop = geo.addCurveLoop(arcs)
-    particle, matrix = geo.addPlaneSurface([loop]), geo.addPlaneSurface([_sides(geo, size), loop])
+        poles = [add_point(angle) for angle in quarters]
+        steps = np.linspace(0, np.pi / 2, _spline_steps(outline) + 1)[1:-1]
+        inner = [[add_point(angle + step) for step in steps] for angle in quarters]
+        curves = [geo.addSpline([poles[k], *inner[k], poles[(k + 1) % 4]]) for k in range(4)]
+    loop = geo.addCurveLoop(curves)
+    particle = geo.addPlaneSurface([loop])
+    matrix = geo.addPlaneSurface([_square_loop(geo, size), loop])
     geo.synchronize()
     gmsh.model.mesh.embed(0, [centre], 2, particle)
     return particle, matrix

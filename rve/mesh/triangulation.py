@@ -59,7 +59,9 @@ class Triangulation:
 def reference_radius(
     radius_map: RadiusMap, outline: Outline = circle, thickness: float = 0.0
 ) -> float:
-    """Radius of the planar mesh: the middle of the map's range, rounded, in [0.1, 0.9 / reach].
+    """Radius of the particle in the planar mesh, which is then moved to all radii of a map.
+
+    The middle of the map's range, rounded to 1/20, in [0.1, 0.9 / reach of the outline].
 
     Raises:
         ValueError: The map gives radii outside (0, 1), or its law of θ is none.

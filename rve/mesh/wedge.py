@@ -15,8 +15,8 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.fenicsx import basix
 
-SLICES = 3  # Gauss points along θ in a layer
-POINTS = 6  # of each slice of a wedge
+SLICES_PER_LAYER = 3  # Gauss points along θ
+POINTS_PER_SLICE = 6  # quadrature points of each slice of a wedge
 PRISM = basix.CellType.prism
 
 
@@ -45,31 +45,31 @@ def _points_by_entity() -> list[list[Array]]:
 
 @cache
 def wedge(components: int) -> Any:
-    """The element blocked to `components` values, for DOLFINx."""
+    """UFL element of the 15-node serendipity prism with `components` values at each node."""
     points = _points_by_entity()
+    # degrees of freedom are point values: one evaluation with weight 1 each
     evaluations = [
         [np.eye(len(p)).reshape(len(p), 1, len(p), 1) for p in entity] for entity in points
     ]
-    identity, smooth = basix.MapType.identity, basix.SobolevSpace.H1
-    degrees = 1, 2  # Lagrange's subdegree and superdegree
     scalar = basix.ufl.custom_element(
-        PRISM,
-        [],
-        _coefficients(),
-        points,
-        evaluations,
-        0,
-        identity,
-        smooth,
-        False,
-        *degrees,
-        basix.PolysetType.standard,
+        cell_type=PRISM,
+        reference_value_shape=[],
+        wcoeffs=_coefficients(),
+        x=points,
+        M=evaluations,
+        interpolation_nderivs=0,
+        map_type=basix.MapType.identity,
+        sobolev_space=basix.SobolevSpace.H1,
+        discontinuous=False,
+        embedded_subdegree=1,
+        embedded_superdegree=2,
+        polyset_type=basix.PolysetType.standard,
     )
     return basix.ufl.blocked_element(scalar, shape=(components,))
 
 
 @cache
-def slab_rule() -> tuple[Array, Array]:
+def prism_rule() -> tuple[Array, Array]:
     """Quadrature on the reference prism: six points of a triangle times three of Gauss along ζ.
 
     Returns:
@@ -84,7 +84,7 @@ def slab_rule() -> tuple[Array, Array]:
 
 def slice_weights() -> Array:
     """Weights of the points of each slice of the reference prism, shape (3, 6), their sums 1/2."""
-    weights = slab_rule()[1].reshape(SLICES, -1)
+    weights = prism_rule()[1].reshape(SLICES_PER_LAYER, -1)
     return np.asarray(weights / (2 * weights.sum(axis=1, keepdims=True)))
 
 

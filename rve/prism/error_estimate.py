@@ -24,7 +24,7 @@ _POINTS = 14  # slices in θ
 
 
 def with_errors(result: HomogenisedStiffness) -> HomogenisedStiffness:
-    """The result with its declared errors.
+    """Copy of a result with declared errors: its distance from a reference plus the reference's.
 
     Args:
         result: Of the product space, with its cell.
@@ -38,8 +38,8 @@ def with_errors(result: HomogenisedStiffness) -> HomogenisedStiffness:
     moduli, reference_moduli = _mean_moduli(result.curve), _mean_moduli(reference.curve)
     if len(moduli) == 1:  # two loads: s11 is along x1
         reference_moduli = reference_moduli[1:]
-    pairs = zip(moduli, reference_moduli, strict=False)
-    distance = np.max([_relative_distance(*pair) for pair in pairs], axis=0)  # nan where unknown
+    distances = list(map(_relative_distance, moduli, reference_moduli))
+    distance = np.max(distances, axis=0)  # nan where a modulus was not computed
     error = np.asarray((1 + distance) * (1 + reference.modulus_errors) - 1)
     energies = _energies_with_errors(result, reference)
     return replace(result, errors={"space": error}, energies=energies)
@@ -48,7 +48,7 @@ def with_errors(result: HomogenisedStiffness) -> HomogenisedStiffness:
 def _energies_with_errors(
     result: HomogenisedStiffness, reference: HomogenisedStiffness
 ) -> PhaseEnergies | None:
-    """Energies of the phases; declared error: distance from the reference, plus its own error."""
+    """Energies of the phases; their error is the distance from the reference plus the latter's."""
     if result.energies is None or reference.energies is None:
         return result.energies
     values, errors = result.energies.values, reference.energies.errors
@@ -56,25 +56,22 @@ def _energies_with_errors(
 
 
 def _reference_result(cell: Cell) -> HomogenisedStiffness:
-    """Result of the series or the slices for the cell, far more accurate than that of prisms."""
+    """Result of the series, or of slices where it has no formula; more accurate than prisms."""
     matrix, inclusion = cell.matrix, cell.inclusion
-    if (
-        cell.square
-        and cell.interphase is None
-        and isinstance(matrix, Phase)
-        and isinstance(inclusion, Phase)
-    ):
-        return SeriesModel(accuracy=_ACCURACY, energies=True).solve(
-            cell.radius, matrix, [inclusion]
-        )[0]
-    model = SlicesModel(points=_POINTS, outline=cell.outline, energies=True)
-    return model.solve(cell.radius, matrix, [inclusion], cell.interphase)[0]
+    is_square = cell.square and cell.interphase is None
+    if is_square and isinstance(matrix, Phase) and isinstance(inclusion, Phase):
+        series = SeriesModel(accuracy=_ACCURACY, energies=True)
+        return series.solve(cell.radius, matrix, [inclusion])[0]
+    slices = SlicesModel(points=_POINTS, outline=cell.outline, energies=True)
+    return slices.solve(cell.radius, matrix, [inclusion], cell.interphase)[0]
 
 
 def _mean_moduli(curve: StressCurve) -> Sequence[Array]:
-    """Mean C11 + C12, C11 − C12 and C33, (3,), in Pa: by C22 in place of C11, by C11, by both.
+    """Mean C11 + C12, C11 − C12 and C33 over θ in Pa, (3,) each, in three versions.
 
-    Without a third load C11 − C12 is nan, and the list has one entry, of σ11 and σ12 alone.
+    Returns:
+        With C22 in place of C11, with C11, and with their mean; without a third load only the
+        second one, where C11 − C12 is nan.
     """
     s11, s12 = curve.mean
     if curve.stiffness is None:

@@ -74,7 +74,7 @@ def cell_fields(
     """
     cell = Cell(matrix, inclusion, radius_map, model.outline, interphase)
     problem = model.problem(radius_map, thickness_of(interphase))
-    return _fields(problem, cell.stiffness, model.loads(cell), model.options)
+    return _solve_fields(problem, cell.stiffness, model.loads(cell), model.options)
 
 
 def mesh_fields(model: PrismModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]) -> CellFields:
@@ -87,37 +87,44 @@ def mesh_fields(model: PrismModel, law: ThetaLaw, phases: Mapping[str, AnyPhase]
     """
     problem, named = model.mesh_problem(law, phases)
     stiffness = [phase.stiffness for phase in named.phases]
-    return _fields(problem, stiffness, THREE_LOADS, model.options)
+    return _solve_fields(problem, stiffness, THREE_LOADS, model.options)
 
 
-def _fields(
+def _solve_fields(
     problem: PrismProblem, stiffness: Sequence[Array], loads: Array, options: SolverOptions
 ) -> CellFields:
-    """Fields under macroscopic strains (loads, 3)."""
+    """Solve for displacements and stresses under macroscopic strains of shape (loads, 3)."""
     form, grid = problem.form, problem.form.grid
     problem.assemble(stiffness)
     vectors = solve(problem.solver(options), problem.loads(loads)).vectors
-    fluctuation, cells_of_rank = (
-        fem.Function(form.space),
-        np.arange(len(form.wedge), dtype=np.int32),
-    )
-    at_nodes = at_points(strain(fluctuation), vertices_and_midpoints())
+    fluctuation = fem.Function(form.space)
+    rank_cells = np.arange(len(form.wedge), dtype=np.int32)
+    nodal_strain = at_points(strain(fluctuation), vertices_and_midpoints())
     positions = grid.positions(problem.map, problem.thickness)
-    total = np.empty((grid.nodes, 2, len(vectors)))
+    displacement = np.empty((grid.nodes, 2, len(vectors)))
     prism_strains = np.empty((len(grid.cells), NODES, 3, len(vectors)))
     for k, vector in enumerate(vectors):
         u, uniform = problem.field(vector), np.asarray(loads[k], float)
         tensor = np.array([[uniform[0], uniform[2] / 2], [uniform[2] / 2, uniform[1]]])
-        total[form.node, :, k] = u + positions[form.node, :2] @ tensor
+        displacement[form.node, :, k] = u + positions[form.node, :2] @ tensor
         fluctuation.x.array[:] = u.ravel()
-        strains = at_nodes.eval(form.mesh, cells_of_rank).reshape(len(cells_of_rank), NODES, 3)
+        strains = nodal_strain.eval(form.mesh, rank_cells).reshape(len(rank_cells), NODES, 3)
         prism_strains[form.wedge, ..., k] = strains + uniform
     stress = np.stack(stiffness)[grid.phase][:, None] @ prism_strains
-    numbered = grid.cells + grid.phase[:, None] * grid.nodes
-    point_numbers, cells = np.unique(numbered, return_inverse=True)
-    cells = cells.reshape(numbered.shape)
-    mean = np.zeros((len(point_numbers), 3, len(vectors)))
-    np.add.at(mean, cells, stress)
-    mean /= np.bincount(cells.ravel())[:, None, None]
-    nodes = point_numbers % grid.nodes
-    return CellFields(positions[nodes], cells, grid.phase, total[nodes], mean, grid.names, nodes)
+    # one point for each node and phase, since stresses jump at the interface
+    point_keys = grid.cells + grid.phase[:, None] * grid.nodes
+    points, cells = np.unique(point_keys, return_inverse=True)
+    cells = cells.reshape(point_keys.shape)
+    mean_stress = np.zeros((len(points), 3, len(vectors)))
+    np.add.at(mean_stress, cells, stress)
+    mean_stress /= np.bincount(cells.ravel())[:, None, None]
+    nodes = points % grid.nodes
+    return CellFields(
+        points=positions[nodes],
+        cells=cells,
+        phase=grid.phase,
+        displacement=displacement[nodes],
+        stress=mean_stress,
+        names=grid.names,
+        node=nodes,
+    )

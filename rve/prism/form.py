@@ -10,7 +10,13 @@ from alphacut.rve.fenicsx import MPI, at_points, basix, fem, mesh_of, ufl
 from alphacut.rve.form import CellForm, strain
 from alphacut.rve.mesh.jacobian import LEAST_RATIO
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import POINTS, SLICES, slab_rule, slice_weights, wedge
+from alphacut.rve.mesh.wedge import (
+    POINTS_PER_SLICE,
+    SLICES_PER_LAYER,
+    prism_rule,
+    slice_weights,
+    wedge,
+)
 from alphacut.rve.outline import is_round
 from alphacut.stochastic import RadiusMap
 from alphacut.stochastic.theta.quadrature import level_rule
@@ -45,7 +51,7 @@ class PrismForm:
         self.wedge: Rows = np.asarray(self.mesh.topology.original_cell_index)
         self.layer = self.wedge // len(grid.plane.triangles)
         self.node = self._node_of_dof()
-        self._compile()
+        self._compile_forms()
 
     def _node_of_dof(self) -> Rows:
         sizes, geometry = self.space.dofmap.index_map, self.mesh.geometry
@@ -53,10 +59,10 @@ class PrismForm:
         nodes[self.space.dofmap.list] = geometry.input_global_indices[geometry.dofmap]
         return nodes
 
-    def _compile(self) -> None:
-        points, weights = slab_rule()
-        at_each = basix.ufl.quadrature_element("prism", points=points, weights=weights)
-        rule = {
+    def _compile_forms(self) -> None:
+        """Compile the elasticity form, and strain and det J at the quadrature points of prisms."""
+        points, weights = prism_rule()
+        metadata = {
             "quadrature_rule": "custom",
             "quadrature_points": points,
             "quadrature_weights": weights,
@@ -65,12 +71,13 @@ class PrismForm:
         cells = [
             (k, np.flatnonzero(phase == k).astype(np.int32)) for k in range(len(self.grid.names))
         ]
-        dx = ufl.Measure("dx", self.mesh, metadata=rule, subdomain_data=cells)
+        dx = ufl.Measure("dx", self.mesh, metadata=metadata, subdomain_data=cells)
         self.dx = {name: dx(k) for k, name in enumerate(self.grid.names)}
-        values = fem.functionspace(self.mesh, at_each)
-        self.elastic = CellForm(
-            self.space, values, list(self.dx.values()), mixed=not self.grid.conforming
-        )
+        point_element = basix.ufl.quadrature_element("prism", points=points, weights=weights)
+        point_space = fem.functionspace(self.mesh, point_element)
+        ignores_interface = not self.grid.conforming
+        measures = list(self.dx.values())
+        self.elastic = CellForm(self.space, point_space, measures, mixed=ignores_interface)
         self._u = fem.Function(self.space)
         self._strain = at_points(strain(self._u), points)
         self._volume = at_points(ufl.JacobianDeterminant(self.mesh), points)
@@ -78,13 +85,15 @@ class PrismForm:
     def move_to(self, radius: RadiusMap, thickness: float = 0.0) -> None:
         """Move the nodes to the cone of `radius` and mark the particle at the quadrature points.
 
-        An interphase, of a grid that has one, gets its thickness.
+        After an error the form stays where it was.
+
+        Args:
+            radius: Radius over θ.
+            thickness: Of the interphase, of a grid that has one.
 
         Raises:
             FoldedMeshError: An element is inverted.
             RefusedError: The density of θ is not positive at a quadrature point.
-
-        After either error the form stays where it was.
         """
         names = ("_levels", "_law", "areas")
         nodes = self.mesh.geometry.x.copy()
@@ -97,12 +106,12 @@ class PrismForm:
             raise
 
     def _move(self, radius: RadiusMap, thickness: float) -> None:
-        """Moves the nodes, checks the elements, and marks the particle at the quadrature points."""
+        """Move the nodes, check density and elements, and set both functions of the form."""
         positions, geometry = self.grid.positions(radius, thickness), self.mesh.geometry
         geometry.x[:] = positions[geometry.input_global_indices]
-        self._levels = self.grid.levels(radius.distribution)
+        self._levels = self.grid.level_thetas(radius.distribution)
         self._law = radius.distribution
-        theta, _ = self.slices()
+        theta, _ = self.slice_rule()
         density = radius.distribution.pdf(theta)
         if not (density > 0).all():
             key = f"density of θ at {theta[~(density > 0)][0]:.4g}"
@@ -110,30 +119,31 @@ class PrismForm:
             raise RefusedError(key, f"{density.min():g}", "positive densities", cure)
         self.areas = self._areas()
         self._require_valid_elements()
-        self.elastic.density.x.array[:] = np.repeat(self.of_slices(density), POINTS)
+        prism_density = self.at_prisms(density)
+        self.elastic.density.x.array[:] = np.repeat(prism_density, POINTS_PER_SLICE)
         if not self.grid.conforming:
-            self.elastic.share.x.array[:] = self._inside(positions, radius).ravel()
+            self.elastic.in_particle.x.array[:] = self._inside(positions, radius).ravel()
 
     def _require_valid_elements(self) -> None:
         """Refuse inverted elements, and nearly inverted ones about outlines that are not round.
 
         Raises:
-            FoldedMeshError: There is one at a quadrature point.
+            FoldedMeshError: det J is too small at a quadrature point, on any rank.
         """
         determinants = self.areas / slice_weights()
         means = determinants.mean(axis=(1, 2), keepdims=True)
-        least = 0.0 if is_round(self.grid.plane.outline) else LEAST_RATIO
-        bad = (means <= 0) | (determinants <= least * means)
-        if self.mesh.comm.allreduce(int(bad.any())):
+        least_ratio = 0.0 if is_round(self.grid.plane.outline) else LEAST_RATIO
+        is_folded = (means <= 0) | (determinants <= least_ratio * means)
+        if self.mesh.comm.allreduce(int(is_folded.any())):
             where = f"where it follows the radius through {self.grid.layers} layers in θ"
             cure = "take more layers or a smaller mesh size"
             raise FoldedMeshError(f"the mesh folds over {where}", cure)
 
     def _inside(self, positions: Array, radius: RadiusMap) -> Array:
         """Indicator of the particle, 1 inside and 0 elsewhere, at the points, (cells, points)."""
-        shapes: Array = wedge(1).tabulate(0, slab_rule()[0])[0].reshape(-1, 15)
-        x = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
-        return np.asarray(self.grid.sign(x, radius))
+        shapes: Array = wedge(1).tabulate(0, prism_rule()[0])[0].reshape(-1, 15)
+        points = np.einsum("qn,cnd->cqd", shapes, positions[self.grid.cells[self.wedge]])
+        return np.asarray(self.grid.particle_indicator(points, radius))
 
     def strains(self, displacement: Array) -> Array:
         """(ε11, ε22, 2 ε12) at the points of the slices, shape (cells, 3, points, 3).
@@ -152,26 +162,26 @@ class PrismForm:
     def _at_points(self, expression: fem.Expression, size: int) -> Array:
         cells = np.arange(len(self.wedge), dtype=np.int32)
         values = np.asarray(expression.eval(self.mesh, cells))
-        return values.reshape(len(cells), SLICES, -1, size)
+        return values.reshape(len(cells), SLICES_PER_LAYER, -1, size)
 
     def phase_areas(self) -> Array:
-        """`areas` of the phases, the others' being 0, shape (phases, cells, 3, points)."""
+        """`areas` of the points in each phase, 0 elsewhere, shape (phases, cells, 3, points)."""
         if self.grid.conforming:
             phase = self.grid.phase[self.wedge][:, None, None]
             return np.array([self.areas * (phase == k) for k in range(len(self.grid.names))])
-        share = self.elastic.share.x.array.reshape(len(self.wedge), SLICES, -1)
-        return np.stack([self.areas * (1 - share), self.areas * share])
+        indicator = self.elastic.in_particle.x.array.reshape(self.areas.shape)
+        return np.stack([self.areas * (1 - indicator), self.areas * indicator])
 
-    def slices(self) -> tuple[Array, Array]:
-        """θ of the slices at Gauss points of the layers, and their weights, shape (3 layers,)."""
-        rule = level_rule(self._law, self._levels, points=SLICES)
+    def slice_rule(self) -> tuple[Array, Array]:
+        """θ and weights of the slices, the Gauss points of all layers, shape (3 layers,) each."""
+        rule = level_rule(self._law, self._levels, points=SLICES_PER_LAYER)
         return rule.nodes, rule.weights
 
-    def of_slices(self, values: Array) -> Array:
-        """Values of the slices, (3 layers,), at this rank's prisms, shape (cells, 3)."""
-        return np.asarray(values.reshape(-1, SLICES)[self.layer])
+    def at_prisms(self, slice_values: Array) -> Array:
+        """Values of the slices, (3 layers,), repeated for this rank's prisms, shape (cells, 3)."""
+        return np.asarray(slice_values.reshape(-1, SLICES_PER_LAYER)[self.layer])
 
-    def by_layer(self, values: Array) -> Array:
+    def sum_by_layer(self, values: Array) -> Array:
         """Sums over this rank's prisms of each layer of values (cells, …), shape (layers, …)."""
         member = np.equal.outer(np.arange(self.grid.layers), self.layer).astype(float)
         return np.asarray(np.tensordot(member, values, axes=1))

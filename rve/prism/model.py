@@ -42,9 +42,9 @@ from alphacut.rve.prism.form import FoldedMeshError
 from alphacut.rve.prism.modulus_basis import TOLERANCE, ModulusBasis, modulus_basis
 from alphacut.rve.prism.own_mesh import (
     NamedPhases,
+    level_set_phases,
+    mesh_phases,
     own_mesh_problem,
-    require_level_set,
-    require_own_mesh,
 )
 from alphacut.rve.prism.problem import PrismProblem, SliceStrains
 from alphacut.rve.result import HomogenisedStiffness, StressCurve
@@ -111,6 +111,7 @@ class PrismModel:
     name: ClassVar[str] = "prism"
 
     def __post_init__(self) -> None:
+        """Refuse a mesh size, number of layers, interface or level set that is not allowed."""
         require_mesh_size(self.mesh_size)
         if self.layers < 1:
             raise RefusedError("the number of layers", self.layers, "1 or more")
@@ -127,11 +128,11 @@ class PrismModel:
         inclusions: Sequence[AnyPhase] = (),
         interphase: Interphase | None = None,
     ) -> list[HomogenisedStiffness]:
-        """One result for each of `inclusions`, in their order, on one mesh.
+        """Homogenised stiffness for each of `inclusions`, in their order, on one mesh.
 
-        On the user's mesh, `solve(law, {name: phase})` gives one result, of the law of θ and
-        the materials of its physical groups, in whose order its energies are. With a level set the
-        names are "matrix" and "inclusion". Neither declares an error: a coarser mesh tells it.
+        On the user's mesh, or with a level set, `solve(law, {name: phase})` gives one result for
+        the law of θ and the materials of its physical groups, or of "matrix" and "inclusion". It
+        declares no error; energies are in the order of these names.
 
         Raises:
             ConvergenceError: The linear solver stopped early.
@@ -175,21 +176,17 @@ class PrismModel:
         return results
 
     def _solve_own_mesh(self, law: object, phases: object) -> HomogenisedStiffness:
-        """Result on the mesh of a file or of a level set."""
+        """Homogenised stiffness on the mesh of a file or with a level set, without errors."""
         seconds: Seconds = {}
         with timed(seconds, "mesh"):
             problem, named = self.mesh_problem(law, phases)
         loads, stiffness = THREE_LOADS, [phase.stiffness for phase in named.phases]
         strains, solved = self._solve_system(problem, stiffness, loads, seconds)
-        stress = strains.stress(stiffness)
-        stiffness_at_nodes = stress @ np.linalg.inv(loads).T
-        curve = StressCurve(
-            strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], stiffness_at_nodes
-        )
         checks = _checks(strains, stiffness, loads, named.phases) | {"residual": solved.residual}
-        energies, order = energies_of(strains, named.phases, loads), [*named.order]
+        energies = energies_of(strains, named.phases, loads)
+        order = list(named.order)  # of the user
         return HomogenisedStiffness(
-            curve,
+            _stress_curve(strains, stiffness, loads),
             self.name,
             str(self.options),
             unknowns=problem.numbering.size,
@@ -200,7 +197,7 @@ class PrismModel:
         )
 
     def mesh_problem(self, law: object, phases: object) -> tuple[PrismProblem, NamedPhases]:
-        """The problem on a mesh from a file with its law and its phases; kept for the next ones.
+        """Problem on the mesh of a file or with a level set, and its law and phases; cached.
 
         Raises:
             MeshError: The file holds no cell of prisms.
@@ -208,19 +205,19 @@ class PrismModel:
         """
         if self.level_set is None:
             problem = own_mesh_problem(self.mesh, self.parallel)
-            named = require_own_mesh(problem.form.grid, law, phases)
+            named = mesh_phases(problem.form.grid, law, phases)
         else:
-            named = require_level_set(self.level_set, law, phases)
+            named = level_set_phases(self.level_set, law, phases)
             mesh = (self.mesh_size, 0.0, circle, REFINEMENTS[0], self.layers, self.parallel)
-            problem = _problem(*mesh, 0.0)
+            problem = _cached_problem(*mesh, 0.0)
         problem.move(named.law)
         return problem, named
 
     def problem(self, radius_map: RadiusMap, thickness: float = 0.0) -> PrismProblem:
-        """The mesh and the form, moved to a map; kept for the next map.
+        """Mesh and form for a radius map; cached, so that the next map moves the same mesh.
 
         Args:
-            radius_map: The map.
+            radius_map: Radius of the particle over θ.
             thickness: Of the interphase, 0 for none.
 
         Raises:
@@ -242,7 +239,7 @@ class PrismModel:
     ) -> PrismProblem:
         """Problem on the mesh of a reference radius, with its nodes moved to a map."""
         mesh = (self.mesh_size, radius, self.outline, refinement, self.layers, self.parallel)
-        problem = _problem(*mesh, RING_THICKNESS if thickness else 0.0)
+        problem = _cached_problem(*mesh, RING_THICKNESS if thickness else 0.0)
         problem.move(radius_map, thickness)
         return problem
 
@@ -252,16 +249,19 @@ class PrismModel:
         return SolverOptions(self.petsc)
 
     def loads(self, cell: Cell) -> Array:
-        """Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15).
+        """Macroscopic strains (ε11, ε22, 2 ε12), shape (loads, 3) (eq. 15): two or three.
 
-        Two tell all moduli of a cell with the symmetry of the square, of others three.
+        Two give E and ν of a cell with the symmetry of the square; others need three.
         """
         return LOADS if cell.square and not self.stiffness else THREE_LOADS
 
     def _basis(
         self, problem: PrismProblem, matrix: AnyPhase, inclusions: Sequence[AnyPhase]
     ) -> ModulusBasis | None:
-        """Solutions to project the samples on; None where each is to be solved."""
+        """Solutions on which the samples of a map can be projected; None if each must be solved.
+
+        Samples may differ only in the modulus of isotropic inclusions, within `self.moduli`.
+        """
         if not (isinstance(matrix, Phase) and self.moduli and self.interface == "conforming"):
             return None
         phases = [phase for phase in inclusions if isinstance(phase, Phase)]
@@ -269,8 +269,8 @@ class PrismModel:
         if len(phases) < len(inclusions) or len(ratios) > 1 or self.petsc:
             return None
         low, high = self.moduli
-        within = low * (1 - ROUND_OFF) <= min(moduli) <= max(moduli) <= high * (1 + ROUND_OFF)
-        if low == high or not within:
+        is_within = low * (1 - ROUND_OFF) <= min(moduli) and max(moduli) <= high * (1 + ROUND_OFF)
+        if low == high or not is_within:
             return None
         cell = Cell(matrix, inclusions[0], problem.map, self.outline)
         basis = modulus_basis(problem, matrix, ratios.pop(), self.moduli, self.loads(cell))
@@ -283,41 +283,41 @@ class PrismModel:
         strains: Array,
         seconds: Seconds,
     ) -> tuple[SliceStrains, Solutions]:
-        """Slice means of the strains and fluctuations under macroscopic strains (loads, 3)."""
+        """Solve for macroscopic strains, shape (loads, 3): mean strains of slices, and solutions.
+
+        Wall times are added to those of the stages in `seconds`.
+        """
         with timed(seconds, "assemble"):
             problem.assemble(stiffness)
             loads = problem.loads(strains)
-        if all(np.array_equal(matrix, stiffness[0]) for matrix in stiffness):
-            # the affine field is the solution
-            solved = Solutions([load.duplicate() for load in loads], (0,) * len(loads), 0.0)
+        is_homogeneous = all(np.array_equal(phase, stiffness[0]) for phase in stiffness)
+        if is_homogeneous:  # without fluctuation
+            zeros = [load.duplicate() for load in loads]
+            solutions = Solutions(zeros, iterations=(0,) * len(loads), residual=0.0)
         else:
             with timed(seconds, "setup"):
                 ksp = problem.solver(self.options)
             with timed(seconds, "solve"):
-                solved = solve(ksp, loads)
+                solutions = solve(ksp, loads)
         with timed(seconds, "solve"):
-            fluctuations = [problem.field(vector) for vector in solved.vectors]
+            fluctuations = [problem.field(vector) for vector in solutions.vectors]
             means = problem.slice_strains(list(zip(strains, fluctuations, strict=True)))
-        return means, solved
+        return means, solutions
 
     def _result(self, strains: SliceStrains, cell: Cell, residual: float) -> HomogenisedStiffness:
-        """Homogenised stiffness of solved slice means, with declared errors, checked.
+        """Homogenised stiffness from mean strains of slices, with declared errors and checks.
 
         Args:
-            strains: Slice means under `loads(cell)`.
+            strains: Of the slices, under `loads(cell)`.
             cell: The cell solved.
             residual: Relative residual of the linear system.
 
         Raises:
             CertificateError: A check is violated by more than twice the declared error.
         """
-        stress, loads = strains.stress(cell.stiffness), self.loads(cell)
-        stiffness_at_nodes = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
-        curve = StressCurve(
-            strains.theta, strains.weights, stress[:, 0, 0], stress[:, 2, 1], stiffness_at_nodes
-        )
+        loads = self.loads(cell)
         result = HomogenisedStiffness(
-            curve,
+            _stress_curve(strains, cell.stiffness, loads),
             self.name,
             str(self.options),
             cell=cell,
@@ -342,6 +342,15 @@ def energies_of(strains: SliceStrains, phases: Sequence[AnyPhase], loads: Array)
     return PhaseEnergies(values, np.full(values.shape, np.nan))
 
 
+def _stress_curve(strains: SliceStrains, stiffness: Sequence[Array], loads: Array) -> StressCurve:
+    """Homogenised stress at each θ, with the stiffness if there are three loads."""
+    stress = strains.stress(stiffness)
+    by_theta = stress @ np.linalg.inv(loads).T if len(loads) == 3 else None
+    return StressCurve(
+        strains.theta, strains.weights, s11=stress[:, 0, 0], s12=stress[:, 2, 1], stiffness=by_theta
+    )
+
+
 def _checks(
     strains: SliceStrains,
     stiffness: Sequence[Array],
@@ -359,7 +368,7 @@ def _checks(
 
 @contextmanager
 def timed(seconds: Seconds, stage: str) -> Iterator[None]:
-    """Add the wall time of the block to that of a stage."""
+    """Context that adds its wall time to that of a stage in `seconds`."""
     started = perf_counter()
     try:
         yield
@@ -368,7 +377,7 @@ def timed(seconds: Seconds, stage: str) -> Iterator[None]:
 
 
 @lru_cache(maxsize=2)
-def _problem(
+def _cached_problem(
     size: float,
     radius: float,
     outline: Outline,
@@ -377,7 +386,7 @@ def _problem(
     parallel: bool,
     thickness: float,
 ) -> PrismProblem:
-    """Mesh, form and numbering: they do not depend on the map, only on these."""
+    """Mesh, form and numbering for any map with this reference radius; see `extrude`."""
     comm = MPI.COMM_WORLD if parallel else MPI.COMM_SELF
     grid = extrude(
         size=size,

@@ -19,11 +19,11 @@ from alphacut.rve.solver.krylov import solve
 from alphacut.rve.solver.options import SolverOptions
 
 TOLERANCE = 2e-10  # of the energy that is left out; E is off by half of it at most
-_CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)
+_CHEBYSHEV = (0.5 - 0.125**0.5, 0.5 + 0.125**0.5)  # nodes in [0, 1]
 _SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
-_PHASES = slice(0, 1), slice(1, 2)  # parts of the mesh
-_LOOSE = SolverOptions(overrides={"ksp_rtol": "1e-6"})  # its square is what a modulus is off by
-ROUND_OFF = 1e-9  # of a solution that the others carry already
+_MATRIX_AND_PARTICLE = slice(0, 1), slice(1, 2)  # parts of the mesh
+_LOOSE = SolverOptions(overrides={"ksp_rtol": "1e-6"})  # the error of a modulus is its square
+ROUND_OFF = 1e-9  # relative norm of what is new in a solution, below which it is left out
 
 
 @dataclass(frozen=True)
@@ -62,82 +62,90 @@ class ModulusBasis:
 def modulus_basis(
     problem: PrismProblem, matrix: Phase, poisson: float, ends: tuple[float, float], strains: Array
 ) -> ModulusBasis:
-    """The basis of the map that the problem was moved to.
+    """Reduced basis of the solutions at two Chebyshev moduli of the particle, with its error.
 
     Args:
-        problem: Mesh and form.
+        problem: Mesh and form, moved to a map.
         matrix: Phase outside the particle.
         poisson: Of the particle.
-        ends: Least and greatest modulus of the particle, in Pa, apart.
+        ends: Least and greatest modulus of the particle, in Pa, not equal.
         strains: Macroscopic strains, shape (loads, 3).
 
     Raises:
         ConvergenceError: A linear solve stopped early.
     """
-    phases = matrix.stiffness, Phase(ends[1], poisson).stiffness
-    systems = [problem.assemble(phases, phase).copy() for phase in _PHASES]
-    forces = [problem.loads(strains, phase) for phase in _PHASES]
+    low, high = ends
+    phases = matrix.stiffness, Phase(high, poisson).stiffness
+    systems = [problem.assemble(phases, part).copy() for part in _MATRIX_AND_PARTICLE]
+    forces = [problem.loads(strains, part) for part in _MATRIX_AND_PARTICLE]
     ksp, solved = None, []
-    for share in _CHEBYSHEV:
-        part = (ends[0] + share * (ends[1] - ends[0])) / ends[1]
+    for node in _CHEBYSHEV:
+        factor = (low + node * (high - low)) / high
         systems[0].copy(problem.matrix, _SAME)
-        problem.matrix.axpy(part, systems[1], _SAME)
+        problem.matrix.axpy(factor, systems[1], _SAME)
         ksp = ksp or problem.solver(_LOOSE)  # its factors serve both
-        loads = [_sum(first, second, part) for first, second in zip(*forces, strict=True)]
+        loads = [_scaled_sum(f0, f1, factor) for f0, f1 in zip(*forces, strict=True)]
         solved.append(solve(ksp, loads))
     assert ksp is not None
-    vectors = _orthonormal([v for solutions in solved for v in solutions.vectors])
+    vectors = _orthonormal_basis([v for solutions in solved for v in solutions.vectors])
     images = [[system * v for v in vectors] for system in systems]
-    stiffness, projected = (
-        np.array([[[v.dot(w) for w in side] for v in vectors] for side in sides])
-        for sides in (images, forces)
-    )
-    none: Array = np.zeros(3)
+    stiffness = np.array([[[v.dot(w) for w in image] for v in vectors] for image in images])
+    projected_loads = np.array([[[v.dot(f) for f in force] for v in vectors] for force in forces])
+    no_strain: Array = np.zeros(3)
     means = problem.slice_strains(
-        [(strain, None) for strain in strains] + [(none, problem.field(v)) for v in vectors]
+        [(strain, None) for strain in strains] + [(no_strain, problem.field(v)) for v in vectors]
     )
     iterations = sum((solutions.iterations for solutions in solved), ())
-    basis = ModulusBasis(stiffness, projected, means, iterations, ends)
-    scale = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
-    # half-way it is as large as at the ends or less: the nodes are those of Chebyshev
-    left = [_left_out(basis, modulus, images, forces, ksp.pc) for modulus in ends]
-    return replace(basis, error=float((np.array(left) / scale).max()))
+    basis = ModulusBasis(stiffness, projected_loads, means, iterations, ends)
+    affine_energy = AREA * np.einsum("li,ij,lj->l", strains, matrix.stiffness, strains)
+    # the error is largest at the ends of the range, since the nodes are those of Chebyshev
+    errors = [_residual_energy(basis, modulus, images, forces, ksp.pc) for modulus in ends]
+    return replace(basis, error=float((np.array(errors) / affine_energy).max()))
 
 
-def _left_out(
+def _residual_energy(
     basis: ModulusBasis,
     modulus: float,
     images: list[list[PETSc.Vec]],
     forces: list[list[PETSc.Vec]],
     preconditioner: PETSc.PC,
 ) -> Array:
-    """Energy of the residual at a modulus, by the preconditioner, shape (loads,)."""
-    part, energies = modulus / basis.ends[1], []
+    """Energy rᵀ P⁻¹ r of the residual of projected solutions at a modulus in Pa, shape (loads,).
+
+    Args:
+        basis: The reduced basis.
+        modulus: Of the particle.
+        images: K_0 v and K_1 v of the basis vectors.
+        forces: f_0 and f_1 of the loads.
+        preconditioner: P⁻¹.
+    """
+    factor, energies = modulus / basis.ends[1], []
     for k, column in enumerate(basis.coefficients(modulus).T):
-        residual = _sum(forces[0][k], forces[1][k], part)
-        shares = np.concatenate([-column, -part * column])
-        residual.maxpy(shares.tolist(), images[0] + images[1])
-        answer = residual.duplicate()
-        preconditioner.apply(residual, answer)
-        energies.append(residual.dot(answer))
+        residual = _scaled_sum(forces[0][k], forces[1][k], factor)
+        coefficients = np.concatenate([-column, -factor * column])
+        residual.maxpy(coefficients.tolist(), images[0] + images[1])
+        preconditioned = residual.duplicate()
+        preconditioner.apply(residual, preconditioned)
+        energies.append(residual.dot(preconditioned))
     return np.array(energies)
 
 
-def _sum(matrix: PETSc.Vec, particle: PETSc.Vec, part: float) -> PETSc.Vec:
-    """The load with the particle's scaled."""
+def _scaled_sum(matrix: PETSc.Vec, particle: PETSc.Vec, factor: float) -> PETSc.Vec:
+    """The load f_0 + factor · f_1."""
     total = matrix.copy()
-    total.axpy(part, particle)
+    total.axpy(factor, particle)
     return total
 
 
-def _orthonormal(vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
-    """Vectors of the same span, without those that others carry (Gram and Schmidt, twice)."""
+def _orthonormal_basis(vectors: list[PETSc.Vec]) -> list[PETSc.Vec]:
+    """Orthonormal vectors of the same span by the Gram–Schmidt process, done twice for rounding."""
     basis: list[PETSc.Vec] = []
     for vector in vectors:
         size = vector.norm()
         for direction in [*basis, *basis]:
             vector.axpy(-vector.dot(direction), direction)
-        if vector.norm() > ROUND_OFF * size:
+        is_new = vector.norm() > ROUND_OFF * size
+        if is_new:
             vector.normalize()
             basis.append(vector)
     return basis

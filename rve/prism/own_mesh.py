@@ -40,38 +40,39 @@ class NamedPhases:
     order: tuple[int, ...]
 
 
-def require_own_mesh(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
-    """Refuse a law of another support, and materials that are not those of the physical groups.
+def mesh_phases(grid: PrismGrid, law: object, phases: object) -> NamedPhases:
+    """Law and materials of a mesh from a file, in its order of phases.
 
     Raises:
-        RefusedError: One does not fit.
+        RefusedError: The law has another support, or the materials' names are not those of the
+            physical groups.
     """
-    return _in_order(require_law(grid, law), grid.names, phases)
+    return _order_phases(mesh_law(grid, law), grid.names, phases)
 
 
-def require_level_set(z: LevelFunction, law: object, phases: object) -> NamedPhases:
-    """Refuse what is no law, and materials that are not those of matrix and particles.
+def level_set_phases(z: LevelFunction, law: object, phases: object) -> NamedPhases:
+    """Law and materials of a cell with a level set z < 0 in the particles, matrix first.
 
     Raises:
-        RefusedError: One does not fit.
+        RefusedError: The law is none, or the materials' names are not "matrix" and "inclusion".
     """
     if not hasattr(law, "pdf"):
         raise RefusedError("law of θ", type(law).__name__, "a law, as TruncatedNormal(-3, 3)")
-    return _in_order(LevelSet(cast("ThetaLaw", law), z), NAMES[:2], phases)
+    return _order_phases(LevelSet(cast("ThetaLaw", law), z), NAMES[:2], phases)
 
 
-def _in_order(law: FixedCell, names: Sequence[str], phases: object) -> NamedPhases:
-    """Materials in the order of the mesh, whose phases have these names."""
-    named = require_phases(names, phases)
+def _order_phases(law: FixedCell, names: Sequence[str], phases: object) -> NamedPhases:
+    """Materials in the order of `names`, those of the mesh, checked."""
+    named = _checked_phases(names, phases)
     order = tuple(names.index(name) for name in named)
     return NamedPhases(law, tuple(named[name] for name in names), order)
 
 
-def require_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhase]:
-    """Refuse materials that are not those of the phases of a mesh.
+def _checked_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhase]:
+    """The materials by name, if they are one for each name of the phases of a mesh.
 
     Raises:
-        RefusedError: One is missing or has another name.
+        RefusedError: One is missing, has another name, or is no material.
     """
     listed = ", ".join(names)
     if not isinstance(phases, Mapping):
@@ -87,29 +88,31 @@ def require_phases(names: Sequence[str], phases: object) -> Mapping[str, AnyPhas
     return phases
 
 
-def require_law(grid: PrismGrid, law: object) -> FixedCell:
-    """Refuse a law of another support than the levels of the mesh.
+def mesh_law(grid: PrismGrid, law: object) -> FixedCell:
+    """The law of θ for a mesh from a file, whose levels span its support.
 
     Raises:
-        RefusedError: It is one, or no law.
+        RefusedError: It has another support, or is no law.
     """
     assert grid.fixed is not None
     theta = grid.fixed[:, 2]
-    ends = np.array([theta.min(), theta.max()])
-    support = np.array([getattr(law, end, np.nan) for end in ("lower", "upper")])
-    if not abs(support - ends).max() <= SAME_LEVEL * np.ptp(ends) or not hasattr(law, "pdf"):
-        value = f"on {support[0]:g} … {support[1]:g}"
-        allowed = f"laws on {ends[0]:g} … {ends[1]:g}, the lowest and the highest level of the mesh"
+    low, high = theta.min(), theta.max()
+    lower, upper = getattr(law, "lower", np.nan), getattr(law, "upper", np.nan)
+    tolerance = SAME_LEVEL * (high - low)
+    is_same = abs(lower - low) <= tolerance and abs(upper - high) <= tolerance
+    if not is_same or not hasattr(law, "pdf"):
+        value = f"on {lower:g} … {upper:g}"
+        allowed = f"laws on {low:g} … {high:g}, the lowest and the highest level of the mesh"
         raise RefusedError("law of θ", value, allowed)
     return FixedCell(cast("ThetaLaw", law))
 
 
 def own_mesh_problem(path: Path | str, parallel: bool) -> PrismProblem:
-    """Problem on the user's mesh, cached for the next materials.
+    """Problem on the mesh of a Gmsh file; cached as long as the file does not change.
 
     Raises:
         RefusedError: There is no such file, or it is none of Gmsh.
-        MeshError: It is no cell of prisms.
+        MeshError: Its elements are no prisms that fill a periodic cell.
     """
     path = Path(path)
     if not path.is_file():

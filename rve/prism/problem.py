@@ -12,7 +12,7 @@ from alphacut.rve.cell import AREA
 from alphacut.rve.fenicsx import MPI, PETSc, fem, petsc
 from alphacut.rve.form import ALL_PARTS
 from alphacut.rve.mesh.prism_grid import PrismGrid
-from alphacut.rve.mesh.wedge import POINTS, SLICES
+from alphacut.rve.mesh.wedge import POINTS_PER_SLICE, SLICES_PER_LAYER
 from alphacut.rve.prism.form import PrismForm
 from alphacut.rve.solver.krylov import krylov_solver
 from alphacut.rve.solver.numbering import (
@@ -98,10 +98,10 @@ class PrismProblem:
         self._to_nodes = NodeScatter(pairs[self.form.node], self.matrix.createVecRight())
 
     def move(self, radius_map: RadiusMap, thickness: float = 0.0) -> None:
-        """Move the nodes to the cone of a map and mark the particle (eq. 13, 14).
+        """Move the nodes to the interface r(θ) of a map and mark the particle (eq. 13, 14).
 
         Args:
-            radius_map: The map.
+            radius_map: Radius of the particle over θ.
             thickness: Of the interphase, of a grid that has one.
 
         Raises:
@@ -112,7 +112,7 @@ class PrismProblem:
         self.form.move_to(radius_map, thickness)
 
     def assemble(self, stiffness: Sequence[Array], parts: slice = ALL_PARTS) -> PETSc.Mat:
-        """The reduced stiffness of eq. 7 for the phases' Voigt matrices, in Pa.
+        """Assemble the reduced stiffness of eq. 7 into `self.matrix`, which is returned.
 
         Args:
             stiffness: Of the phases in the order of the grid, (3, 3) each.
@@ -130,11 +130,11 @@ class PrismProblem:
         return [reduced_vector(force, self.local_map, num_rows, size) for force in forces]
 
     def solver(self, options: SolverOptions, matrix: PETSc.Mat | None = None) -> PETSc.KSP:
-        """The solver of the stiffness as assembled, or of another symmetric operator.
+        """PETSc solver of the assembled stiffness, or of another symmetric operator.
 
         Args:
             options: PETSc options.
-            matrix: Reduced operator, as of `assemble_operator`.
+            matrix: Reduced operator from `assemble_operator`.
         """
         operator = self.matrix if matrix is None else matrix
         return krylov_solver(operator, self.numbering, self.map.distribution, options)
@@ -158,26 +158,26 @@ class PrismProblem:
         return self._to_nodes(vector)
 
     def slice_strains(self, fields: Sequence[tuple[Array, Array | None]]) -> SliceStrains:
-        """Mean strains of fields, each a macroscopic strain (3,) and a fluctuation (nodes, 2).
+        """Mean strains of slices by phase, area fractions and mean products, summed over ranks.
 
-        None is a fluctuation of zero.
+        Args:
+            fields: Macroscopic strain (3,) and fluctuation (nodes, 2) of each; None is no
+                fluctuation.
         """
-        form = self.form
-        strain = np.empty((len(form.wedge), SLICES, POINTS, 3, len(fields)))
+        form, count = self.form, len(fields)
+        strain = np.empty((len(form.wedge), SLICES_PER_LAYER, POINTS_PER_SLICE, 3, count))
         for k, (uniform, u) in enumerate(fields):
             strain[..., k] = uniform if u is None else form.strains(u) + uniform
-        parts = form.phase_areas() / AREA  # (phases, cells, 3, points)
-        sums = np.einsum("pmsq,msqif->pmsif", parts, strain)
-        means = np.stack([form.by_layer(values) for values in sums])
-        fractions = np.array([form.by_layer(areas.sum(axis=-1)) for areas in parts])
-        theta, weights = form.slices()
-        weight = form.of_slices(weights)[None, :, :, None] * parts
-        flat = strain.reshape(-1, 3 * len(fields))
-        products = np.array([flat.T @ (factors.reshape(-1, 1) * flat) for factors in weight])
-        means, fractions, products = (
-            self.comm.allreduce(total) for total in (means, fractions, products)
-        )
-        phases, count = len(parts), len(fields)
+        areas = form.phase_areas() / AREA  # (phases, cells, 3, points)
+        prism_means = np.einsum("pmsq,msqif->pmsif", areas, strain)
+        means = np.stack([form.sum_by_layer(phase_means) for phase_means in prism_means])
+        fractions = np.stack([form.sum_by_layer(phase.sum(axis=-1)) for phase in areas])
+        theta, weights = form.slice_rule()
+        point_weights = form.at_prisms(weights)[None, :, :, None] * areas
+        flat = strain.reshape(-1, 3 * count)
+        products = np.array([flat.T @ (phase.reshape(-1, 1) * flat) for phase in point_weights])
+        means, fractions, products = map(self.comm.allreduce, (means, fractions, products))
+        phases = len(areas)
         return SliceStrains(
             theta=theta,
             weights=weights,

@@ -15,7 +15,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve.fenicsx import PETSc, compiled, fem, ufl
 from alphacut.rve.form import strain
 from alphacut.rve.prism.model import PrismModel
-from alphacut.rve.prism.own_mesh import own_mesh_problem, require_law
+from alphacut.rve.prism.own_mesh import mesh_law, own_mesh_problem
 from alphacut.rve.prism.problem import PrismProblem
 from alphacut.rve.solver.krylov import Solutions, solve
 from alphacut.rve.solver.options import SolverOptions
@@ -105,7 +105,7 @@ class ProductSpace:
         loads: Sequence[PETSc.Vec],
         petsc_options: Mapping[str, str] | None = None,
     ) -> Solutions:
-        """Solutions of A x = b by conjugate gradients with the θ-preconditioner.
+        """Solve A x = b for each load, by default by conjugate gradients preconditioned along θ.
 
         Args:
             matrix: From `assemble_matrix`, symmetric positive definite.
@@ -128,35 +128,34 @@ class ProductSpace:
 
 
 def _separate_problem(model: PrismModel, law: RadiusMap | ThetaLaw) -> PrismProblem:
-    """A problem that the model does not move to its next map, as it does those that it keeps."""
+    """New problem for a map or law; the cached ones of the model would move to its next map."""
     if model.mesh:
-        shared = own_mesh_problem(model.mesh, model.parallel)
-        radius: RadiusMap = require_law(shared.form.grid, law)
+        cached = own_mesh_problem(model.mesh, model.parallel)
+        radius: RadiusMap = mesh_law(cached.form.grid, law)
     else:
-        shared = model.problem(cast("RadiusMap", law))
-        radius = shared.map
-    problem = PrismProblem(shared.form.grid, shared.comm)
+        cached = model.problem(cast("RadiusMap", law))
+        radius = cached.map
+    problem = PrismProblem(cached.form.grid, cached.comm)
     problem.move(radius)
     return problem
 
 
 def require_symmetric(matrix: PETSc.Mat) -> None:
-    """Refuse a matrix for which conjugate gradients would give a wrong answer in silence.
+    """Refuse a matrix A that is not symmetric, for which conjugate gradients would be wrong.
 
     Raises:
-        RefusedError: A x and Aᵀ x differ for a vector x of random signs and sizes.
+        RefusedError: A x and Aᵀ x differ for a random vector x.
     """
     x, product = matrix.createVecs()
-    transposed = x.duplicate()
+    difference = x.duplicate()
     x.array[:] = np.random.default_rng(x.owner_range[0]).standard_normal(x.local_size)
     matrix.mult(x, product)
-    matrix.multTranspose(x, transposed)
-    size = product.norm()
-    transposed.axpy(-1, product)
-    gap = transposed.norm() / (size or 1.0)
-    if not gap <= ASYMMETRY:
+    matrix.multTranspose(x, difference)
+    difference.axpy(-1, product)
+    asymmetry = difference.norm() / (product.norm() or 1.0)
+    if not asymmetry <= ASYMMETRY:
         allowed = "symmetric operators"
         cure = (
             "use a Krylov method of PETSc for others, with `preconditioner` of the symmetric part"
         )
-        raise RefusedError("asymmetry of the matrix", f"{gap:.1e}", allowed, cure)
+        raise RefusedError("asymmetry of the matrix", f"{asymmetry:.1e}", allowed, cure)

@@ -12,7 +12,7 @@ from alphacut.rve.cell import Phase
 from alphacut.rve.phase_energies import STEP, PhaseEnergies
 from alphacut.rve.series.means import Mean, finer_count
 from alphacut.rve.series.multipoles import LOADS, Contrast, modulus, multipoles
-from alphacut.stochastic import RadiusMap, gauss_rule
+from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 SAFETY, NOISE = 1.6, 1e-12
 
@@ -35,13 +35,18 @@ def complex_moduli(radius: Array, bulk: Array, shear: Array, *, harmonics: int) 
 
 
 def phase_energies(radius: Array, matrix: Phase, inclusion: Phase, *, harmonics: int) -> Array:
-    """X ∂c/∂X of the three moduli for K and G of both phases, shape (n, 2, 2, 3), in Pa."""
+    """Parts X ∂c/∂X of K and G of both phases in the moduli c of n cells, by a complex step.
+
+    Returns:
+        For C11 + C12, C11 − C12 and C33, shape (n, 2 phases, 2, 3), in Pa.
+    """
     moduli = np.array([matrix.bulk_and_shear, inclusion.bulk_and_shear], complex)
     energies = np.zeros((radius.size, 2, 2, 3))
     for phase, kind in product(range(2), repeat=2):
-        moved = moduli.copy()
-        moved[phase, kind] *= 1 + 1j * STEP
-        values = complex_moduli(radius, *moved.T, harmonics=harmonics)[:, 0]
+        stepped = moduli.copy()
+        stepped[phase, kind] *= 1 + 1j * STEP
+        bulk, shear = stepped.T
+        values = complex_moduli(radius, bulk, shear, harmonics=harmonics)[:, 0]
         energies[:, phase, kind] = values.imag / STEP
     return energies
 
@@ -49,7 +54,7 @@ def phase_energies(radius: Array, matrix: Phase, inclusion: Phase, *, harmonics:
 def mean_energies(
     radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], means: Sequence[Mean]
 ) -> list[PhaseEnergies]:
-    """Energies of means over θ, one for each inclusion."""
+    """Mean parts of the phases in the strain energy over θ, for each inclusion."""
     return [
         _energies_of_mean(radius_map, matrix, inclusion, mean)
         for inclusion, mean in zip(inclusions, means, strict=True)
@@ -59,17 +64,17 @@ def mean_energies(
 def _energies_of_mean(
     radius_map: RadiusMap, matrix: Phase, inclusion: Phase, mean: Mean
 ) -> PhaseEnergies:
-    """Energies of one inclusion; the farther of two finer means tells the error, as of moduli."""
-    nodes, terms, law = mean.curve.theta.size, mean.terms, radius_map.distribution
-    levels: list[tuple[Array, Array, int]] = [(mean.curve.theta, mean.curve.weights, terms)]
+    """Mean energies of the phases with one inclusion; error: distance from two finer means."""
+
+    def mean_at(rule: ThetaRule, terms: int) -> Array:
+        radii = radius_map(rule.nodes)
+        return rule.mean(phase_energies(radii, matrix, inclusion, harmonics=terms))
+
+    rule, terms = ThetaRule(mean.curve.theta, mean.curve.weights), mean.terms
+    values, distances = mean_at(rule, terms), []
     for _ in range(2):
-        nodes, terms = finer_count(nodes), terms + max(2, terms // 2)
-        rule = gauss_rule(law, points=nodes)
-        levels.append((rule.nodes, rule.weights, terms))
-    values, *finer = (
-        weights @ phase_energies(radius_map(theta), matrix, inclusion, harmonics=n).reshape(-1, 12)
-        for theta, weights, n in levels
-    )
-    values, distance = values.reshape(2, 2, 3), np.max([abs(values - x) for x in finer], axis=0)
-    errors = SAFETY * distance.reshape(2, 2, 3) + NOISE * values.sum(axis=(0, 1))
+        rule = gauss_rule(radius_map.distribution, points=finer_count(rule.nodes.size))
+        terms += max(2, terms // 2)
+        distances.append(abs(values - mean_at(rule, terms)))
+    errors = SAFETY * np.max(distances, axis=0) + NOISE * values.sum(axis=(0, 1))
     return PhaseEnergies(values, errors)

@@ -37,17 +37,23 @@ class LatticeSums:
 
     @cached_property
     def natanzon_period(self) -> float:
-        """Constant g of Q(z + P) − Q(z) = conj(P) ℘(z) + g P, from z = −1, P = 2."""
+        """Constant g in Natanzon's Q(z + P) − Q(z) = conj(P) ℘(z) + g P with Weierstrass' ℘.
+
+        From z = −1 and P = 2, where Q is odd and ℘ even.
+        """
         n = np.arange(2, len(self.plain))
         half = 0.5**n
-        natanzon = np.sum((n - 1) * 2 * half * self.conjugate[2:])  # Q(1)
-        weierstrass = 1 + np.sum((n - 1) * half * self.plain[2:])  # ℘(1)
-        return float(natanzon - weierstrass)
+        Q_at_1 = np.sum((n - 1) * 2 * half * self.conjugate[2:])
+        weierstrass_at_1 = 1 + np.sum((n - 1) * half * self.plain[2:])
+        return float(Q_at_1 - weierstrass_at_1)
 
 
 @cache
 def lattice_sums(highest: int) -> LatticeSums:
-    """Both families up to exponent `highest` ≥ 60, to round-off."""
+    """Sums Σ p^-n and Σ conj(p) p^-n over p = m + i j ≠ 0 for n ≤ `highest`, from 60 on.
+
+    By series that converge fast for n < 40, by the points near the origin for others.
+    """
     plain, conjugate = np.zeros(highest + 1), np.zeros(highest + 1)
     for n in range(4, highest + 1, 4):
         # Σ p^-n by Riemann's ζ and Lipschitz' formula
@@ -59,12 +65,10 @@ def lattice_sums(highest: int) -> LatticeSums:
 
 
 def lattice_images(sums: LatticeSums, k: Rows, n: Rows) -> Array:
-    """Taylor coefficient k of Σ' (z − P)^-n for odd n, shape (len(k), len(n))."""
+    """Taylor coefficients k of Σ (z − P)^-n over all images P ≠ 0, odd n, (len(k), len(n))."""
     k, n = k[:, None], n[None, :]
-    halved = np.exp(
-        gammaln(n + k) - gammaln(n) - gammaln(k + 1) - (n + k) * np.log(2)
-    )  # binomial over 2^(n + k)
-    return np.asarray(-halved * sums.plain[n + k])
+    log_binomial = gammaln(n + k) - gammaln(n) - gammaln(k + 1)
+    return np.asarray(-np.exp(log_binomial - (n + k) * np.log(2)) * sums.plain[n + k])  # P = 2p
 
 
 def _lipschitz(n: int, power: int) -> float:
@@ -75,8 +79,8 @@ def _lipschitz(n: int, power: int) -> float:
 
 
 def _near_points(n: int, *, conjugate: bool) -> float:
-    """Direct sum over |m|, |j| ≤ 8; the rest is below round-off, later all but |p| = 1."""
-    if n >= _UNIT_POINTS:
+    """Σ p^-n, or Σ conj(p) p^-n, for large n over the lattice points with |m|, |j| ≤ 8."""
+    if n >= _UNIT_POINTS:  # only the four points with |p| = 1 count
         return 4.0
     m = np.arange(-8.0, 9.0)
     p = (m[:, None] + 1j * m).ravel()

@@ -20,7 +20,7 @@ _SAFETY = 1.6
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 
 
-_kept_rule = lru_cache(maxsize=256)(gauss_rule)
+_cached_rule = lru_cache(maxsize=256)(gauss_rule)
 
 
 class RuleError(FailedError):
@@ -60,31 +60,31 @@ class _Averages:
         return self.rule.mean(self.cells.moduli * self.cells.errors) / self.moduli
 
 
-def settled_means(
+def converged_means(
     radius_map: RadiusMap,
     cells: Callable[[Array], CellModuli],
     *,
     points: int | None,
     accuracy: float,
 ) -> list[Mean]:
-    """Each inclusion's mean, whose nodes are added until the mean moduli settle.
+    """Means over θ for each inclusion, by Gauss rules refined until the mean moduli converge.
 
-    Two finer rules tell how large the error of a rule is: its distance from them, with a margin.
+    The declared error of a rule is its distance from two finer rules, times a safety factor.
 
     Args:
-        radius_map: The map.
-        cells: Moduli at n radii for m inclusions; cheap.
-        points: Nodes, or None for as many as settle.
-        accuracy: Relative error of every mean modulus that counts as settled.
+        radius_map: Radius of the particle over θ.
+        cells: Moduli at n radii for m inclusions.
+        points: Nodes of the rule, or None for as many as the accuracy asks.
+        accuracy: Relative error allowed for every mean modulus.
 
     Raises:
-        RuleError: No rule in reach settles.
+        RuleError: No rule of up to `_MOST_POINTS` nodes converges.
         RefusedError: The map jumps, or gives radii outside (0, 1), or its law of θ is none.
     """
     require_continuous(radius_map)
     count = points or max(6, int(np.ceil(1 - 0.75 * np.log10(accuracy))))
     law = radius_map.distribution
-    make_rule: Callable[..., ThetaRule] = _kept_rule if isinstance(law, Hashable) else gauss_rule
+    make_rule: Callable[..., ThetaRule] = _cached_rule if isinstance(law, Hashable) else gauss_rule
     averages: dict[int, _Averages] = {}
     means: dict[int, Mean] = {}
     while True:
@@ -94,28 +94,29 @@ def settled_means(
                 rule = make_rule(law, points=n)
                 averages[n] = _Averages(rule, cells(radius_map(rule.nodes)))
         coarse, finer, finest = (averages[n] for n in counts)
-        left = _SAFETY * error_by_more_terms(coarse.moduli, finer.moduli, finest.moduli) + _NOISE
-        for k in range(len(left)):
-            if k not in means and (points or left[k].max() <= accuracy):
-                # each inclusion by itself, whatever its companions need
-                means[k] = _mean(coarse, finest, left[k], k)
-        if len(means) == len(left):
-            return [means[k] for k in range(len(left))]
+        distance = error_by_more_terms(coarse.moduli, finer.moduli, finest.moduli)
+        errors = _SAFETY * distance + _NOISE
+        for k in range(len(errors)):
+            if k not in means and (points or errors[k].max() <= accuracy):
+                # each inclusion by itself, whatever the others need
+                means[k] = _mean_of_inclusion(k, coarse, finest, errors[k])
+        if len(means) == len(errors):
+            return [means[k] for k in range(len(errors))]
         if counts[-1] >= _MOST_POINTS:
             raise RuleError(
-                f"the rule of {count} nodes in θ leaves a relative error of {left.max():.1e};"
+                f"the rule of {count} nodes in θ leaves a relative error of {errors.max():.1e};"
                 f" {accuracy:.1e} is allowed: the radius map is not smooth",
                 "allow a larger error, or give the number of nodes",
             )
         count = counts[1]
 
 
-def _mean(result: _Averages, judge: _Averages, in_theta: Array, k: int) -> Mean:
-    """Inclusion k by a rule; what the rule that judges it is off by is in no error yet."""
+def _mean_of_inclusion(k: int, coarse: _Averages, finest: _Averages, theta_error: Array) -> Mean:
+    """Mean of inclusion k by the coarse rule; its error in space is the larger of both rules'."""
     return Mean(
-        curve=StressCurve.from_stiffness(result.rule, result.cells.matrix[:, k]),
-        errors={"space": np.maximum(result.errors[k], judge.errors[k]), "theta": in_theta},
-        terms=int(result.cells.terms[:, k].max()),
+        curve=StressCurve.from_stiffness(coarse.rule, coarse.cells.matrix[:, k]),
+        errors={"space": np.maximum(coarse.errors[k], finest.errors[k]), "theta": theta_error},
+        terms=int(coarse.cells.terms[:, k].max()),
     )
 
 

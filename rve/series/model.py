@@ -16,7 +16,7 @@ from alphacut.rve.cell import Cell, Phase
 from alphacut.rve.certificate import with_checks
 from alphacut.rve.result import HomogenisedStiffness
 from alphacut.rve.series.energies import mean_energies
-from alphacut.rve.series.means import Mean, settled_means
+from alphacut.rve.series.means import Mean, converged_means
 from alphacut.rve.series.stiffness import square_stiffness
 from alphacut.rve.series.truncation import CellModuli
 from alphacut.rve.settings import require_parts, require_points
@@ -61,11 +61,11 @@ class SeriesModel:
     def solve(
         self, radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase]
     ) -> list[HomogenisedStiffness]:
-        """One result for each of `inclusions`, in their order.
+        """Homogenised stiffness for each of `inclusions`, in their order.
 
         Raises:
             SeriesError: Particles nearly touch.
-            RuleError: No rule in θ settles (a map that is not smooth).
+            RuleError: No rule in θ converges (a map that is not smooth).
         """
         require_parts(radius_map, matrix, inclusions)
         start = perf_counter()
@@ -73,15 +73,19 @@ class SeriesModel:
         def moduli(radii: Array) -> CellModuli:
             return self._moduli(radii, matrix, inclusions)
 
-        means = settled_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
+        means = converged_means(radius_map, moduli, points=self.points, accuracy=self.accuracy)
         seconds = perf_counter() - start
-        cells = [Cell(matrix, inclusion, radius_map) for inclusion in inclusions]
-        results = [self._result(*pair, seconds) for pair in zip(means, cells, strict=True)]
+        results = [
+            self._result(mean, Cell(matrix, inclusion, radius_map), seconds)
+            for mean, inclusion in zip(means, inclusions, strict=True)
+        ]
         if not self.energies:
             return results
-        energies = self._energies(radius_map, matrix, inclusions, means)
-        pairs = zip(results, energies, strict=True)
-        return [replace(result, energies=energy) for result, energy in pairs]
+        all_energies = self._energies(radius_map, matrix, inclusions, means)
+        return [
+            replace(result, energies=energies)
+            for result, energies in zip(results, all_energies, strict=True)
+        ]
 
     _energies = staticmethod(mean_energies)
 
@@ -89,7 +93,7 @@ class SeriesModel:
         return square_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
 
     def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedStiffness:
-        """The certified result of one inclusion."""
+        """Result of one inclusion from its means over θ, with its checks."""
         return with_checks(
             HomogenisedStiffness(
                 curve=mean.curve,

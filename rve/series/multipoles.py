@@ -117,89 +117,100 @@ def _conjugate_images(sums: LatticeSums, k: Rows, n: Rows) -> Array:
 
 @cache
 def family(harmonics: int, *, hydrostatic: bool) -> Family:
-    """Couplings of the first `harmonics` orders."""
+    """First harmonics of a hydrostatic or a deviatoric load, with their lattice couplings."""
     sums = _sums()
     a = 4 * np.arange(harmonics) + (3 if hydrostatic else 1)
     b = 4 * np.arange(harmonics) + (1 if hydrostatic else 3)
-    to_next = (a + 2)[:, None] * lattice_images(sums, a + 2, a)
     return Family(
-        a,
-        b,
-        lattice_images(sums, b, a),
-        to_next,
-        _conjugate_images(sums, a, a),
-        lattice_images(sums, a, b),
+        a=a,
+        b=b,
+        to_p=lattice_images(sums, b, a),
+        to_next=(a + 2)[:, None] * lattice_images(sums, a + 2, a),
+        a_to_q=_conjugate_images(sums, a, a),
+        b_to_q=lattice_images(sums, a, b),
     )
 
 
 def multipoles(load: str, radius: Array, contrast: Contrast, *, harmonics: int) -> Array:
-    """The a_n, scaled by r, under a unit far field: "hydrostatic", "deviator" or "shear".
+    """Multipoles a_n of the potential φ, scaled by rⁿ, under a unit macroscopic strain.
 
     Args:
-        load: One of `LOADS`.
-        radius: Shape (n,).
+        load: One of `LOADS`: "hydrostatic", "deviator" or "shear".
+        radius: Of the particles over half the cell's side, shape (n,).
         contrast: The materials, m inclusions.
-        harmonics: N.
+        harmonics: Number N of multipoles.
 
     Returns:
         Shape (n, m, N); of the shear load the imaginary parts.
     """
-    kind = family(harmonics, hydrostatic=load == "hydrostatic")
-    matrices, sources = _system(kind, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
+    orders = family(harmonics, hydrostatic=load == "hydrostatic")
+    matrices, sources = _system(orders, radius, contrast, mirror=-1.0 if load == "shear" else 1.0)
     return np.asarray(np.linalg.solve(matrices, sources[..., None])[..., 0])
 
 
 def _system(
-    kind: Family, radius: Array, contrast: Contrast, *, mirror: float
+    orders: Family, radius: Array, contrast: Contrast, *, mirror: float
 ) -> tuple[Array, Array]:
-    """Matrices (n, m, N, N) and sources (n, m, N) for a_n after b_n is eliminated."""
-    in_a, in_b = radius[:, None] ** kind.a, radius[:, None] ** kind.b
-    to_p = kind.to_p * in_b[:, :, None] * in_a[:, None, :]
-    to_next = kind.to_next * (in_a * radius[:, None] ** 2)[:, :, None] * in_a[:, None, :]
-    a_to_q = kind.a_to_q * in_a[:, :, None] * in_a[:, None, :]
-    b_to_q = kind.b_to_q * in_a[:, :, None] * in_b[:, None, :]
-    shifted = np.zeros_like(b_to_q)  # b_to_q applied to (n − 2) a_{n-2}
-    if kind.a[0] == 1:
-        shifted = b_to_q * (kind.b - 2)
+    """Linear systems for the multipoles a_n of φ after those of ψ, b_n, are eliminated.
+
+    Equations at the head of the file; p_k and q_k are the Taylor coefficients of φ and ψ.
+
+    Returns:
+        Matrices (n, m, N, N) and right-hand sides (n, m, N) for n radii and m inclusions.
+    """
+    r_a, r_b = radius[:, None] ** orders.a, radius[:, None] ** orders.b
+    to_p = orders.to_p * r_b[:, :, None] * r_a[:, None, :]
+    to_next = orders.to_next * (r_a * radius[:, None] ** 2)[:, :, None] * r_a[:, None, :]
+    a_to_q = orders.a_to_q * r_a[:, :, None] * r_a[:, None, :]
+    b_to_q = orders.b_to_q * r_a[:, :, None] * r_b[:, None, :]
+    is_deviatoric = orders.a[0] == 1
+    by_shift = np.zeros_like(b_to_q)  # b_to_q applied to the part (n − 2) a_{n-2} of b_n
+    if is_deviatoric:
+        by_shift = b_to_q * (orders.b - 2)
     else:
-        shifted[..., :-1] = b_to_q[..., 1:] * (kind.b[1:] - 2)
+        by_shift[..., :-1] = b_to_q[..., 1:] * (orders.b[1:] - 2)
     outer, inner = (mirror * f[:, None, None] for f in (contrast.outer, contrast.inner))
-    coupling = (to_next + a_to_q + shifted)[:, None] + inner * (b_to_q @ to_p)[:, None]
-    shape = len(radius), contrast.kappa_i.size, kind.a.size
+    coupling = (to_next + a_to_q + by_shift)[:, None] + inner * (b_to_q @ to_p)[:, None]
+    shape = len(radius), contrast.kappa_i.size, orders.a.size
     source = np.zeros(shape, np.result_type(outer))
-    if kind.a[0] == 1:
+    if is_deviatoric:
         source[..., 0] = mirror * contrast.outer * radius[:, None]
-    else:  # the row of b_1 has a factor of its own
-        swelling, first = contrast.swelling[:, None], b_to_q[:, None, :, 0]
-        coupling += (
-            (contrast.swelling - contrast.inner)[:, None, None]
-            * first[..., None]
-            * to_p[:, None, :1, :]
-        )
-        source += contrast.outer[:, None] * swelling * first * radius[:, None, None]
-    return np.eye(kind.a.size) - outer * coupling, source
+    else:  # b_1 has the factor `swelling` in place of `inner`
+        b1_to_q, to_p1 = b_to_q[:, None, :, 0], to_p[:, None, :1, :]
+        excess = (contrast.swelling - contrast.inner)[:, None, None]
+        coupling += excess * b1_to_q[..., None] * to_p1
+        factor = contrast.outer * contrast.swelling
+        source += factor[:, None] * b1_to_q * radius[:, None, None]
+    return np.eye(orders.a.size) - outer * coupling, source
 
 
 def modulus(load: str, a: Array, radius: Array, contrast: Contrast) -> Array:
-    """C11 + C12, C11 − C12 or C33 in Pa, shape (n, m), from the multipoles `a` of `load`.
+    """C11 + C12, C11 − C12 or C33 in Pa, shape (n, m), from the multipoles of one load.
 
-    Both means follow from the jumps across the cell of 2μu and of the resultant φ + z conj(φ') +
-    conj(ψ).
+    Mean strain and stress follow from the jumps across the cell of 2μu and of the resultant force
+    φ + z conj(φ') + conj(ψ).
+
+    Args:
+        load: "hydrostatic", "deviator" or "shear", for these moduli in their order.
+        a: Scaled multipoles of φ, shape (n, m, N).
+        radius: Shape (n,).
+        contrast: The materials.
     """
     r, kappa, mu = radius[:, None], contrast.kappa, contrast.mu
     if load == "hydrostatic":
-        turn = ZETA_PERIOD * r * _swelling_pole(a, radius, contrast)
-        return mu * (4 + 2 * turn) / (kappa - 1 - turn)
-    turn, g = ZETA_PERIOD * r * a[..., 0], _sums().natanzon_period * r * a[..., 0]
+        jump = ZETA_PERIOD * r * _dilatation_pole(a, radius, contrast)  # of ψ
+        return mu * (4 + 2 * jump) / (kappa - 1 - jump)
+    jump = ZETA_PERIOD * r * a[..., 0]  # of φ
+    g = _sums().natanzon_period * r * a[..., 0]
     if load == "deviator":
-        return np.asarray(2 * mu * (1 + g + turn) / (1 + g - kappa * turn))
-    return np.asarray(mu * (1 + g - turn) / (1 + g + kappa * turn))
+        return np.asarray(2 * mu * (1 + g + jump) / (1 + g - kappa * jump))
+    return np.asarray(mu * (1 + g - jump) / (1 + g + kappa * jump))
 
 
-def _swelling_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
-    """b_1 = swelling · (p_1 of the images + r A), shape (n, m)."""
-    kind = family(a.shape[-1], hydrostatic=True)
-    to_first = kind.to_p[0] * radius[:, None] ** (kind.a + 1)
+def _dilatation_pole(a: Array, radius: Array, contrast: Contrast) -> Array:
+    """Pole b_1 of ψ = swelling · (p_1 by the images + r), shape (n, m)."""
+    orders = family(a.shape[-1], hydrostatic=True)
+    to_first = orders.to_p[0] * radius[:, None] ** (orders.a + 1)
     return np.asarray(contrast.swelling * (np.einsum("nk,nmk->nm", to_first, a) + radius[:, None]))
 
 

@@ -26,7 +26,7 @@ TRUNCATION = Truncation(
 def square_stiffness(
     radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-12
 ) -> CellModuli:
-    """C11 + C12, C11 − C12 and C33 of n cells times m inclusions.
+    """C11 + C12, C11 − C12 and C33 of n square cells times m inclusions, with declared errors.
 
     Args:
         radius: Radii over half the cell's side, shape (n,), each in [0, 1).
@@ -47,4 +47,4 @@ def square_stiffness(
         ]
         return np.stack(columns, axis=-1)
 
-    return TRUNCATION.settle(radius, len(inclusions), solve, tolerance=tolerance)
+    return TRUNCATION.converged_moduli(radius, len(inclusions), solve, tolerance=tolerance)

@@ -44,13 +44,13 @@ class CellModuli:
 
 @dataclass(frozen=True)
 class Truncation:
-    """How a series is continued, how it is judged, and what is said where it ends.
+    """Numbers of terms of a series, its error estimate, and the words of its error message.
 
     Args:
         steps: Numbers of terms to try, rising.
-        decay: What a term takes from the logarithm of the error, over arccosh(1/r).
+        decay: d in: error ~ exp(−d · terms · arccosh(1/r)).
         unknowns: Of one linear system with so many terms.
-        safety: Margin of the estimated error.
+        safety: Factor of the estimated error.
         round_off: Relative, of a modulus.
         terms: Their name in the message, such as "harmonics".
         particles: Name of the particles that nearly touch.
@@ -66,20 +66,20 @@ class Truncation:
     particles: str
     voigt: Callable[[Array, Array, Array], Array]
 
-    def settle(
+    def converged_moduli(
         self, radius: Array, inclusions: int, solve: Solve, *, tolerance: float
     ) -> CellModuli:
-        """Moduli of n cells times m inclusions, each with as many terms as it needs.
+        """Moduli of n cells times m inclusions, each with as many terms as its error asks.
 
         Args:
             radius: Radii over half the cell's side, shape (n,), each in [0, 1).
-            inclusions: m.
-            solve: The series.
+            inclusions: Number m of inclusions.
+            solve: Moduli by the series, from radii and number of terms.
             tolerance: Relative error allowed, of the moduli.
 
         Raises:
             RefusedError: A radius lies outside [0, 1).
-            SeriesError: The last step does not suffice.
+            SeriesError: The largest number of terms does not suffice.
         """
         radius, tolerance = np.atleast_1d(radius), max(tolerance, 2 * self.round_off)
         if not ((radius >= 0) & (radius < 1)).all():
@@ -87,35 +87,41 @@ class Truncation:
             raise RefusedError("radius", worst, "values in [0, 1) halves of the cell's side")
         steps, shape = np.array(self.steps), (radius.size, inclusions)
         moduli, errors = np.zeros((*shape, 3)), np.full((*shape, 3), np.inf)
-        used, todo = np.zeros(shape, int), np.arange(radius.size)
+        terms, unsolved = np.zeros(shape, int), np.arange(radius.size)
         rate = self.decay * np.arccosh(1 / np.maximum(radius, 1e-3))
-        step_number = np.searchsorted(steps, np.log(1 / tolerance) / rate)
-        step_number = np.minimum(step_number, steps.size - 1)
-        while todo.size:
-            for step in np.unique(step_number[todo]):
-                rows = todo[step_number[todo] == step]
-                # what is settled stays, whatever its companions need
-                open_ = errors[rows].max(axis=2) > tolerance
-                values, left = self._with_error(radius[rows], inclusions, solve, int(steps[step]))
-                moduli[rows] = np.where(open_[..., None], values, moduli[rows])
-                errors[rows] = np.where(open_[..., None], left, errors[rows])
-                used[rows] = np.where(open_, steps[step], used[rows])
-            todo = todo[errors[todo].max(axis=(1, 2)) > tolerance]
-            ended = todo[step_number[todo] == steps.size - 1]
-            if ended.size:
+        step_index = np.searchsorted(steps, np.log(1 / tolerance) / rate)
+        step_index = np.minimum(step_index, steps.size - 1)
+        while unsolved.size:
+            for step in np.unique(step_index[unsolved]):
+                cells = unsolved[step_index[unsolved] == step]
+                # results do not depend on which inclusions are solved together
+                is_open = errors[cells].max(axis=2) > tolerance
+                new_moduli, new_errors = self._moduli_with_errors(
+                    radius[cells], inclusions, solve, int(steps[step])
+                )
+                moduli[cells] = np.where(is_open[..., None], new_moduli, moduli[cells])
+                errors[cells] = np.where(is_open[..., None], new_errors, errors[cells])
+                terms[cells] = np.where(is_open, steps[step], terms[cells])
+            unsolved = unsolved[errors[unsolved].max(axis=(1, 2)) > tolerance]
+            failed = unsolved[step_index[unsolved] == steps.size - 1]
+            if failed.size:
                 raise SeriesError(
-                    f"the series at r = {radius[ended].max():.6g} reaches a relative error of"
-                    f" {errors[ended].max():.1e} with {self.steps[-1]} {self.terms},"
+                    f"the series at r = {radius[failed].max():.6g} reaches a relative error of"
+                    f" {errors[failed].max():.1e} with {self.steps[-1]} {self.terms},"
                     f" {tolerance:.1e} is allowed: {self.particles} nearly touch",
                     "lower the radius or raise the tolerance",
                 )
-            step_number[todo] += 1
-        return CellModuli(moduli, errors, used, self.voigt)
+            step_index[unsolved] += 1
+        return CellModuli(moduli, errors, terms, self.voigt)
 
-    def _with_error(
+    def _moduli_with_errors(
         self, radius: Array, inclusions: int, solve: Solve, terms: int
     ) -> tuple[Array, Array]:
-        """Moduli and their errors, with a margin: a quarter and a half more terms tell them."""
+        """Moduli by a number of terms and their relative errors, shape (k, inclusions, 3) each.
+
+        The error is the distance from the moduli by a quarter and by half more terms, times a
+        safety factor.
+        """
         counts = terms, terms + max(2, terms // 4), terms + max(4, terms // 2)
         coarse, finer, finest = (
             np.concatenate([solve(part, n) for part in self._batches(radius, inclusions, n)])

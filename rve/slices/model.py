@@ -6,12 +6,10 @@ with radius r(θ).
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -39,8 +37,8 @@ from alphacut.rve.settings import (
     require_points,
 )
 from alphacut.rve.slices.outline_slice import (
-    ACCURATE,
-    JUDGE,
+    ACCURATE_ORDER,
+    REFERENCE_ORDER,
     OutlineSlice,
     energies_with_errors,
     second_size,
@@ -51,14 +49,14 @@ from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 if TYPE_CHECKING:
     from alphacut.rve.slices.plane_cell import PlaneCell
 
-_FADE = 0.03  # least ratio of the changes by two successive orders that is extrapolated with
+_MIN_RATIO = 0.03  # least ratio of the changes by two successive orders in the extrapolation
 _ORDERS = 2, 3, 4
 _ROUND_OFF = 1e-13
 _CANCELLATION = 2e-14  # relative round-off for each unit of radius and contrast
 _SAFETY = 3.3
-_COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which orders do not yet leave what they should
-_AXES = 1.5  # safety where the moduli along both axes differ
-_SHARED = np.array([0.03, 0.5, 0.5])  # C11 + C12 is the easiest by far
+_COARSE, _COARSE_SAFETY = 0.6, 5.5  # mesh size above which errors do not yet fall as they should
+_AXES_SAFETY = 1.5  # where the moduli along both axes differ
+_MIN_FRACTION = np.array([0.03, 0.5, 0.5])  # least error of each modulus over the largest of them
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ class SlicesModel:
         inclusions: Sequence[AnyPhase],
         interphase: Interphase | None = None,
     ) -> list[HomogenisedStiffness]:
-        """One result for each of `inclusions`, in their order.
+        """Homogenised stiffness for each of `inclusions`, in their order.
 
         Raises:
             ConvergenceError: A linear system was not solved.
@@ -113,12 +111,13 @@ class SlicesModel:
         require_parts(radius_map, matrix, inclusions, isotropic=False)
         require_compressible(matrix, *inclusions)
         require_interphase(interphase, self.outline)
-        mapped = require_continuous(radius_map)
+        fine_radii = require_continuous(radius_map)
         start = perf_counter()
         rule = gauss_rule(radius_map.distribution, points=self.points)
-        all_radii = np.concatenate([radius_map(rule.nodes), [mapped.min(), mapped.max()]])
+        extremes = [fine_radii.min(), fine_radii.max()]  # for the error in θ
+        all_radii = np.concatenate([radius_map(rule.nodes), extremes])
         radii, indices = np.unique(np.round(all_radii, DIGITS), return_inverse=True)
-        nodes = indices[: rule.nodes.size]
+        nodes = indices[: rule.nodes.size]  # index among the radii of each node in θ
         slices = [self._slice(radius, matrix, inclusions, interphase) for radius in radii]
         seconds = {"total": perf_counter() - start}
         results = []
@@ -163,7 +162,7 @@ class SlicesModel:
     def _mean_energies(
         self, result: HomogenisedStiffness, radii: Array, nodes: Rows, values: Array, errors: Array
     ) -> PhaseEnergies:
-        """Mean energies of the phases under f_Θ with declared errors.
+        """Mean energies of the phases over θ, with declared errors.
 
         Args:
             result: The result, with its cell.
@@ -174,26 +173,28 @@ class SlicesModel:
         """
         cell, rule = result.cell, ThetaRule(result.curve.theta, result.curve.weights)
         assert cell is not None
-        moduli = values.sum(axis=(1, 2))
+        thickness = thickness_of(cell.interphase)
 
-        def error_in_theta(at_radii: Array) -> Array:
+        def absolute_theta_error(moduli: Array) -> Array:
+            """Error of the mean over θ of moduli at the radii, shape (n, 3), in Pa."""
             relative = theta_error(
                 cell.radius,
                 rule,
                 radii=radii,
-                moduli=at_radii,
+                moduli=moduli,
                 phases=cell.phases,
-                thickness=thickness_of(cell.interphase),
+                thickness=thickness,
             )
-            return relative * rule.mean(at_radii[nodes])
+            return relative * rule.mean(moduli[nodes])
 
-        # moduli of stiffer phases, c + X ∂c/∂X, are averaged as well as moduli are
-        in_theta = [
-            [error_in_theta(moduli + values[:, p, x]) for x in range(2)]
-            for p in range(len(cell.phases))
+        # energies X ∂c/∂X may change sign, but c + X ∂c/∂X are moduli with stiffer phases
+        moduli = values.sum(axis=(1, 2))
+        stiffer_errors = [
+            [absolute_theta_error(moduli + values[:, phase, kind]) for kind in range(2)]
+            for phase in range(len(cell.phases))
         ]
-        error = rule.mean(errors[nodes]) + np.array(in_theta) + error_in_theta(moduli)
-        return PhaseEnergies(rule.mean(values[nodes]), error)
+        error_in_theta = np.array(stiffer_errors) + absolute_theta_error(moduli)
+        return PhaseEnergies(rule.mean(values[nodes]), rule.mean(errors[nodes]) + error_in_theta)
 
     def _slice(
         self,
@@ -202,30 +203,44 @@ class SlicesModel:
         inclusions: Sequence[AnyPhase],
         interphase: Interphase | None,
     ) -> Slice | OutlineSlice:
-        """Cell of one radius solved for all inclusions, with what its error estimate compares.
+        """Solve the cell of one radius for all inclusions by several orders, for an error estimate.
 
         A circle without interphase: three orders on one mesh; else two orders and two meshes.
         """
-        size, outline = self.mesh_size, self.outline
-        options: dict[str, Any] = {"mesh_size": size, "outline": outline, "energies": self.energies}
-        if is_round(outline) and interphase is None:
-            return solve_slice(radius, matrix, inclusions, **options)
-        options |= {"order": self.order, "interphase": interphase}
-        return solve_outline_slice(radius, matrix, inclusions, **options)
+        if is_round(self.outline) and interphase is None:
+            return solve_slice(
+                radius,
+                matrix,
+                inclusions,
+                mesh_size=self.mesh_size,
+                outline=self.outline,
+                energies=self.energies,
+            )
+        return solve_outline_slice(
+            radius,
+            matrix,
+            inclusions,
+            mesh_size=self.mesh_size,
+            outline=self.outline,
+            order=self.order,
+            energies=self.energies,
+            interphase=interphase,
+        )
 
 
 def mean_errors(curve: StressCurve, error: Array, *, square: bool) -> Array:
-    """Relative errors of the mean C11 + C12, C11 − C12 and C33 from those at the nodes, (n, 3).
+    """Relative errors of the means over θ of C11 + C12, C11 − C12 and C33, shape (3,).
 
     Args:
         curve: With its stiffness.
-        error: At the nodes, shape (n, 3).
-        square: Whether x1 and x2 differ by the mesh alone.
+        error: Relative errors at the nodes of θ, shape (n, 3).
+        square: Whether the cell has the symmetry of the square.
     """
     moduli = square_moduli(np.asarray(curve.stiffness))
     mean = curve.weights @ moduli
     errors = np.asarray(curve.weights @ (moduli * error) / mean)
-    errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1) * square
+    if square:  # C11 and C22 differ by the mesh alone; s11 has C11, the moduli their mean
+        errors[0] += abs(STRAIN * mean[0] / curve.mean[0] - 1)
     return errors
 
 
@@ -264,21 +279,26 @@ class Slice:
         """
         moduli = axial_moduli(self.by_order, square=square)  # (3, m, axes, 3)
         distance = abs(moduli[_ORDERS.index(order)] / moduli[-1] - 1).max(axis=1)
-        gaps = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2) * (1 if square else _AXES)
-        return np.asarray((1 + distance) * (1 + self._error_of_highest(gaps)) - 1)
+        changes = abs(moduli[:-1] / moduli[1:] - 1).max(axis=2)
+        if not square:
+            changes = _AXES_SAFETY * changes
+        return np.asarray((1 + distance) * (1 + self._error_of_order_4(changes)) - 1)
 
-    def _error_of_highest(self, gaps: Array) -> Array:
-        """Declared errors by order 4, shape (m, 3), from changes by each rise of order, (2, m, 3).
+    def _error_of_order_4(self, changes: Array) -> Array:
+        """Declared relative errors by order 4, shape (m, 3), extrapolated from lower orders.
 
-        The geometric series of the changes by further orders, times a safety factor; its ratio
-        is that of the last two changes. One modulus may change little by chance: the error of each
-        is at least a fraction of the largest.
+        The geometric series of the changes by further orders, times a safety factor. One modulus
+        may change little by chance: the error of each is at least a fraction of the largest.
+
+        Args:
+            changes: Relative changes from order 2 to 3 and from 3 to 4, shape (2, m, 3).
         """
-        fade = np.clip(gaps[1] / np.maximum(gaps[0], 1e-300), _FADE, 0.5)
+        first, second = changes
+        ratio = np.clip(second / np.maximum(first, 1e-300), _MIN_RATIO, 0.5)
         safety = _SAFETY if self.mesh_size <= _COARSE else _COARSE_SAFETY
-        error = safety * gaps[1] * fade / (1 - fade)
-        shared = _SHARED * error.max(axis=1, keepdims=True)
-        return np.asarray(np.maximum(error, shared) + _ROUND_OFF + self.cancellation)
+        error = safety * second * ratio / (1 - ratio)
+        least = _MIN_FRACTION * error.max(axis=1, keepdims=True)
+        return np.asarray(np.maximum(error, least) + _ROUND_OFF + self.cancellation)
 
 
 def solve_slice(
@@ -290,20 +310,20 @@ def solve_slice(
     outline: Outline = circle,
     energies: bool = False,
 ) -> Slice:
-    """Solve a two-dimensional cell by elements of orders 2, 3 and 4 on one mesh."""
+    """Solve a cell with a round particle by elements of orders 2, 3 and 4 on one mesh."""
     from alphacut.rve.mesh.curved import plane_mesh
     from alphacut.rve.slices.plane_cell import PlaneCell
 
     mesh = plane_mesh(radius, size=mesh_size, outline=outline)
     cells = {order: PlaneCell(mesh, order) for order in _ORDERS}
     phases = [(matrix, inclusion) for inclusion in inclusions]
-    stiffness, parts = _by_order(cells, phases, energies=energies)
+    stiffness, phase_energies = _solve_orders(cells, phases, energies=energies)
     return Slice(
-        np.array([*stiffness.values()]),
-        {order: cell.unknowns for order, cell in cells.items()},
-        mesh_size,
-        _cancellation(radius, matrix, inclusions),
-        parts,
+        by_order=np.array([*stiffness.values()]),
+        unknowns={order: cell.unknowns for order, cell in cells.items()},
+        mesh_size=mesh_size,
+        cancellation=_cancellation(radius, matrix, inclusions),
+        energies=phase_energies,
     )
 
 
@@ -314,11 +334,11 @@ def solve_outline_slice(
     *,
     mesh_size: float,
     outline: Outline,
-    order: int = ACCURATE,
+    order: int = ACCURATE_ORDER,
     energies: bool = False,
     interphase: Interphase | None = None,
 ) -> OutlineSlice:
-    """Solve a two-dimensional cell with a particle that is not round, or in a ring, on two meshes.
+    """Solve a cell with a particle that is not round, or with an interphase, on two meshes.
 
     Args:
         radius: Radius of the particle.
@@ -340,33 +360,41 @@ def solve_outline_slice(
         plane_mesh(radius, size=size, outline=outline, thickness=thickness)
         for size in (mesh_size, second_size(mesh_size))
     )
-    cells = {degree: PlaneCell(first, degree) for degree in {order, ACCURATE, JUDGE}}
-    stiffness, parts = _by_order(cells, phases, energies=energies)
-    judge = {JUDGE: PlaneCell(second, JUDGE)}
+    orders = {order, ACCURATE_ORDER, REFERENCE_ORDER}
+    cells = {degree: PlaneCell(first, degree) for degree in orders}
+    stiffness, phase_energies = _solve_orders(cells, phases, energies=energies)
+    reference = {REFERENCE_ORDER: PlaneCell(second, REFERENCE_ORDER)}
+    reference_stiffness, _ = _solve_orders(reference, phases)
     return OutlineSlice(
         by_order=stiffness,
-        on_second_mesh=_by_order(judge, phases)[0][JUDGE],
+        on_second_mesh=reference_stiffness[REFERENCE_ORDER],
         unknowns={degree: cell.unknowns for degree, cell in cells.items()},
         round_off=_ROUND_OFF + _cancellation(radius, matrix, inclusions),
-        energies=parts,
+        energies=phase_energies,
     )
 
 
-def _by_order(
+def _solve_orders(
     cells: Mapping[int, PlaneCell], samples: Sequence[Sequence[AnyPhase]], *, energies: bool = False
 ) -> tuple[dict[int, Array], dict[int, Array]]:
-    """Stiffness, (m, 3, 3), and energies if wanted, (m, phases, 2, 3), of samples by order."""
-    stiffness: dict[int, list[Array]] = defaultdict(list)
-    parts: dict[int, list[Array]] = defaultdict(list)
-    for (order, cell), phases in product(cells.items(), samples):
-        stiffness[order].append(cell.stiffness([phase.stiffness for phase in phases]))
+    """Stiffness, (m, 3, 3), and energies of the phases, (m, phases, 2, 3), by order of elements.
+
+    Args:
+        cells: Cell by order.
+        samples: Phases of each of m samples.
+        energies: Whether to compute energies; else their mapping is empty.
+    """
+    stiffness, phase_energies = {}, {}
+    for order, cell in cells.items():
+        values, parts = [], []
+        for phases in samples:
+            values.append(cell.stiffness([phase.stiffness for phase in phases]))
+            if energies:  # of the fields that were just solved
+                parts.append(cell.phase_energies(phases))
+        stiffness[order] = np.array(values)
         if energies:
-            parts[order].append(cell.phase_energies(phases))
-    return _as_arrays(stiffness), _as_arrays(parts)
-
-
-def _as_arrays(by_order: Mapping[int, list[Array]]) -> dict[int, Array]:
-    return {order: np.array(values) for order, values in by_order.items()}
+            phase_energies[order] = np.array(parts)
+    return stiffness, phase_energies
 
 
 def _cancellation(radius: float, matrix: AnyPhase, inclusions: Sequence[AnyPhase]) -> Array:

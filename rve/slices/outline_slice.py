@@ -10,8 +10,8 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import axial_moduli
 
-ACCURATE, JUDGE = 4, 5
-"""Order of the elements whose error is known, and the next, which tells it."""
+ACCURATE_ORDER, REFERENCE_ORDER = 4, 5
+"""Order of the elements whose error is estimated, and the next, which estimates it."""
 LIMIT = 0.7
 """Mesh size up to which the second mesh is twice as coarse, in halves of the cell's side: there
 size ends to matter. Where it would lie above, the second mesh is twice as fine."""
@@ -33,8 +33,8 @@ class OutlineSlice:
     """A two-dimensional cell solved for m inclusions by several orders, the highest on two meshes.
 
     Args:
-        by_order: Stiffness in Pa, (m, 3, 3), by order; `ACCURATE` and `JUDGE` are among them.
-        on_second_mesh: Stiffness by order `JUDGE` on the second mesh, shape (m, 3, 3), in Pa.
+        by_order: Stiffness in Pa, (m, 3, 3), by order; orders 4 and 5 are among them.
+        on_second_mesh: Stiffness by order 5 on the second mesh, shape (m, 3, 3), in Pa.
         unknowns: Number of unknowns of the linear system, by order.
         round_off: Relative error by rounding of each inclusion, shape (m, 1).
         energies: Parts of the phases in the three moduli by order, shape (m, 2, 2, 3), in Pa; empty
@@ -54,20 +54,17 @@ class OutlineSlice:
     def error(self, order: int, *, square: bool) -> Array:
         """Declared relative errors of C11 + C12, C11 − C12 and C33, shape (m, 3).
 
-        The error of order 4 is the larger of its distances from order 5 on the same mesh and on a
-        mesh that has nothing in common with it, each with a safety factor; that of another order is
-        its distance from order 4 besides. On the second mesh order 4 itself would be 50 times as
-        far off as here in the median, order 5 is 4 times.
+        The error of order 4 is the larger of its distances from order 5 on the same mesh and on
+        the second one, each with a safety factor; other orders add their distance from order 4.
 
         Args:
             order: Order of the elements of the result.
-            square: Whether the stiffness has the symmetry of the square; never true here.
+            square: Whether the stiffness has the symmetry of the square.
         """
-        accurate, judge = self.by_order[ACCURATE], self.by_order[JUDGE]
-        error = np.maximum(
-            ORDER_SAFETY * _distance(accurate, judge, square=square),
-            MESH_SAFETY * _distance(accurate, self.on_second_mesh, square=square),
-        )
+        accurate, higher = self.by_order[ACCURATE_ORDER], self.by_order[REFERENCE_ORDER]
+        by_order = ORDER_SAFETY * _distance(accurate, higher, square=square)
+        by_mesh = MESH_SAFETY * _distance(accurate, self.on_second_mesh, square=square)
+        error = np.maximum(by_order, by_mesh)
         distance = _distance(self.by_order[order], accurate, square=square)
         return np.asarray((1 + distance) * (1 + error + self.round_off) - 1)
 
@@ -79,10 +76,10 @@ def _distance(first: Array, second: Array, *, square: bool) -> Array:
 
 
 def energies_with_errors(energies: Mapping[int, Array], order: int) -> tuple[Array, Array]:
-    """Energies by elements of `order` and their declared errors, shape (m, 2, 2, 3) each.
+    """Energies by elements of `order` and their declared errors, shape (m, phases, 2, 3) each.
 
     The error is the distance from the highest other order, times a safety factor.
     """
-    values, judge = energies[order], energies[max(set(energies) - {order})]
-    error = ORDER_SAFETY * abs(values - judge)
+    values, reference = energies[order], energies[max(set(energies) - {order})]
+    error = ORDER_SAFETY * abs(values - reference)
     return values, error + NOISE * values.sum(axis=(1, 2), keepdims=True)

@@ -53,7 +53,7 @@ class PlaneCell:
         self._matrix = zero_matrix(pairs[space.dofmap.list], self._local, rows, self.unknowns)
 
     def stiffness(self, phases: Sequence[Array]) -> Array:
-        """Homogenised stiffness in Pa, Voigt order, shape (3, 3), for the phases' matrices.
+        """Solve under unit strains: homogenised stiffness in Pa, Voigt order, shape (3, 3).
 
         Raises:
             ConvergenceError: The linear system was not solved.
@@ -72,22 +72,23 @@ class PlaneCell:
                 "check the moduli, or take the series",
             )
         self._fields = solved.vectors
-        affine = -self._affine().T @ np.stack(forces, axis=-1)
-        fluctuation = [[load.dot(x) for x in solved.vectors] for load in loads]
-        return np.asarray((affine - fluctuation) / AREA)  # ⟨σ⟩ by Hill–Mandel
+        # ∫ σ by Hill–Mandel; loads are −∫ Bᵀ C ε̄
+        by_unit_strains = -self._affine().T @ np.stack(forces, axis=-1)
+        by_fluctuations = [[load.dot(x) for x in solved.vectors] for load in loads]
+        return np.asarray((by_unit_strains - by_fluctuations) / AREA)
 
     def phase_energies(self, phases: Sequence[AnyPhase]) -> Array:
-        """Parts of K and G of the phases in the three moduli, shape (phases, 2, 3), in Pa.
+        """Parts of K and G of each phase in C11 + C12, C11 − C12 and C33, (phases, 2, 3), in Pa.
 
-        They are of the fields of the last `stiffness`, which was of these phases.
+        `stiffness` must have been called with these phases just before: its fields are used.
         """
         energies = np.zeros((len(phases), 2, 3))
         fields = [self._field(strain) for strain in THREE_LOADS]
-        for kind in range(2):
-            self._form.set_phases([phase.stiffness_parts[kind] for phase in phases])
+        for part in range(2):  # K, then G
+            self._form.set_phases([phase.stiffness_parts[part] for phase in phases])
             for k in range(len(phases)):
-                of_loads = self._energies(fields, slice(k, k + 1))
-                energies[k, kind] = moduli_of_energies(of_loads, THREE_LOADS)
+                load_energies = self._energies(fields, slice(k, k + 1))
+                energies[k, part] = moduli_of_energies(load_energies, THREE_LOADS)
         return energies
 
     def _field(self, strain: Array) -> PETSc.Vec:
@@ -98,7 +99,10 @@ class PlaneCell:
         return field
 
     def _energies(self, fields: Sequence[PETSc.Vec], phase: slice) -> Array:
-        """Mean of ε_a : C ε_a in a phase, C as set, for each of `THREE_LOADS`, in Pa."""
+        """Mean of ε : C ε in a phase under each of `THREE_LOADS`, shape (3,), in Pa.
+
+        C is that set in the form; the strain is that of the load plus that of its fluctuation.
+        """
         self._matrix.zeroEntries()
         self._form.add_stiffness(self._matrix, phase)
         energies, affine = [], self._affine()
@@ -106,7 +110,8 @@ class PlaneCell:
             force = self._form.load(strain, phase)
             load = reduced_vector(force, self._local, self.unknowns, self.unknowns)
             uniform = -(affine @ strain) @ force
-            energies.append(uniform - 2 * load.dot(field) + field.dot(self._matrix * field))
+            mixed, fluctuation = -2 * load.dot(field), field.dot(self._matrix * field)
+            energies.append(uniform + mixed + fluctuation)
         return np.array(energies) / AREA
 
     def _affine(self) -> Array:

@@ -13,7 +13,7 @@ from alphacut.rve.cell import AnyPhase
 from alphacut.stochastic import RadiusMap, ThetaRule, gauss_rule
 
 DIGITS = 12  # radii equal to so many decimals are one slice
-_FINE = 128
+_FINE = 128  # points of a rule whose error is below rounding
 _SAFETY = 1.6
 _NOISE = 1e-13  # of a declared error: what rounding leaves
 
@@ -30,10 +30,9 @@ def theta_error(
     """Declared relative errors of the mean C11 + C12, C11 − C12 and C33 by `rule`, shape (3,).
 
     The logarithm of a modulus over that of Mori and Tanaka is smooth in √(1 − r²), also where soft
-    particles or an incompressible matrix make the modulus itself steep: polynomials through the
-    slices at the nodes and at the extreme radii are averaged by a rule so fine that it leaves
-    nothing out, and compared with the average over the nodes. The largest gap of several degrees,
-    with a margin.
+    particles or an incompressible matrix make the modulus itself steep. Its weighted least-squares
+    polynomials of several degrees are averaged by a rule of `_FINE` points; the error is the
+    largest distance of these means from that by `rule`, with a safety factor.
 
     Args:
         radius_map: The map.
@@ -41,26 +40,28 @@ def theta_error(
         radii: Radii solved, shape (m,): those of the nodes and the two extreme ones.
         moduli: C11 + C12, C11 − C12 and C33 at `radii`, shape (m, 3).
         phases: Matrix and inclusion first.
-        thickness: Of an interphase, which rings that nearly touch add to their radii.
+        thickness: Of an interphase; with it r is the outer radius.
     """
-    places = np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
-    weights = np.maximum(np.bincount(places, rule.weights, minlength=radii.size), 1e-6)
+    nodes = np.searchsorted(radii, np.round(radius_map(rule.nodes), DIGITS))
+    weights = np.maximum(np.bincount(nodes, rule.weights, minlength=radii.size), 1e-6)
     root = np.sqrt(weights)[:, None]
     fine = gauss_rule(radius_map.distribution, points=_FINE)
-    between = radius_map(fine.nodes)
-    scale, logarithm = _dilute(between, phases), np.log(moduli / _dilute(radii, phases))
+    fine_radii = radius_map(fine.nodes)
+    scale = _mori_tanaka_moduli(fine_radii, phases)
+    logarithm = np.log(moduli / _mori_tanaka_moduli(radii, phases))
     low, high, span = logarithm.min(axis=0), logarithm.max(axis=0), np.ptp(logarithm, axis=0)
-    touch, target = np.sqrt(1 - (radii + thickness) ** 2), np.sqrt(1 - (between + thickness) ** 2)
-    ends, width = touch.min() + touch.max(), max(np.ptp(touch), 1e-12)
-    mean, gaps = rule.weights @ moduli[places], []
+    x, fine_x = (np.sqrt(1 - (r + thickness) ** 2) for r in (radii, fine_radii))
+    middle, half_width = (x.min() + x.max()) / 2, max(np.ptp(x), 1e-12) / 2
+    mean, distances = rule.weights @ moduli[nodes], []
     for degree in range(min(max(0, radii.size - 4), 9), min(radii.size, 15)):
-        basis, carried = (chebvander((2 * x - ends) / width, degree) for x in (touch, target))
+        basis = chebvander((x - middle) / half_width, degree)
         coefficients = np.linalg.lstsq(basis * root, logarithm * root, rcond=1e-14)[0]
-        refined = scale * np.exp(np.clip(carried @ coefficients, low - span, high + span))
-        gaps.append(fine.weights @ refined / mean - 1)
-    return np.asarray(_SAFETY * np.abs(gaps).max(axis=0) + _NOISE)
+        fit = chebvander((fine_x - middle) / half_width, degree) @ coefficients
+        fine_moduli = scale * np.exp(np.clip(fit, low - span, high + span))
+        distances.append(fine.weights @ fine_moduli / mean - 1)
+    return np.asarray(_SAFETY * np.abs(distances).max(axis=0) + _NOISE)
 
 
-def _dilute(radii: Array, phases: Sequence[AnyPhase]) -> Array:
-    """The moduli of Mori and Tanaka of matrix and inclusion at radii, shape (n, 3)."""
+def _mori_tanaka_moduli(radii: Array, phases: Sequence[AnyPhase]) -> Array:
+    """C11 + C12, C11 − C12 and C33 of matrix and inclusion at radii, shape (n, 3)."""
     return mori_tanaka(np.pi / 4 * radii**2, *phases[:2])

@@ -42,11 +42,11 @@ class Solutions:
 def krylov_solver(
     matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw, options: SolverOptions
 ) -> PETSc.KSP:
-    """A PETSc solver of one reduced stiffness, its preconditioner set up.
+    """PETSc Krylov solver of a reduced stiffness, with its preconditioner set up.
 
     Args:
         matrix: The reduced stiffness, symmetric positive definite.
-        numbering: Its unknowns.
+        numbering: Its unknowns by level.
         law: Law of θ.
         options: PETSc options.
 
@@ -54,7 +54,7 @@ def krylov_solver(
         RefusedError: PETSc refuses an option or its value, or does not use it.
         ConvergenceError: A factorisation failed.
     """
-    PETSc.garbage_cleanup(matrix.comm)  # solvers of samples before, which ranks drop together
+    PETSc.garbage_cleanup(matrix.comm)  # frees the solvers of earlier samples, on all ranks
     ksp = PETSc.KSP().create(matrix.comm)
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
@@ -68,7 +68,7 @@ def krylov_solver(
 
 
 def translations(matrix: PETSc.Mat) -> PETSc.NullSpace:
-    """The near-null space, which multigrid asks for: either translation of all levels."""
+    """Near-null space for multigrid: the two translations in the plane, normalised."""
     vectors = []
     for component in range(2):
         vector = matrix.createVecRight()
@@ -80,7 +80,7 @@ def translations(matrix: PETSc.Mat) -> PETSc.NullSpace:
 
 @uninterrupted()
 def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
-    """Solutions for all loads, one after another, with the solver's matrix as it is now.
+    """Solve for each load; returns solutions, iterations and the largest true relative residual.
 
     Raises:
         ConvergenceError: The tolerance was not reached, or a solution is not finite.
@@ -108,30 +108,31 @@ def solve(ksp: PETSc.KSP, loads: Sequence[PETSc.Vec]) -> Solutions:
 
 @contextmanager
 def in_database(options: SolverOptions) -> Iterator[None]:
-    """Keep options in PETSc's database during the block; those of the caller's own there stay.
+    """Context with the options in PETSc's database, which is restored at its end.
+
+    What the database has already comes before the defaults, overrides come before both.
 
     Raises:
-        RefusedError: PETSc refuses an option, or has not asked for an override by the end of the
-            block.
+        RefusedError: PETSc refuses an option, or has not used an override in the block.
         ConvergenceError: PETSc fails otherwise.
     """
     database = PETSc.Options(PREFIX)
-    from_user = {name: database.getString(name) for name in options.all if database.hasName(name)}
+    existing = {name: database.getString(name) for name in options.all if database.hasName(name)}
     overrides = {name: options.all[name] for name in options.overrides}
-    for name, value in (options.all | from_user | overrides).items():
+    for name, value in (options.all | existing | overrides).items():
         database[name] = value
     try:
         yield
         unused = [name for name in options.overrides if not option_is_used(PREFIX + name)]
     except PETSc.Error as failure:
-        why = str(failure).splitlines()[-1].strip()
+        reason = str(failure).splitlines()[-1].strip()
         if options.overrides:
-            raise RefusedError("PETSc", str(options), "what PETSc takes", why) from failure
-        raise ConvergenceError(f"PETSc cannot set up {options}: {why}") from failure
+            raise RefusedError("PETSc", str(options), "what PETSc takes", reason) from failure
+        raise ConvergenceError(f"PETSc cannot set up {options}: {reason}") from failure
     finally:
         for name in options.all:
             database.delValue(name)
-        for name, value in from_user.items():
+        for name, value in existing.items():
             database[name] = value
     if unused:
         value = options.overrides[unused[0]]

@@ -25,39 +25,41 @@ def map_of(pairs: Rows, comm: MPI.Intracomm) -> PETSc.LGMap:
 
 
 def zero_matrix(pairs: Rows, local_map: PETSc.LGMap, rows: range, size: int) -> PETSc.Mat:
-    """Zero matrix with the sparsity pattern of all unknowns that share a cell.
+    """PETSc matrix of zeros with the sparsity pattern of all unknowns that share a cell.
+
+    Unknowns come in pairs, the two displacements of a node.
 
     Args:
-        pairs: Pairs of unknowns of the nodes of the cells that touch these rows, −1 where
-            eliminated, shape (cells, nodes).
+        pairs: Pair number of each node of the cells that touch these rows, −1 where eliminated,
+            shape (cells, nodes).
         local_map: Nodes of this rank to pairs of unknowns.
         rows: Unknowns of this rank.
         size: Number of unknowns of all ranks.
     """
     has_unknown = pairs >= 0
     cell = np.broadcast_to(np.arange(len(pairs))[:, None], pairs.shape)[has_unknown]
-    shape = len(pairs), size // 2
-    touch = sp.csr_matrix((np.ones(len(cell), np.int8), (cell, pairs[has_unknown])), shape)
-    rows_touched = touch.T.tocsr()[rows.start // 2 : rows.stop // 2]
-    neighbours = rows_touched @ touch
+    ones = np.ones(len(cell), np.int8)
+    cell_to_pair = sp.csr_matrix((ones, (cell, pairs[has_unknown])), (len(pairs), size // 2))
+    pair_to_cell = cell_to_pair.T.tocsr()[rows.start // 2 : rows.stop // 2]
+    neighbours = pair_to_cell @ cell_to_pair
     neighbours.sort_indices()
     blocks = np.broadcast_to(np.int8(1), (neighbours.nnz, 2, 2))
     bsr = blocks, neighbours.indices, neighbours.indptr
     pattern = sp.bsr_matrix(bsr, shape=(len(rows), size)).tocsr()
-    csr = pattern.indptr.astype(PETSc.IntType), pattern.indices.astype(PETSc.IntType)
+    indptr, indices = (x.astype(PETSc.IntType) for x in (pattern.indptr, pattern.indices))
     sizes = (len(rows), size)
     matrix = PETSc.Mat().createAIJ((sizes, sizes), bsize=2, comm=local_map.comm)
-    matrix.setPreallocationCSR((*csr, np.zeros(pattern.nnz)))
+    matrix.setPreallocationCSR((indptr, indices, np.zeros(pattern.nnz)))
     matrix.setLGMap(local_map, local_map)
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     return matrix
 
 
 def reduced_vector(values: Array, local_map: PETSc.LGMap, num_rows: int, size: int) -> PETSc.Vec:
-    """Assembled vector Pᵀ b of nodal values b, (2 nodes,): values of identified nodes are added.
+    """PETSc vector of unknowns: the nodal values, those of periodic partners added.
 
     Args:
-        values: b on this rank, two entries a node.
+        values: On this rank, two entries a node, shape (2 nodes,).
         local_map: Nodes of this rank to pairs of unknowns.
         num_rows: Number of unknowns of this rank.
         size: Number of unknowns of all ranks.
@@ -103,45 +105,53 @@ class LevelNumbering:
 
     Attributes:
         periodicity: Unknowns of one level.
-        planar: Number of unknowns of a level.
-        between: Number of unknowns half-way between two levels: those of vertices.
+        level_size: Number of unknowns of a level.
+        half_level_size: Number of unknowns half-way between two levels: those of vertices.
+        stride: Sum of both.
         size: Number of unknowns of all ranks.
         levels: Levels of this rank.
-        middles: Half-way levels of this rank.
+        half_levels: Half-way levels of this rank.
         rows: Unknowns of this rank.
         layers: Layers with a cell that has one of these unknowns.
     """
 
     def __init__(self, grid: PrismGrid, comm: MPI.Intracomm) -> None:
         self.grid, self.periodicity = grid, identify(grid.plane)
-        self.planar, self.between = 2 * self.periodicity.count, 2 * self.periodicity.vertices
-        self.stride = self.planar + self.between
-        self.size = grid.layers * self.stride + self.planar
+        self.level_size = 2 * self.periodicity.count
+        self.half_level_size = 2 * self.periodicity.vertices
+        self.stride = self.level_size + self.half_level_size
+        self.size = grid.layers * self.stride + self.level_size
         # the last ranks have a level more, and with it nothing half-way above their last one: so
         # levels go with the prisms that are divided evenly, and few entries are of other ranks
         first, last = ((grid.layers + 1) * k // comm.size for k in (comm.rank, comm.rank + 1))
-        self.levels, self.middles = range(first, last), range(first, min(last, grid.layers))
+        self.levels, self.half_levels = range(first, last), range(first, min(last, grid.layers))
         ends = (min(k * self.stride, self.size) for k in (first, last))
         self.rows = range(*ends)
-        self.layers = range(max(0, first - 1), self.middles.stop) if self.levels else range(0)
+        self.layers = range(max(0, first - 1), self.half_levels.stop) if self.levels else range(0)
 
     @cached_property
     def pairs(self) -> Rows:
         """Pair of unknowns of each node of the grid, −1 on the fixed line, shape (nodes,)."""
         planar, layers = self.periodicity.unknown, self.grid.layers
         vertices = planar[: self.grid.plane.vertices]
-        first = np.arange(layers + 1)[:, None] * (self.stride // 2)
-        on = np.where(planar >= 0, planar + first, -1)
-        half = np.where(vertices >= 0, vertices + self.planar // 2 + first[:-1], -1)
-        return np.concatenate([on.ravel(), half.ravel()])
+        first_pair = np.arange(layers + 1)[:, None] * (self.stride // 2)  # of each level
+        on_levels = np.where(planar >= 0, planar + first_pair, -1)
+        half_first = first_pair[:-1] + self.level_size // 2
+        half_way = np.where(vertices >= 0, vertices + half_first, -1)
+        return np.concatenate([on_levels.ravel(), half_way.ravel()])
 
-    def by_level(self, values: Array) -> tuple[Array, Array]:
-        """Copies of values on levels, (layers + 1, planar), and half-way, (layers, between)."""
-        below = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
+    def split_levels(self, values: Array) -> tuple[Array, Array]:
+        """Copies of the values of all unknowns on levels and half-way between them.
+
+        Returns:
+            Shapes (layers + 1, level_size) and (layers, half_level_size).
+        """
+        layers = values[: self.grid.layers * self.stride].reshape(-1, self.stride)
         top = values[self.grid.layers * self.stride :][None]
-        return np.concatenate([below[:, : self.planar], top]), below[:, self.planar :].copy()
+        on_levels = np.concatenate([layers[:, : self.level_size], top])
+        return on_levels, layers[:, self.level_size :].copy()
 
-    def from_levels(self, on: Array, half: Array) -> Array:
-        """Vector of values on levels and half-way, as of `by_level`, here or on this rank alone."""
-        layers = np.concatenate([on[: len(half)], half], axis=1)
-        return np.concatenate([layers.ravel(), on[len(half) :].ravel()])
+    def join_levels(self, on_levels: Array, half_way: Array) -> Array:
+        """Vector of unknowns from values on levels and half-way, of all ranks or of this one."""
+        layers = np.concatenate([on_levels[: len(half_way)], half_way], axis=1)
+        return np.concatenate([layers.ravel(), on_levels[len(half_way) :].ravel()])

@@ -46,42 +46,50 @@ class ThetaMass:
     Args:
         hats: Diagonal of M, shape (layers + 1,).
         bubbles: Diagonal of M_bb, shape (layers,).
-        root: M^-½, shape (layers + 1, layers + 1).
-        excess: G^-½, shape (layers, layers).
-        shift: M⁻¹ M_hb, shape (layers + 1, layers).
+        inverse_root: M^-½, shape (layers + 1, layers + 1).
+        bubble_inverse_root: G^-½, shape (layers, layers).
+        projection: M⁻¹ M_hb, bubbles to hats, shape (layers + 1, layers).
     """
 
     hats: Array
     bubbles: Array
-    root: Array
-    excess: Array
-    shift: Array
+    inverse_root: Array
+    bubble_inverse_root: Array
+    projection: Array
 
 
 def theta_mass(law: ThetaLaw, levels: Array) -> ThetaMass:
-    """The masses on the levels θ_k, shape (layers + 1,), by the rule of the prisms."""
+    """Mass matrices along θ, weighted by the density, of hats at the levels and bubbles between.
+
+    Args:
+        law: Law of θ.
+        levels: θ of the levels, rising, shape (layers + 1,).
+    """
     layers, heights = len(levels) - 1, np.diff(levels)[:, None]
-    abscissae, double = np.polynomial.legendre.leggauss(3)
-    t, w = (abscissae + 1) / 2, double / 2
-    shapes = np.array([1 - t, t, 4 * t * (1 - t)])
+    abscissae, gauss_weights = np.polynomial.legendre.leggauss(3)  # on [−1, 1]
+    t, w = (abscissae + 1) / 2, gauss_weights / 2
+    shapes = np.array([1 - t, t, 4 * t * (1 - t)])  # lower hat, upper hat, bubble of a layer
     density = heights * w * law.pdf(levels[:-1, None] + heights * t)
-    local = np.einsum("lq,iq,jq->lij", density, shapes, shapes)
+    layer_mass = np.einsum("lq,iq,jq->lij", density, shapes, shapes)
     k = np.arange(layers)
     number = np.stack([k, k + 1, k + layers + 1], axis=1)
     mass = np.zeros((2 * layers + 1,) * 2)
-    np.add.at(mass, (number[:, :, None], number[:, None, :]), local)
-    hats, between, bubbles = (
-        mass[: layers + 1, : layers + 1],
-        mass[: layers + 1, layers + 1 :],
-        mass[layers + 1 :, layers + 1 :],
+    np.add.at(mass, (number[:, :, None], number[:, None, :]), layer_mass)
+    hats, bubbles = mass[: layers + 1, : layers + 1], mass[layers + 1 :, layers + 1 :]
+    coupling = mass[: layers + 1, layers + 1 :]  # M_hb
+    projection: Array = np.asarray(np.linalg.solve(hats, coupling), float)
+    orthogonal_mass = bubbles - coupling.T @ projection  # G
+    return ThetaMass(
+        hats=hats.diagonal(),
+        bubbles=bubbles.diagonal(),
+        inverse_root=_inverse_root(hats),
+        bubble_inverse_root=_inverse_root(orthogonal_mass),
+        projection=projection,
     )
-    shift: Array = np.asarray(np.linalg.solve(hats, between), float)
-    root, excess = _inverse_root(hats), _inverse_root(bubbles - between.T @ shift)
-    return ThetaMass(hats.diagonal(), bubbles.diagonal(), root, excess, shift)
 
 
 def _inverse_root(matrix: Array) -> Array:
-    """The symmetric positive definite matrix to the power −½."""
+    """Inverse square root of a symmetric positive definite matrix."""
     values, vectors = np.linalg.eigh(matrix)
     return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 
@@ -122,109 +130,118 @@ class ThetaPreconditioner:
 
     def __init__(self, matrix: PETSc.Mat, numbering: LevelNumbering, law: ThetaLaw) -> None:
         self.numbering = numbering
-        self.mass = theta_mass(law, numbering.grid.levels(law))
+        self.mass = theta_mass(law, numbering.grid.level_thetas(law))
         self.injection = _injection(numbering)
-        self.own = matrix.createVecLeft()
-        self.scatter, self.whole = PETSc.Scatter.toAll(self.own)
-        n, v, layers = numbering.planar, numbering.between, numbering.grid.layers
-        parts = self._blocks(matrix)
+        self.rank_vector = matrix.createVecLeft()
+        self.scatter, self.full_vector = PETSc.Scatter.toAll(self.rank_vector)
+        sizes, layers = (numbering.level_size, numbering.half_level_size), numbering.grid.layers
+        blocks = self._blocks(matrix)
         self.levels = [
-            PlaneSolver(part.PtAP(_hat(n, v, below=k > 0, above=k < layers)), self.mass.hats[k])
-            for k, part in zip(numbering.levels, parts, strict=False)
+            PlaneSolver(block.PtAP(_hats(*sizes, below=k > 0, above=k < layers)), self.mass.hats[k])
+            for k, block in zip(numbering.levels, blocks, strict=False)
         ]
-        self.middles = [
-            PlaneSolver(part, self.mass.bubbles[k])
-            for k, part in zip(numbering.middles, parts[len(self.levels) :], strict=True)
+        self.half_levels = [
+            PlaneSolver(block, self.mass.bubbles[k])
+            for k, block in zip(numbering.half_levels, blocks[len(self.levels) :], strict=True)
         ]
 
     def _blocks(self, matrix: PETSc.Mat) -> list[PETSc.Mat]:
-        """Blocks of this rank's levels with what is half-way beside them, and of that alone."""
+        """Diagonal blocks of each level with its half-way neighbours, then of each half-level."""
         numbering = self.numbering
-        n, v, stride = numbering.planar, numbering.between, numbering.stride
+        n, v, stride = numbering.level_size, numbering.half_level_size, numbering.stride
         spans = [
             (max(0, k * stride - v), min(k * stride + n + v, numbering.size))
             for k in numbering.levels
         ]
-        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.middles]
-        # the first level alone has a part on another rank, and what PETSc fetches is slow
-        first, start = [_stride(*span) for span in spans[:1]], numbering.rows.start
-        others = [_stride(a - start, b - start) for a, b in spans[1:]]
-        own = matrix.getDiagonalBlock()
-        return [*matrix.createSubMatrices(first), *own.createSubMatrices(others)]
+        spans += [(k * stride + n, (k + 1) * stride) for k in numbering.half_levels]
+        # only the first span reaches into another rank, from which PETSc fetches slowly
+        first, start = [_index_range(*span) for span in spans[:1]], numbering.rows.start
+        others = [_index_range(a - start, b - start) for a, b in spans[1:]]
+        rank_matrix = matrix.getDiagonalBlock()
+        return [*matrix.createSubMatrices(first), *rank_matrix.createSubMatrices(others)]
 
     def apply(self, _pc: PETSc.PC, residual: PETSc.Vec, result: PETSc.Vec) -> None:
-        """Result = P⁻¹ residual, called by PETSc."""
-        numbering, corners = self.numbering, self.numbering.between
-        hats, bubbles = numbering.by_level(self._of_all_ranks(residual))
-        hats[:-1, :corners] += bubbles / 2
-        hats[1:, :corners] += bubbles / 2
-        self.own.array[:] = self._solved_levels(hats, bubbles)
-        hats, bubbles = numbering.by_level(self._of_all_ranks(self.own))
-        hats, bubbles = self._own_rows(hats, bubbles)
-        half = len(bubbles)
-        bubbles += (hats[:half, :corners] + hats[1 : half + 1, :corners]) / 2
-        result.array[:] = numbering.from_levels(hats[: len(self.levels)], bubbles)
+        """Set the result to P⁻¹ residual; called by PETSc."""
+        numbering, v = self.numbering, self.numbering.half_level_size
+        # from nodal values to hats and bubbles (transposed), and back: see the head of the file
+        hats, bubbles = numbering.split_levels(self._gather(residual))
+        hats[:-1, :v] += bubbles / 2
+        hats[1:, :v] += bubbles / 2
+        self.rank_vector.array[:] = self._solve_levels(hats, bubbles)
+        hats, bubbles = numbering.split_levels(self._gather(self.rank_vector))
+        hats, bubbles = self._multiply_theta(hats, bubbles)
+        layers = len(bubbles)
+        bubbles += (hats[:layers, :v] + hats[1 : layers + 1, :v]) / 2
+        result.array[:] = numbering.join_levels(hats[: len(self.levels)], bubbles)
 
-    def _solved_levels(self, hats: Array, bubbles: Array) -> Array:
-        """This rank's part of diag(K⁻¹) (M^-½ ⊗ 1; (G^-½ ⊗ 1) Jᵀ Zᵀ) on hats and bubbles."""
-        mass = self.mass
-        root, excess = (
-            mass.root[list(self.numbering.levels)],
-            mass.excess[list(self.numbering.middles)],
-        )
-        orthogonal = excess @ bubbles - (excess @ mass.shift.T @ hats) @ self.injection  # Jᵀ
-        return self.numbering.from_levels(
-            self._solved(self.levels, root @ hats), self._solved(self.middles, orthogonal)
-        )
+    def _solve_levels(self, hats: Array, bubbles: Array) -> Array:
+        """This rank's rows of diag(K⁻¹) (M^-½ ⊗ 1; (G^-½ ⊗ 1) Jᵀ Zᵀ) times hats and bubbles."""
+        mass, numbering = self.mass, self.numbering
+        root = mass.inverse_root[list(numbering.levels)]
+        bubble_root = mass.bubble_inverse_root[list(numbering.half_levels)]
+        projected = (bubble_root @ mass.projection.T @ hats) @ self.injection  # Jᵀ
+        on_levels = self._solve_rows(self.levels, root @ hats)
+        half_way = self._solve_rows(self.half_levels, bubble_root @ bubbles - projected)
+        return numbering.join_levels(on_levels, half_way)
 
-    def _own_rows(self, hats: Array, bubbles: Array) -> tuple[Array, Array]:
-        """(M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) on this rank's levels, with the one above, and half-way."""
-        numbering, mass = self.numbering, self.mass
-        reach = len(numbering.middles) + 1  # the level above takes part in the values half-way
-        rows = slice(numbering.levels.start, numbering.levels.start + reach)
-        shifted = (mass.shift[rows] @ mass.excess @ bubbles) @ self.injection.T  # J
-        return mass.root[rows] @ hats - shifted, mass.excess[list(numbering.middles)] @ bubbles
+    def _multiply_theta(self, hats: Array, bubbles: Array) -> tuple[Array, Array]:
+        """This rank's rows of (M^-½ ⊗ 1; Z J (G^-½ ⊗ 1)) times hats and bubbles.
+
+        Hats include the level above this rank's, which takes part in the values half-way.
+        """
+        mass, numbering = self.mass, self.numbering
+        start = numbering.levels.start
+        rows = slice(start, start + len(numbering.half_levels) + 1)
+        projected = mass.projection[rows] @ mass.bubble_inverse_root @ bubbles
+        rank_hats = mass.inverse_root[rows] @ hats - projected @ self.injection.T  # J
+        return rank_hats, mass.bubble_inverse_root[list(numbering.half_levels)] @ bubbles
 
     def view(self, _pc: PETSc.PC, viewer: PETSc.Viewer) -> None:
-        """Show the solver of a level, called by PETSc for ``-rve_ksp_view``."""
-        count = f"{len(self.levels)} levels and {len(self.middles)} half-way on the first rank"
+        """Print the solver of the first level; called by PETSc for ``-rve_ksp_view``."""
+        count = f"{len(self.levels)} levels and {len(self.half_levels)} half-way on the first rank"
         viewer.printfASCII(f"    preconditioner along θ, {count}, each solved by\n")
-        of_rank = viewer.getSubViewer(PETSc.COMM_SELF)
+        rank_viewer = viewer.getSubViewer(PETSc.COMM_SELF)
         if 0 in self.numbering.levels:  # like all others
-            self.levels[0].view(of_rank)
-        viewer.restoreSubViewer(of_rank)
+            self.levels[0].view(rank_viewer)
+        viewer.restoreSubViewer(rank_viewer)
 
-    def _of_all_ranks(self, vector: PETSc.Vec) -> Array:
-        self.scatter.scatter(vector, self.whole)
-        return np.asarray(self.whole.array_r)
+    def _gather(self, vector: PETSc.Vec) -> Array:
+        self.scatter.scatter(vector, self.full_vector)
+        return np.asarray(self.full_vector.array_r)
 
     @staticmethod
-    def _solved(solvers: list[PlaneSolver], rows: Array) -> Array:
+    def _solve_rows(solvers: list[PlaneSolver], rows: Array) -> Array:
         """Solutions of this rank's blocks, one for each row."""
         solutions = [solver(rows[k]) for k, solver in enumerate(solvers)]
         return np.array(solutions).reshape(rows.shape)
 
 
-def _stride(first: int, last: int) -> PETSc.IS:
+def _index_range(first: int, last: int) -> PETSc.IS:
     """Indices of this rank from `first` to below `last`."""
     return PETSc.IS().createStride(last - first, first, 1, comm=PETSc.COMM_SELF)
 
 
-def _hat(planar: int, corners: int, *, below: bool, above: bool) -> PETSc.Mat:
-    """Nodal values of a level's hats: half on the vertices half-way below and above."""
-    half, level = sp.eye(corners, planar) / 2, sp.eye(planar)
+def _hats(level_size: int, half_size: int, *, below: bool, above: bool) -> PETSc.Mat:
+    """Matrix from a level's unknowns to nodal values: 1 on it, ½ at vertices half-way beside it."""
+    half, level = sp.eye(half_size, level_size) / 2, sp.eye(level_size)
     stacked = sp.vstack([half] * below + [level] + [half] * above, "csr")
     csr = stacked.indptr.astype(PETSc.IntType), stacked.indices.astype(PETSc.IntType)
     return PETSc.Mat().createAIJ(stacked.shape, csr=(*csr, stacked.data), comm=PETSc.COMM_SELF)
 
 
 def _injection(numbering: LevelNumbering) -> sp.csr_matrix:
-    """J: a linear field on vertices, carried on to edge midpoints, shape (planar, between)."""
-    corners, ends = numbering.periodicity.vertices, numbering.periodicity.ends(numbering.grid.plane)
-    rows, is_free = np.arange(corners, numbering.periodicity.count), ends >= 0
-    middle = sp.csr_matrix(
-        (np.full(is_free.sum(), 0.5), (np.repeat(rows, 2).reshape(-1, 2)[is_free], ends[is_free])),
-        (numbering.periodicity.count, corners),
+    """Matrix J from linear to quadratic triangles, shape (level_size, half_level_size).
+
+    Edge midpoints get the mean of their two vertices.
+    """
+    periodicity = numbering.periodicity
+    vertices, count, ends = (
+        periodicity.vertices,
+        periodicity.count,
+        periodicity.ends(numbering.grid.plane),
     )
-    linear = middle + sp.eye(numbering.periodicity.count, corners)
-    return sp.kron(linear, sp.eye(2), "csr")
+    is_free = ends >= 0
+    rows = np.repeat(np.arange(vertices, count), 2).reshape(-1, 2)[is_free]
+    halves = np.full(is_free.sum(), 0.5)
+    midpoints = sp.csr_matrix((halves, (rows, ends[is_free])), (count, vertices))
+    return sp.kron(midpoints + sp.eye(count, vertices), sp.eye(2), "csr")

@@ -21,17 +21,18 @@ def space_stiffness(phase: Phase) -> Array:
 
 
 def hashin_shtrikman(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
-    """Bounds of K and μ in Pa: shape (2 moduli, 2 ends, …) for volume fractions of shape (…)."""
-    share = np.asarray(fraction, float)
+    """Hashin–Shtrikman bounds of K and μ in Pa, for volume fractions of shape (…).
+
+    Returns:
+        Lower and upper bound of K, lower and upper bound of μ: shape (2, 2, …).
+    """
     bulks, shears = zip(*(map(float, x.bulk_and_shear) for x in (matrix, inclusion)), strict=True)
-    ends = [
-        [
-            _harmonic_about(share, pair, x)
-            for pair, x in zip((bulks, shears), _around(end(bulks), end(shears)), strict=True)
-        ]
-        for end in (min, max)
-    ]
-    return np.swapaxes(np.array(ends), 0, 1)
+    bounds = []
+    for extreme in (min, max):
+        bulk_term, shear_term = _reference_terms(extreme(bulks), extreme(shears))
+        bulk_bound = _harmonic_mean_with(fraction, bulks, bulk_term)
+        bounds.append([bulk_bound, _harmonic_mean_with(fraction, shears, shear_term)])
+    return np.swapaxes(np.array(bounds), 0, 1)
 
 
 def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
@@ -39,19 +40,20 @@ def mori_tanaka(fraction: Array, matrix: Phase, inclusion: Phase) -> Array:
 
     The bound that the matrix gives: the lower one of stiffer spheres, the upper one of softer.
     """
-    share, around = np.asarray(fraction, float), _around(*matrix.bulk_and_shear)
+    terms = _reference_terms(*matrix.bulk_and_shear)
     pairs = zip(matrix.bulk_and_shear, inclusion.bulk_and_shear, strict=True)
     return np.array(
-        [_harmonic_about(share, pair, x) for pair, x in zip(pairs, around, strict=True)]
+        [_harmonic_mean_with(fraction, pair, term) for pair, term in zip(pairs, terms, strict=True)]
     )
 
 
-def _harmonic_about(share: Array, moduli: tuple[float, float], around: float) -> Array:
-    """Harmonic mean of matrix's and particle's moduli, each with `around` added, less that."""
-    first, second = moduli
-    return np.asarray(1 / ((1 - share) / (first + around) + share / (second + around)) - around)
+def _harmonic_mean_with(fraction: Array, moduli: tuple[float, float], term: float) -> Array:
+    """X of 1/(X + term) = Σ fraction/(modulus + term), of the matrix's and particle's moduli."""
+    matrix, particle = moduli
+    f = np.asarray(fraction, float)
+    return np.asarray(1 / ((1 - f) / (matrix + term) + f / (particle + term)) - term)
 
 
-def _around(bulk: float, shear: float) -> tuple[float, float]:
+def _reference_terms(bulk: float, shear: float) -> tuple[float, float]:
     """Terms that Hashin and Shtrikman add to bulk and shear moduli in a reference material."""
     return 4 / 3 * shear, shear / 6 * (9 * bulk + 8 * shear) / (bulk + 2 * shear)

@@ -22,14 +22,14 @@ MODELS = [
 
 
 def solved(model, matrix=MATRIX, particle=PARTICLE):
-    return model.solve(RADIUS, matrix, [particle])[0].averaged("isotropic")
+    return model.solve(RADIUS, matrix, [particle])[0].with_average("isotropic")
 
 
 def test_the_shares_of_the_paper_s_cell_are_those_of_differences_of_its_modulus():
     result = SeriesModel(energies=True).solve(RADIUS, MATRIX, [Phase(80e9, 0.3)])[0]
     of_phases = [
-        result.averaged(x)
-        .energies.energy_fractions(result.averaged(x).constants_of)[0][..., 0]
+        result.with_average(x)
+        .energies.energy_fractions(result.with_average(x).constants_of)[0][..., 0]
         .sum(1)
         for x in ("axes", "isotropic")
     ]

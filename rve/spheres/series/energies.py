@@ -18,37 +18,41 @@ STEP, TOLERANCE = 0.02, 1e-7
 """Relative step of a modulus, and truncation error of the series: loss factors to four digits."""
 WEIGHTS = {-2: (1 / 12, 0.0), -1: (-2 / 3, -0.5), 1: (2 / 3, 0.5), 2: (-1 / 12, 0.0)}
 """Of the values at multiples of the step: for derivatives of fourth and of second order."""
-OF_RULE = 10.0
+RULE_FACTOR = 10.0
 """Error of mean derivatives by the rule in θ, over that of the mean moduli."""
 
 
 def mean_energies(
     radius_map: RadiusMap, matrix: Phase, inclusions: Sequence[Phase], means: Sequence[Mean]
 ) -> list[PhaseEnergies]:
-    """X ∂c/∂X of K, (C11 − C12)/2 and C44 for K and G of both phases, for each inclusion.
+    """Parts X ∂c/∂X of K and G of both phases in K, (C11 − C12)/2 and C44, for each inclusion.
 
-    Errors hold the difference of both orders, the truncation and the rule in θ.
+    Errors are those of the differences, of the truncated series and of the rule in θ.
     """
     energies = []
     for inclusion, mean in zip(inclusions, means, strict=True):
-        values, judge = _differences(radius_map(mean.curve.theta), mean, matrix, inclusion)
-        relative = TOLERANCE / STEP + OF_RULE * mean.errors["theta"]
-        energies.append(
-            PhaseEnergies(values, abs(values - judge) + relative * values.sum(axis=(0, 1)))
-        )
+        radii = radius_map(mean.curve.theta)
+        values, second_order = _energies_by_differences(radii, mean, matrix, inclusion)
+        relative_error = TOLERANCE / STEP + RULE_FACTOR * mean.errors["theta"]
+        errors = abs(values - second_order) + relative_error * values.sum(axis=(0, 1))
+        energies.append(PhaseEnergies(values, errors))
     return energies
 
 
-def _differences(radii: Array, mean: Mean, matrix: Phase, inclusion: Phase) -> Array:
-    """Mean energies by differences of fourth and of second order, shape (2, 2, 2, 3), in Pa."""
+def _energies_by_differences(radii: Array, mean: Mean, matrix: Phase, inclusion: Phase) -> Array:
+    """Mean energies over θ by differences of fourth and of second order, in Pa.
+
+    Returns:
+        Shape (2 orders, 2 phases, K and G, 3 moduli).
+    """
     moduli = np.array([matrix.bulk_and_shear, inclusion.bulk_and_shear])
     energies = np.zeros((2, 2, 2, 3))
     for phase, kind in product(range(2), repeat=2):
-        for count, weights in WEIGHTS.items():
-            moved = moduli.copy()
-            moved[phase, kind] *= 1 + count * STEP
-            pair = [Phase.of_bulk_and_shear(*values) for values in moved]
-            cells = cubic_stiffness(radii, pair[0], pair[1:], tolerance=TOLERANCE)
-            change = mean.curve.weights @ cells.moduli[:, 0] / STEP
-            energies[:, phase, kind] += np.multiply.outer(weights, change)
+        for multiple, weights in WEIGHTS.items():
+            stepped = moduli.copy()
+            stepped[phase, kind] *= 1 + multiple * STEP
+            stepped_matrix, stepped_inclusion = (Phase.of_bulk_and_shear(*x) for x in stepped)
+            cells = cubic_stiffness(radii, stepped_matrix, [stepped_inclusion], tolerance=TOLERANCE)
+            mean_moduli = mean.curve.weights @ cells.moduli[:, 0]
+            energies[:, phase, kind] += np.multiply.outer(weights, mean_moduli / STEP)
     return energies

@@ -24,7 +24,7 @@ _REACH = 4  # of Ewald's sums: exp(−π 17) is the first term left out
 
 
 def harmonics(points: Array, highest: int, order: int) -> Array:
-    """Real parts of Racah's C_n^m of directions, m = `order`, n = 0 … `highest`.
+    """Real parts of Racah's spherical harmonics C_n^m of the directions of points, for one m.
 
     Args:
         points: Shape (k, 3), none zero.
@@ -40,34 +40,39 @@ def harmonics(points: Array, highest: int, order: int) -> Array:
     values = np.zeros((highest + 1, len(points)))
     if order > highest:
         return values
-    factors = np.sqrt((2 * np.arange(1, order + 1) - 1) / (2 * np.arange(1, order + 1)))
-    values[order] = (-1) ** order * np.prod(factors) * (flat**order).real
-    for n in range(order + 1, highest + 1):
-        before = np.sqrt((n - 1) ** 2 - order**2) * values[n - 2] if n > order + 1 else 0.0
-        values[n] = ((2 * n - 1) * cosine * values[n - 1] - before) / np.sqrt(n**2 - order**2)
+    m = np.arange(1, order + 1)
+    values[order] = (-1) ** order * np.prod(np.sqrt((2 * m - 1) / (2 * m))) * (flat**order).real
+    for n in range(order + 1, highest + 1):  # three-term recurrence in n
+        values[n] = (2 * n - 1) * cosine * values[n - 1]
+        if n > order + 1:
+            values[n] -= np.sqrt((n - 1) ** 2 - order**2) * values[n - 2]
+        values[n] /= np.sqrt(n**2 - order**2)
     return values
 
 
 @cache
 def lattice_sums(highest: int) -> tuple[Array, Array]:
-    """S and D by degree and order, shape (highest + 1, highest + 1); zero where symmetry says so.
+    """Lattice sums Σ C_n^m |p|^(−n−1) and Σ C_n^m |p|^(1−n) by degree n and order m.
 
     Args:
         highest: Largest degree, at least 4.
+
+    Returns:
+        Shape (highest + 1, highest + 1) each; zero where symmetry says so.
     """
     harmonic, biharmonic = np.zeros((2, highest + 1, highest + 1))
-    near, far = _points(_REACH), _points(3)
-    for order in range(0, highest + 1, 4):
-        ewald = harmonics(near, min(highest, _DIRECT), order)
-        direct = harmonics(far, highest, order)
-        for n in range(max(4, order), highest + 1, 2):
+    ewald_points, direct_points = _points(_REACH), _points(3)
+    radius = np.linalg.norm(direct_points, axis=1)
+    for m in range(0, highest + 1, 4):
+        ewald = harmonics(ewald_points, min(highest, _DIRECT), m)
+        direct = harmonics(direct_points, highest, m)
+        for n in range(max(4, m), highest + 1, 2):
             if n <= _DIRECT:
-                harmonic[n, order] = _epstein(ewald[n], near, n, 1)
-                biharmonic[n, order] = _epstein(ewald[n], near, n, -1)
+                harmonic[n, m] = _epstein(ewald[n], ewald_points, n, 1)
+                biharmonic[n, m] = _epstein(ewald[n], ewald_points, n, -1)
             else:
-                radius = np.linalg.norm(far, axis=1)
-                harmonic[n, order] = direct[n] @ radius ** (-n - 1.0)
-                biharmonic[n, order] = direct[n] @ radius ** (1.0 - n)
+                harmonic[n, m] = direct[n] @ radius ** (-n - 1.0)
+                biharmonic[n, m] = direct[n] @ radius ** (1.0 - n)
     return harmonic, biharmonic
 
 
@@ -80,11 +85,18 @@ def _points(reach: int) -> Array:
 
 
 def _epstein(angular: Array, points: Array, n: int, power: int) -> float:
-    """Σ C_n^m |p|^(−n−power), power 1 or −1, by Ewald's split at t = 1."""
+    """Lattice sum Σ C_n^m |p|^(−n−power) by Ewald's split of the theta function at t = 1.
+
+    Args:
+        angular: C_n^m at the points.
+        points: Lattice points p near the origin, shape (k, 3).
+        n: Degree.
+        power: 1 or −1.
+    """
     square = (points**2).sum(axis=1)
     s, x = n + power / 2, np.pi * square
-    near = angular @ (square ** (-(n + power) / 2) * gammaincc(s, x))
+    direct = angular @ (square ** (-(n + power) / 2) * gammaincc(s, x))
     # the reciprocal lattice is the lattice itself: Γ(1, x)/x or Γ(2, x)/x²
-    tail = np.exp(-x) * (1 / x if power == 1 else (1 + x) / x**2)
-    scale = np.exp(s * np.log(np.pi) - gammaln(s))
-    return float(near + (-1) ** (n // 2) * scale * (angular * square ** (n / 2)) @ tail)
+    gamma = np.exp(-x) * (1 / x if power == 1 else (1 + x) / x**2)
+    scale = (-1) ** (n // 2) * np.exp(s * np.log(np.pi) - gammaln(s))
+    return float(direct + scale * (angular * square ** (n / 2)) @ gamma)

@@ -28,7 +28,7 @@ class SphereSeriesModel(SeriesModel):
         return cubic_stiffness(radii, matrix, inclusions, tolerance=self.accuracy)
 
     def _result(self, mean: Mean, cell: Cell, seconds: float) -> HomogenisedSpheres:
-        """The certified result of one inclusion."""
+        """Result of one inclusion from its means over θ, with its checks."""
         return spheres_with_checks(
             HomogenisedSpheres(
                 curve=mean.curve,

@@ -11,7 +11,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.rve.cell import Phase
 from alphacut.rve.series.truncation import CellModuli, Truncation
 from alphacut.rve.spheres.cubic import cubic_voigt
-from alphacut.rve.spheres.series.scattering import scattering
+from alphacut.rve.spheres.series.scattering import t_matrices
 from alphacut.rve.spheres.series.translation import VOLUME, Multipoles, couplings
 
 
@@ -35,7 +35,7 @@ TRUNCATION = Truncation(
 def cubic_stiffness(
     radius: Array, matrix: Phase, inclusions: Sequence[Phase], *, tolerance: float = 1e-10
 ) -> CellModuli:
-    """K, (C11 − C12)/2 and C44 of n cells times m inclusions.
+    """K, (C11 − C12)/2 and C44 of n cubic cells times m inclusions, with declared errors.
 
     Args:
         radius: Radii over half the cell's side, shape (n,), each in [0, 1).
@@ -50,44 +50,46 @@ def cubic_stiffness(
     """
 
     def solve(radii: Array, degree: int) -> Array:
-        """By mean stress less that of the far field, from force dipoles."""
+        """K, (C11 − C12)/2 and C44: those of the matrix less the mean stress of force dipoles."""
         (bulk, mu), nu = matrix.bulk_and_shear, matrix.poisson
-        axial, sheared = (
-            _dipoles(radii, matrix, inclusions, degree, shear=shear) for shear in (False, True)
-        )
-        scale = 8 * np.pi * mu * (1 - nu) * radii[:, None] ** 3 / VOLUME
+        axial = _dipoles(radii, matrix, inclusions, degree, shear=False)
+        shear = _dipoles(radii, matrix, inclusions, degree, shear=True)
         axial[..., 0] /= -3 * (1 - 2 * nu)
-        dipoles = np.concatenate([axial, sheared], axis=-1)
+        dipoles = np.concatenate([axial, shear], axis=-1)
+        scale = 8 * np.pi * mu * (1 - nu) * radii[:, None] ** 3 / VOLUME
         return np.asarray(np.array([bulk, mu, mu]) - scale[..., None] * dipoles)
 
-    return TRUNCATION.settle(radius, len(inclusions), solve, tolerance=tolerance)
+    return TRUNCATION.converged_moduli(radius, len(inclusions), solve, tolerance=tolerance)
 
 
 def _dipoles(
     radius: Array, matrix: Phase, inclusions: Sequence[Phase], degree: int, *, shear: bool
 ) -> Array:
-    """Leading amplitudes over r³ at unit strains: of hydrostatic and deviatoric, or shear load.
+    """Force dipoles of n times m spheres over r³ under unit strains, shape (n, m, loads).
 
-    Returns:
-        Shape (n, m, loads).
+    The loads are hydrostatic and axial deviatoric strain, or shear strain alone. Amplitudes of the
+    singular solutions follow from T (regular amplitudes of the far field and of all images).
     """
     poles = multipoles(degree, shear=shear)
-    inward, outward = (radius[:, None] ** power for power in _powers(poles))
-    images = couplings(degree, matrix.poisson, shear=shear) * inward[..., None] * outward[:, None]
-    least = 2 if shear else 0
-    loads = [(poles.index_of(1, 2, least), poles.index_of(3, 2, least), 1.0)]
+    regular_scale, singular_scale = (radius[:, None] ** power for power in _powers(poles))
+    images = couplings(degree, matrix.poisson, shear=shear)
+    images = images * regular_scale[..., None] * singular_scale[:, None]
+    order = 2 if shear else 0
+    # of each load: index of its far field, of its dipole, and amplitude at unit strain
+    loads = [(poles.index_of(1, 2, order), poles.index_of(3, 2, order), 1.0)]
     if not shear:
         unit = -1 / (2 * (1 - 2 * matrix.poisson))  # solution 3 of degree 0 is −2(1 − 2ν) x
         loads.insert(0, (poles.index_of(3, 0, 0), poles.index_of(1, 0, 0), unit))
-    sources, poles_of, units = map(list, zip(*loads, strict=True))
+    sources, dipole_rows, units = map(list, zip(*loads, strict=True))
     columns, dipoles = range(len(loads)), np.empty((radius.size, len(inclusions), len(loads)))
-    far = np.zeros((poles.n.size, len(loads)))
-    far[sources, columns] = units
+    far_field = np.zeros((poles.n.size, len(loads)))
+    far_field[sources, columns] = units
     for j, inclusion in enumerate(inclusions):
-        spheres = scatterers(degree, matrix, inclusion, shear=shear)
-        system = np.eye(poles.n.size) - answer(spheres, images)
-        right = np.broadcast_to(answer(spheres, far), (*system.shape[:2], len(loads)))
-        dipoles[:, j] = np.linalg.solve(system, right)[:, poles_of, columns]
+        sphere = cached_t_matrices(degree, matrix, inclusion, shear=shear)
+        system = np.eye(poles.n.size) - apply_t_matrices(sphere, images)
+        source = apply_t_matrices(sphere, far_field)
+        source = np.broadcast_to(source, (*system.shape[:2], len(loads)))
+        dipoles[:, j] = np.linalg.solve(system, source)[:, dipole_rows, columns]
     return dipoles
 
 
@@ -99,22 +101,24 @@ def _powers(poles: Multipoles) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=256)
 def multipoles(degree: int, *, shear: bool) -> Multipoles:
-    """Those up to a degree, made once."""
+    """Multipoles up to a degree that axial or shear loads excite; cached."""
     return Multipoles.up_to(degree, shear=shear)
 
 
 @lru_cache(maxsize=1024)
-def scatterers(degree: int, matrix: Phase, inclusion: Phase, *, shear: bool) -> tuple[Array, Array]:
-    """Answer of a sphere to the multipoles of one load: `scattering`, made once."""
+def cached_t_matrices(
+    degree: int, matrix: Phase, inclusion: Phase, *, shear: bool
+) -> tuple[Array, Array]:
+    """T-matrices of a sphere for the multipoles of one load: of solutions 1 and 3, and of 2."""
     poles = multipoles(degree, shear=shear)
-    pair, torsion = scattering(poles.n, matrix, inclusion)
+    pair, torsion = t_matrices(poles.n, matrix, inclusion)
     return pair[poles.kind == 1], torsion[poles.kind == 2]
 
 
-def answer(spheres: tuple[Array, Array], regular: Array) -> Array:
-    """Singular amplitudes for regular ones, shape (…, N, columns)."""
-    pair, torsion = spheres
+def apply_t_matrices(sphere: tuple[Array, Array], regular: Array) -> Array:
+    """Singular amplitudes T @ regular, both of shape (…, N, columns), Lamé solution by solution."""
+    pair, torsion = sphere
     first, second, third = np.split(regular, [len(pair), len(pair) + torsion.size], axis=-2)
-    (a, b), (c, d) = np.moveaxis(pair[..., None], 0, 2)
-    answers = (a * first + b * third, torsion[:, None] * second, c * first + d * third)
-    return np.concatenate(answers, axis=-2)
+    (t11, t13), (t31, t33) = np.moveaxis(pair[..., None], 0, 2)
+    singular = (t11 * first + t13 * third, torsion[:, None] * second, t31 * first + t33 * third)
+    return np.concatenate(singular, axis=-2)

@@ -49,12 +49,15 @@ class Multipoles:
 
     @classmethod
     def up_to(cls, highest: int, *, shear: bool) -> Multipoles:
-        """Those up to degree `highest`: m = 0, 4, … of axial loads, m = 2, 6, … of ε12."""
+        """All up to degree `highest`: m = 0, 4, … for axial loads, m = 2, 6, … for ε12."""
         first = 2 if shear else 0
         even = [(n, m) for n in range(first, highest + 1, 2) for m in range(first, n + 1, 4)]
         odd = [(n, m) for n in range(3, highest + 1, 2) for m in range(first or 4, n + 1, 4)]
-        rows = [(*p, kind) for kind, orders in ((1, even), (2, odd), (3, even)) for p in orders]
-        return cls(*np.array(rows).T)
+        rows = [(n, m, 1) for n, m in even]
+        rows += [(n, m, 2) for n, m in odd]
+        rows += [(n, m, 3) for n, m in even]
+        n, m, kind = np.array(rows).T
+        return cls(n, m, kind)
 
     def index_of(self, kind: int, n: int, m: int) -> int:
         """Index of one multipole."""
@@ -63,7 +66,7 @@ class Multipoles:
 
 @lru_cache(maxsize=96)  # as many Poisson ratios and degrees as a fuzzy modulus takes
 def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
-    """Amplitudes of regular solutions (rows) that the images of unit multipoles (columns) make.
+    """Regular amplitudes (rows) at one sphere by unit multipoles at all its images (columns).
 
     Args:
         highest: Largest degree n.
@@ -76,16 +79,16 @@ def couplings(highest: int, poisson: float, *, shear: bool) -> Array:
     poles = Multipoles.up_to(highest, shear=shear)
     sums = lattice_sums(max(2 * highest, 4))
     coupling = np.zeros((poles.n.size, poles.n.size))
-    for to, source in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
-        rows, columns = np.flatnonzero(poles.kind == to), np.flatnonzero(poles.kind == source)
+    for target, source in ((1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)):
+        rows, columns = np.flatnonzero(poles.kind == target), np.flatnonzero(poles.kind == source)
         k, j = poles.n[rows, None], poles.m[rows, None]
         n, m = poles.n[None, columns], poles.m[None, columns]
-        mirror = (-1.0 if source == 2 else 1.0) * (-1.0 if shear else 1.0) * (m > 0)
-        coupling[np.ix_(rows, columns)] = _coupling(to, source, _Pair(n, m, k, j), poisson, sums)
-        coupling[np.ix_(rows, columns)] += mirror * _coupling(
-            to, source, _Pair(n, -m, k, j), poisson, sums
-        )
-    return _made_periodic(coupling, poles, poisson, shear=shear)
+        # the multipole of −m has the same amplitude or its negative
+        sign = (-1.0 if source == 2 else 1.0) * (-1.0 if shear else 1.0)
+        of_m = _coupling(target, source, _Pair(n, m, k, j), poisson, sums)
+        of_minus_m = _coupling(target, source, _Pair(n, -m, k, j), poisson, sums)
+        coupling[np.ix_(rows, columns)] = of_m + np.where(m > 0, sign * of_minus_m, 0.0)
+    return _with_periodic_strain(coupling, poles, poisson, shear=shear)
 
 
 @dataclass(frozen=True)
@@ -98,59 +101,76 @@ class _Pair:
     j: Array
 
 
-def _coupling(to: int, source: int, at: _Pair, poisson: float, sums: tuple[Array, Array]) -> Array:
-    """Amplitude of Lamé solution `to` by the images of solution `source`."""
-    n, k = at.n, np.maximum(at.k, 1) if to == 1 else at.k
-    if to == source:
-        same = _scaled(sums[0], at, 0)
-        factors = {1: at.k > 0, 2: -n / (k + 1), 3: n * (2 * n - 1) / ((k + 1) * (2 * k + 3))}
-        return np.asarray(factors[to] * same)
-    if 2 in (to, source):
-        turned = (n * at.j + k * at.m) * _scaled(sums[0], at, -1)
-        if to == 1:
-            return np.asarray(-turned / k)
-        return np.asarray(4 * (2 * n - 1) * (1 - poisson) / (k * (k + 1)) * turned)
-    alpha, c = 4 - 4 * poisson - n, 2 * (3 * n + 2 - 2 * poisson * (2 * n + 1))
-    tilt = (2 * alpha * (k - 1) + c) / (2 * (n + k) - 1)
-    far = (alpha - tilt) * 4 * _scaled(sums[1], at, 0)
-    lower = tilt / (k * (2 * k - 1)) * _lifted(at) * _scaled(sums[0], at, -2)
-    return np.where(at.k > 0, far - lower, 0.0)
+def _coupling(
+    target: int, source: int, pair: _Pair, poisson: float, sums: tuple[Array, Array]
+) -> Array:
+    """Amplitude of regular Lamé solution `target` by the images of multipoles of kind `source`.
 
+    Formulas at the head of the file; α and c are those of the multipole (n, m), whose solid
+    harmonic has the degree −n − 1, and (k, j) is the regular solution.
 
-def _scaled(sums: Array, at: _Pair, lower: int) -> Array:
-    """(−1)^n w_N^M / (w_n^m w_k^j) Σ f_N^M(P), N = n + k + `lower`, M = m − j, P = 2p.
-
-    w_n^m = √((n − m)! (n + m)!) carries amplitudes of the ladder's harmonics to Racah's.
+    Args:
+        target: Lamé solution 1, 2 or 3.
+        source: Lamé solution, not below the target.
+        pair: n, m, k and j.
+        poisson: Poisson's ratio of the matrix.
+        sums: Harmonic and biharmonic lattice sums.
     """
-    total, order = at.n + at.k + lower, abs(at.m - at.j)
-    valid = (order <= total) & (total >= 0)
-    total, order = np.where(valid, total, 0), np.where(valid, order, 0)
-    weight = _log_weight(total, order) - _log_weight(at.n, at.m) - _log_weight(at.k, at.j)
-    size = np.exp(weight - (total + 1) * np.log(2)) * sums[total, order]
-    return np.where(valid, np.where(at.n % 2, -size, size), 0.0)
+    harmonic, biharmonic = sums
+    n, k = pair.n, np.maximum(pair.k, 1) if target == 1 else pair.k
+    if target == source:
+        factors = {1: pair.k > 0, 2: -n / (k + 1), 3: n * (2 * n - 1) / ((k + 1) * (2 * k + 3))}
+        return np.asarray(factors[target] * _weighted_sum(harmonic, pair, 0))
+    if 2 in (target, source):  # by the ladder operators
+        rotated = (n * pair.j + k * pair.m) * _weighted_sum(harmonic, pair, -1)
+        if target == 1:
+            return np.asarray(-rotated / k)
+        return np.asarray(4 * (2 * n - 1) * (1 - poisson) / (k * (k + 1)) * rotated)
+    alpha, c = 4 - 4 * poisson - n, 2 * (3 * n + 2 - 2 * poisson * (2 * n + 1))
+    projection = (2 * alpha * (k - 1) + c) / (2 * (n + k) - 1)
+    by_biharmonic = (alpha - projection) * 4 * _weighted_sum(biharmonic, pair, 0)
+    factor = projection / (k * (2 * k - 1)) * _projection_factor(pair)
+    by_harmonic = factor * _weighted_sum(harmonic, pair, -2)
+    return np.where(pair.k > 0, by_biharmonic - by_harmonic, 0.0)
+
+
+def _weighted_sum(sums: Array, pair: _Pair, lower: int) -> Array:
+    """Lattice sum (−1)^n w_N^M / (w_n^m w_k^j) Σ f_N^M(P) with N = n + k + `lower`, M = m − j.
+
+    w_n^m = √((n − m)! (n + m)!) carries amplitudes of the ladder's harmonics to Racah's; P = 2p.
+    """
+    degree, order = pair.n + pair.k + lower, abs(pair.m - pair.j)
+    exists = (order <= degree) & (degree >= 0)
+    degree, order = np.where(exists, degree, 0), np.where(exists, order, 0)
+    weight = _log_weight(degree, order) - _log_weight(pair.n, pair.m) - _log_weight(pair.k, pair.j)
+    value = np.exp(weight - (degree + 1) * np.log(2)) * sums[degree, order]
+    return np.where(exists, np.where(pair.n % 2, -value, value), 0.0)
 
 
 def _log_weight(n: Array, m: Array) -> Array:
     return np.asarray((gammaln(n - m + 1) + gammaln(n + m + 1)) / 2)
 
 
-def _lifted(at: _Pair) -> Array:
+def _projection_factor(pair: _Pair) -> Array:
     """Factor of f_{n+k-2}^{m-j}(P) in H[(x·P) F]_k, times (2k − 1)(2n + 2k − 1)."""
-    degree, order, p, q = at.n + at.k - 1, at.m - at.j, at.k - at.j, at.k + at.j
+    degree, order = pair.n + pair.k - 1, pair.m - pair.j
+    p, q = pair.k - pair.j, pair.k + pair.j
     a, b = degree - order, degree + order
     sides = q * (q - 1) * b * (b + 1) + p * (p - 1) * a * (a + 1)
     return np.asarray(1.0 * p * q * a * b - sides / 2)
 
 
-def _made_periodic(coupling: Array, poles: Multipoles, poisson: float, *, shear: bool) -> Array:
-    """Add the uniform strain that gives the sums of degree −2 no mean strain."""
+def _with_periodic_strain(
+    coupling: Array, poles: Multipoles, poisson: float, *, shear: bool
+) -> Array:
+    """The couplings less the mean strain of the conditionally convergent sums, those of degree −2.
+
+    The array is changed in place.
+    """
     m = 2 if shear else 0
-    # of solution 3, a polarised ball: less its strain by Eshelby
-    coupling[poles.index_of(1, 2, m), poles.index_of(3, 2, m)] -= (
-        16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)
-    )
+    polarised_ball = 16 * np.pi * (4 - 5 * poisson) / (15 * VOLUME)  # strain of Eshelby's ball
+    coupling[poles.index_of(1, 2, m), poles.index_of(3, 2, m)] -= polarised_ball
     if not shear:  # the periodic 1/r has the Laplacian 4π/V besides its poles: strain 4π/(3V)
-        coupling[poles.index_of(3, 0, 0), poles.index_of(1, 0, 0)] -= (
-            4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
-        )
+        dilatation = 4 * np.pi / (6 * VOLUME * (1 - 2 * poisson))
+        coupling[poles.index_of(3, 0, 0), poles.index_of(1, 0, 0)] -= dilatation
     return coupling

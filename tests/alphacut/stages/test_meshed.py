@@ -33,7 +33,7 @@ STIFFNESS = (
 def modulus(young):
     phases = {"matrix": Phase(20e9), "particles": Phase(young)}
     model = PrismModel(mesh=MESHES / "two-particles.msh")
-    return model.solve(TruncatedNormal(-3, 3), phases)[0].averaged("isotropic").modulus
+    return model.solve(TruncatedNormal(-3, 3), phases)[0].with_average("isotropic").modulus
 
 
 def test_fuzzy_phases_of_a_mesh_run_to_a_report(tmp_path, capsys):

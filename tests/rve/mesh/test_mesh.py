@@ -11,7 +11,7 @@ from alphacut.rve.mesh.columns import extrude
 from alphacut.rve.mesh.curved import curved_nodes, plane_mesh
 from alphacut.rve.mesh.jacobian import jacobian_ratios
 from alphacut.rve.mesh.periodicity import MeshError, identify, unknowns
-from alphacut.rve.mesh.prism_grid import moved
+from alphacut.rve.mesh.prism_grid import nodes_at_radii
 from alphacut.rve.mesh.triangulation import reference_radius
 from alphacut.rve.outline import Ellipse, area, circle, is_round
 from alphacut.stochastic import HermiteMap
@@ -35,7 +35,7 @@ def test_sliding_keeps_triangles_sound_and_the_interface_on_its_outline(outline)
     mesh = extrude(size=0.2, radius=0.5, outline=outline, layers=1).plane
     signs = np.sign(areas(mesh.points, mesh.triangles))
     for radius in (0.05, 0.3, 0.65):
-        points = moved(mesh, np.array([radius]))[0]
+        points = nodes_at_radii(mesh, np.array([radius]))[0]
         assert (areas(points, mesh.triangles) * signs > 0).all()
         x, y = points[mesh.arc].T
         assert np.hypot(x, y) == pytest.approx(radius * outline(np.arctan2(y, x)), rel=1e-12)
@@ -138,7 +138,7 @@ def test_the_sign_of_z_marks_the_cone():
     grid = extrude(size=0.5, radius=0.0, layers=2)
     cone = HermiteMap(0.2, 0, 0.8, 0)
     points = np.array([[0.49, 0, 0.0], [0.51, 0, 0.0], [0.3, 0, -3], [0.3, 0, 3]])
-    assert grid.sign(points, cone).tolist() == [1, 0, 0, 1]
+    assert grid.particle_indicator(points, cone).tolist() == [1, 0, 0, 1]
 
 
 @pytest.mark.parametrize(

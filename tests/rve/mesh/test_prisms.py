@@ -11,7 +11,7 @@ from alphacut.rve.fenicsx import MPI
 from alphacut.rve.mesh import gmsh_prisms, square
 from alphacut.rve.mesh.columns import extrude, grid_of
 from alphacut.rve.mesh.periodicity import MeshError
-from alphacut.rve.mesh.wedge import slab_rule, wedge
+from alphacut.rve.mesh.wedge import prism_rule, wedge
 from alphacut.rve.outline import Ellipse, circle
 from alphacut.rve.prism.form import PrismForm
 from alphacut.stochastic import HermiteMap
@@ -21,7 +21,7 @@ MAP = HermiteMap(0.3, 0, 0.6, 0)
 
 def volumes(points, cells):
     """Of prisms of 15 nodes in Basix's order, by quadrature, shape (m,)."""
-    at, weights = slab_rule()
+    at, weights = prism_rule()
     slopes = wedge(1).tabulate(1, at)[1:].reshape(3, len(at), 15)
     jacobians = np.einsum("dqn,mnx->mqdx", slopes, points[cells])
     return np.linalg.det(jacobians) @ weights

@@ -31,8 +31,8 @@ def test_span_is_quadratic_in_the_plane_times_linear_and_linear_times_quadratic(
     assert (error < 1e-12) == inside
 
 
-def test_slab_rule_is_exact_to_its_degrees():
-    points, weights = wedge.slab_rule()
+def test_prism_rule_is_exact_to_its_degrees():
+    points, weights = wedge.prism_rule()
     moment = weights @ (points[:, 0] ** 2 * points[:, 1] ** 2 * points[:, 2] ** 5)
     # ∫x²y² over the triangle is 2!2!/6!, ∫ζ⁵ is 1/6
     assert moment == pytest.approx(2 * 2 / 720 / 6, rel=1e-12)

@@ -13,7 +13,7 @@ pytest.importorskip("dolfinx")
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.rve import Phase, PrismModel
 from alphacut.rve.mesh.columns import extrude
-from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, read_grid, upright, write
+from alphacut.rve.mesh.file import MIRRORED, UPSIDE_DOWN, orient, read_grid, write
 from alphacut.rve.mesh.gmsh_prisms import Prisms
 from alphacut.rve.mesh.periodicity import MeshError
 from alphacut.stochastic import HermiteMap, TruncatedNormal
@@ -137,9 +137,9 @@ def test_prisms_of_any_orientation_are_set_upright():
     right = Prisms(points, grid.cells, grid.phase, grid.names)
     for order in (UPSIDE_DOWN, MIRRORED, [UPSIDE_DOWN[k] for k in MIRRORED]):
         wrong = replace(right, cells=grid.cells[:, order])
-        assert {tuple(row) for row in upright(wrong).cells} & {tuple(row) for row in grid.cells}
+        assert {tuple(row) for row in orient(wrong).cells} & {tuple(row) for row in grid.cells}
         volume = np.linalg.det(
-            points[upright(wrong).cells[:, [1, 2, 3]]] - points[upright(wrong).cells[:, [0]]]
+            points[orient(wrong).cells[:, [1, 2, 3]]] - points[orient(wrong).cells[:, [0]]]
         )
         assert (volume > 0).all()
 

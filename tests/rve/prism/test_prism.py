@@ -174,7 +174,7 @@ def test_any_stiffness_and_outline_agree_with_slices_within_declared_errors(turn
 
 def test_losses_of_any_stiffness_and_outline_agree_within_declared_errors(turned_ellipse):
     losses = np.array([[0.02, 0.02], [0.005, 0.005]])
-    prism, slices = (loss_factors(x.averaged("isotropic"), losses) for x in turned_ellipse)
+    prism, slices = (loss_factors(x.with_average("isotropic"), losses) for x in turned_ellipse)
     for name, value in prism.values.items():
         assert abs(value - slices.values[name]) <= prism.errors[name] + slices.errors[name]
 
@@ -237,12 +237,12 @@ def test_a_mesh_that_folds_over_is_refused_with_its_cure():
 def test_a_map_that_folds_the_mesh_leaves_the_model_as_it_was(monkeypatch):
     problem = PrismModel(0.4, 2).problem(HermiteMap(0.3, 0, 0.5, 0))
     form = problem.form
-    before = form.mesh.geometry.x.copy(), form.areas.copy(), form.slices()[0].copy()
+    before = form.mesh.geometry.x.copy(), form.areas.copy(), form.slice_rule()[0].copy()
     mirrored = form.grid.positions(HermiteMap(0.2, 0, 0.6, 0)) * [-1, 1, 1]
     monkeypatch.setattr(type(form.grid), "positions", lambda *_: mirrored)
     with pytest.raises(FoldedMeshError):
         form.move_to(HermiteMap(0.2, 0, 0.6, 0))
-    after = form.mesh.geometry.x, form.areas, form.slices()[0]
+    after = form.mesh.geometry.x, form.areas, form.slice_rule()[0]
     assert all(np.array_equal(x, y) for x, y in zip(before, after, strict=True))
 
 
