@@ -58,9 +58,9 @@ def leaves(angle: np.ndarray) -> np.ndarray:
 # ## Both discretisations
 
 # %%
-prism = PrismModel(mesh_size=0.12, layers=8, stiffness=True, outline=leaves)
+prism = PrismModel(mesh_size=0.2, layers=6, stiffness=True, outline=leaves)
 product = prism.solve(radius, resin, [fibre])[0]
-slices = SlicesModel(outline=leaves).solve(radius, resin, [fibre])[0]
+slices = SlicesModel(mesh_size=0.3, points=6, outline=leaves).solve(radius, resin, [fibre])[0]
 for result in (product, slices):
     print(
         result.method, np.round(result.stiffness / 1e9, 5).tolist(), f"± {result.largest_error:.1e}"
@@ -78,7 +78,9 @@ assert product.checks["reuss"] == product.checks["voigt"] == 0  # the bounds tak
 # %%
 carbon = Phase(60e9, 0.2)
 lying, standing = (
-    SlicesModel(points=6, outline=Ellipse(aspect)).solve(radius, resin, [carbon])[0].stiffness
+    SlicesModel(mesh_size=0.3, points=4, outline=Ellipse(aspect))
+    .solve(radius, resin, [carbon])[0]
+    .stiffness
     for aspect in (2.0, 0.5)
 )
 print(f"lying C11 {lying[0, 0] / 1e9:.6f}, standing C22 {standing[1, 1] / 1e9:.6f} GPa")

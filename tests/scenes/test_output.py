@@ -13,10 +13,19 @@ from scipy.signal import lsim
 from tests.alphacut.small import SMALLER, written
 
 ROOT = Path(__file__).parents[2]
-SHORT = ("envelope.duration=2 s", "envelope.step=0.02 s", "envelope.alpha=[0, 0.5, 1]")
+SHORT = ("envelope.duration=1 s", "envelope.step=0.02 s", "envelope.alpha=[0, 1]")
 COARSE = {  # case: most lines, changes of its text, changes of its keys
     "paper": (20, SMALLER, ()),
-    "building": (25, {}, (*SHORT, "envelope.tolerance=2 mm", "probability.samples=40")),
+    "building": (
+        25,
+        {},
+        (
+            *SHORT,
+            "envelope.fuzzy=['E', 'm8', 'l1']",
+            "envelope.tolerance=2 mm",
+            "probability.samples=40",
+        ),
+    ),
     "composite": (
         25,
         {},
@@ -68,9 +77,9 @@ def test_the_closing_output_fits_on_a_screen(runs, name):
     assert "next: " in lines[-1]
 
 
-def motion(young, roof, height, mass_damping, stiffness_damping):
+def motion(young, roof, height, mass_damping=0.5, stiffness_damping=2.5e-3):
     """Roof displacement, drift and base shear of the building, by scipy, shape (T, 3), in SI."""
-    time = np.arange(0, 2 + 1e-9, 0.01)
+    time = np.arange(0, 1 + 1e-9, 0.01)
     text = (ROOT / "cases" / "building.record.csv").read_text(encoding="utf-8")
     record = np.array([x.split(",") for x in text.splitlines() if x[:1].isdigit()], float)
     masses = np.array([40e3] * 7 + [roof])
@@ -95,7 +104,7 @@ def test_the_building_moves_as_another_program_computes_it(runs):
     peaks = summary["envelopes"]["all"]["peak"]
     names = ("q8", "drift1", "base_shear")
     modulus = summary["modulus"]["E_GPa"]
-    nominal = motion(1e9 * modulus["lower"][-1], 30e3, 4.0, 0.5, 2.5e-3)
+    nominal = motion(1e9 * modulus["lower"][-1], 30e3, 4.0)
     lower, upper, error = (
         np.array([peaks[x][k] for x in names]) for k in ("lower", "upper", "error")
     )
@@ -104,11 +113,11 @@ def test_the_building_moves_as_another_program_computes_it(runs):
     assert top == pytest.approx(lower[:, -1], rel=2e-2)
     ends = [
         (1e9 * modulus["lower"][0], 1e9 * modulus["upper"][0]),
-        (28e3, 34e3), (3.92, 4.08), (0.4, 0.6), (2e-3, 3e-3),
+        (28e3, 34e3), (3.92, 4.08),
     ]  # fmt: skip
     rng, box = np.random.default_rng(), np.array(ends).T
-    inside = box[0] + rng.random((60, 5)) * (box[1] - box[0])
-    corners = np.array(np.meshgrid(*ends)).reshape(5, -1).T
+    inside = box[0] + rng.random((60, 3)) * (box[1] - box[0])
+    corners = np.array(np.meshgrid(*ends)).reshape(3, -1).T
     tried = np.array([np.abs(motion(*x)).max(axis=0) for x in (*inside, *corners)])
     slack = error[:, 0] + 2e-3 * top  # of the steps of this program
     assert (tried <= upper[:, 0] + slack).all()

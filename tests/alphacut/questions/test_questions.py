@@ -94,9 +94,12 @@ def test_limits_without_a_meaning_are_refused(text):
 
 
 def test_random_inputs_have_the_shape_of_their_membership():
-    draws = shaped_like(Triangular(0, 1, 3))(np.random.default_rng(), 20_000)
-    assert draws.mean() == pytest.approx(4 / 3, abs=0.01)  # of a triangular density
-    assert (draws < 1).mean() == pytest.approx(1 / 3, abs=0.01)
+    count, seed = 20_000, np.random.SeedSequence().entropy
+    draws = shaped_like(Triangular(0, 1, 3))(np.random.default_rng(seed), count)
+    six_deviations = 6 / np.sqrt(count)
+    density_deviation, below_deviation = np.sqrt(7 / 18), np.sqrt(2 / 9)
+    assert abs(draws.mean() - 4 / 3) < density_deviation * six_deviations, f"seed {seed}"
+    assert abs((draws < 1).mean() - 1 / 3) < below_deviation * six_deviations, f"seed {seed}"
 
 
 def test_every_question_is_complete():

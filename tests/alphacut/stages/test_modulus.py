@@ -13,12 +13,14 @@ from tests.alphacut.small import CELL, written
 
 MODELS = {
     "series": (),
-    "slices": ("modulus.method=slices", "mesh.size=0.5"),
+    "slices": ("modulus.method=slices", "mesh.size=0.9"),
     "spheres": ("cell.particles=spheres", "modulus.tolerance=1e-4"),
 }
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model", [pytest.param(x, marks=[pytest.mark.slow] * (x == "slices")) for x in MODELS]
+)
 def test_cuts_agree_with_a_coarser_model_and_narrower_ones_do_not(tmp_path, model):
     if model == "slices":
         pytest.importorskip("dolfinx")
