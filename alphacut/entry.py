@@ -54,7 +54,7 @@ exit status:
 
 
 def parsers(program: str, commands: Mapping[str, str]) -> tuple[Parser, dict[str, Parser]]:
-    """Parser of a program with its commands, and the commands' parsers by name."""
+    """Parser of a program with commands (file by name), and the parser of each command by name."""
     parser = Parser(
         prog=program,
         description="From an uncertain microstructure to the fuzzy vibration of a structure.",
@@ -178,7 +178,7 @@ def _run_command(arguments: Sequence[str], program: str, names: Mapping[str, str
         if PETSC_LOG not in petsc:
             return command.run(options, out)
         if "case" in options:
-            read_case(options)
+            read_case(options)  # refuses the log of a case without prisms
         del petsc[PETSC_LOG]
         from alphacut.rve.fenicsx import log_on_standard_error
 

@@ -214,10 +214,10 @@ class Content(Section):
         """Refuses stages without their sections, two sources of the radius, and unfit methods."""
         has_fraction = self.round is not None and self.round.fraction is not None
         has_radius = "microstructure" in self.stages or has_fraction
-        is_drawn = self.picture is not None or self.meshed is not None
+        has_geometry = self.picture is not None or self.meshed is not None
         sections = {
             "microstructure": ("microstructure",),
-            "modulus": ("cell",) if has_radius or is_drawn else ("radius", "cell"),
+            "modulus": ("cell",) if has_radius or has_geometry else ("radius", "cell"),
             "envelope": ("envelope",),
         }
         for stage in self.stages:
@@ -288,7 +288,7 @@ class Content(Section):
         studies = {"envelope": main_study} | {f"study[{k}]": x for k, x in enumerate(self.study)}
         for key, study in studies.items():
             stated = [name for name in study.fuzzy if not re.fullmatch(computed, name)]
-            structure.inputs(stated, f"{key}.fuzzy")
+            structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
         has_modulus = self.has_own_modulus or "modulus" in self.stages

@@ -152,22 +152,22 @@ def with_forces(
     if model is None:
         raise RefusedError("force", "on a pendulum", "beside [frame] or [matrices]")
     forces = [
-        (unknown, number, section.history.history)
+        (unknown, amplitude, section.history.history)
         for section in sections
-        for unknown, number in section.amplitudes.items()
+        for unknown, amplitude in section.amplitudes.items()
     ]
     floors = range(1, model.floors + 1) if isinstance(model, StoreyFrame) else ()
     for unknown, _, _ in forces:
         chosen("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
     if isinstance(model, StoreyFrame):
-        loads = [Force(int(floor), number.modal, history) for floor, number, history in forces]
+        loads = [Force(int(floor), amplitude.modal, x) for floor, amplitude, x in forces]
         model = replace(model, loads=loads)
         names = model.force_names
     else:
         names = tuple(f"F{number}" for number in range(1, len(forces) + 1))
         model = _with_forces_on_unknowns(model, forces, names, unknowns)
-    numbers = {name: number for name, (_, number, _) in zip(names, forces, strict=True)}
-    return replace(structure, model=model, numbers={**structure.numbers, **numbers})
+    amplitudes = {name: amplitude for name, (_, amplitude, _) in zip(names, forces, strict=True)}
+    return replace(structure, model=model, numbers={**structure.numbers, **amplitudes})
 
 
 NodalForces = Sequence[tuple[str, FuzzyNumber, History | None]]
@@ -183,8 +183,8 @@ def _with_forces_on_unknowns(
     """
     loads: list[Force] = []
     modal: dict[str, float] = {}
-    for name, (unknown, number, history) in zip(names, forces, strict=True):
+    for name, (unknown, amplitude, history) in zip(names, forces, strict=True):
         direction: Array = np.array([float(x == unknown) for x in unknowns])
         loads.append(Force(direction, name, history))
-        modal[name] = number.modal
+        modal[name] = amplitude.modal
     return replace(model, loads=loads, parameters={**model.parameters, **modal})

@@ -30,7 +30,7 @@ def sections() -> dict[str, SectionModels]:
 
 
 def _walk(prefix: str, model: type[Section]) -> Iterator[tuple[str, FieldInfo, SectionModels]]:
-    """Yields the full name, Pydantic's field and, of a section, classes of each key below a class.
+    """Yields each key below a section's class: full name, field of Pydantic, classes if a section.
 
     A key that is no section has an empty list of classes.
     """

@@ -156,10 +156,9 @@ class MatricesSection(Section):
     def _material_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Damping ratios by parameter: "zeta" of all modes, or "zeta1", "zeta2" … of each.
+        """Damping ratios by the loss factor of E: "zeta" of all modes if all stiffness has E.
 
-        They are of each mode where some terms of the stiffness are without E, whose loss factor is
-        `loss`: by the share of the mode's strain energy in the terms with E.
+        Else "zeta1", "zeta2" … of each mode, by its share of strain energy in the terms with E.
         """
         has_modulus = [any(name == "E" for name, _ in f.powers) for f, _ in self.stiffness]
         allowed = "a term of the stiffness with E"

@@ -41,7 +41,7 @@ class PackingSection(Section):
     def source(self, spheres: bool) -> Simulated:
         """The random packings to be computed: of spheres, or else of discs."""
         if self.file is None:
-            ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # by then both are there
+            ends = self.smallest_radius or 0.0, self.largest_radius or 0.0  # both were required
             radii: RadiusLaw = LogNormalRadii(*ends)
         else:
             radii = MeasuredRadii.read(self.file)

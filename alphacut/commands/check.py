@@ -73,7 +73,7 @@ def records_text(section: RecordsSection, records: Sequence[SuiteRecord]) -> str
 def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     """The linear structure of the case at the modal values; None where there is none.
 
-    A modulus that stage modulus will compute is that of the series; None also without a formula.
+    A modulus to be computed is taken from the series; None also where that does not fit the cell.
     """
     if "envelope" not in content.stages or content.structure_section is None:
         return None
@@ -94,22 +94,22 @@ def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
 def rows_of(prefix: str, section: Section) -> Iterator[Row]:
     """Rows (key, value, kind) of every quantity of a section, and of the sections below it."""
     for key, info in type(section).model_fields.items():
-        content, unit = getattr(section, key), quantity_of(info)
-        if isinstance(content, dict):
-            for name, part in content.items():
-                if isinstance(part, Section):
-                    yield from rows_of(f"{prefix}{key}.{name}.", part)
-        sections = content if isinstance(content, tuple) else (content,)
-        for number, subsection in enumerate(sections, start=1):
-            row_key = f"{prefix}{key}" + (f"[{number}]" if len(sections) > 1 else "")
-            if isinstance(subsection, Section):
-                yield from rows_of(f"{row_key}.", subsection)
-            elif isinstance(subsection, FuzzyNumber) and unit and section.has_key(key):
-                yield row_key, _numbers(subsection, unit.si), KINDS.get(type(subsection), "fuzzy")
+        value, unit = getattr(section, key), quantity_of(info)
+        if isinstance(value, dict):
+            for name, subsection in value.items():
+                if isinstance(subsection, Section):
+                    yield from rows_of(f"{prefix}{key}.{name}.", subsection)
+        entries = value if isinstance(value, tuple) else (value,)
+        for number, entry in enumerate(entries, start=1):
+            row_key = f"{prefix}{key}" + (f"[{number}]" if len(entries) > 1 else "")
+            if isinstance(entry, Section):
+                yield from rows_of(f"{row_key}.", entry)
+            elif isinstance(entry, FuzzyNumber) and unit and section.has_key(key):
+                yield row_key, _numbers(entry, unit.si), KINDS.get(type(entry), "fuzzy")
             elif key == "columns" and getattr(section, "stiffness", None) is None:  # a default
-                yield row_key, _numbers(subsection, ""), "default"
-            elif isinstance(subsection, float) and unit and unit.si and section.has_key(key):
-                yield row_key, engineering(subsection, unit.si), "number"
+                yield row_key, _numbers(entry, ""), "default"
+            elif isinstance(entry, float) and unit and unit.si and section.has_key(key):
+                yield row_key, engineering(entry, unit.si), "number"
 
 
 def _numbers(number: FuzzyNumber, unit: str) -> str:

@@ -101,11 +101,11 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
     """The envelope that a dataset holds, with the supports of its fuzzy inputs as intervals."""
     values = {name: variable.values for name, variable in data.data_vars.items()}
     supports = values["cut"][0].tolist()
-    pairs = {
-        kind: Ends(values[f"{key}_lower"], values[f"{key}_upper"])
-        for kind, key in (("inner", "inner"), ("outer", "proved"))
-        if f"{key}_lower" in values
-    }
+
+    def stored_ends(name: str) -> Ends | None:
+        has_ends = f"{name}_lower" in values
+        return Ends(values[f"{name}_lower"], values[f"{name}_upper"]) if has_ends else None
+
     labels = [str(label) for label in values["label"]]
     return Envelope(
         alpha=data["alpha"].values,
@@ -122,8 +122,8 @@ def envelope_of(data: xarray.Dataset) -> Envelope:
         lower_at=values["lower_at"],
         upper_at=values["upper_at"],
         error=values["error"],
-        inner=pairs.get("inner"),
-        outer=pairs.get("outer"),
+        inner=stored_ends("inner"),
+        outer=stored_ends("proved"),
     )
 
 

@@ -33,7 +33,7 @@ def drawings(results: Results) -> Iterator[Drawing]:
     yield from _material_figures(results)
     yield from _structure_figures(results)
     if results.learned is not None and "refuted" not in results.learned:
-        yield "update-inputs", partial(envelope.identified, results.learned)
+        yield "update-inputs", partial(envelope.identified_inputs, results.learned)
     if results.suite is not None:
         yield "spectra", partial(envelope.spectra, results.suite)
     for key, draw in answers.DRAWINGS.items():
@@ -59,7 +59,10 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
             cuts = data.document["E_GPa"]
             bounds = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
             effective = PiecewiseLinear(tuple(data.document["alpha"]), *map(tuple, bounds))
-            yield "fig36-fuzzy-numbers", partial(fuzzy_numbers.kinds, inclusion, effective)
+            yield (
+                "fig36-fuzzy-numbers",
+                partial(fuzzy_numbers.kinds_of_numbers, inclusion, effective),
+            )
             yield "fig37-alpha-cuts", partial(fuzzy_numbers.alpha_cuts, inclusion)
     if (data := results.modulus) is not None:
         yield "fig16-stress-curves", partial(material.stress_curves, data.arrays)
@@ -83,7 +86,10 @@ def _structure_figures(results: Results) -> Iterator[Drawing]:
         yield "fig27-chain", partial(frame.chain, section)
     widest_task = max(results.tasks, key=lambda task: len(task.fuzzy))
     if widest_task.section.method == "graph-follower":
-        yield "fig21-25-graph-follower", partial(follower.follower, results, widest_task)
+        yield (
+            "fig21-25-graph-follower",
+            partial(follower.graph_follower_steps, results, widest_task),
+        )
 
 
 def draw_figures(results: Results, store: StageStore, executor: Executor | None) -> list[str]:

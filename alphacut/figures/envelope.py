@@ -77,7 +77,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     dataset, structure = results.envelopes[task.name].arrays.isel(alpha=0), results.structure
     assert structure is not None
     names = [str(name) for name in dataset["output"].values]
-    output = names[-1] if "q" in names[-1] else names[0]  # the top floor's displacement
+    output = names[-1] if "q" in names[-1] else names[0]  # the last one if it is a displacement
     inputs, step = structure.inputs(task.fuzzy), task.section.step
     end = round(min(duration, task.duration) / step) * step
     scheme = task.section.integrator or ("exact" if structure.frame else None)
@@ -96,7 +96,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
     return figure
 
 
-def identified(document: Document) -> Figure:
+def identified_inputs(document: Document) -> Figure:
     """Bars of each input's prior interval and of its identified cuts, over the prior's middle.
 
     Args:

@@ -35,7 +35,7 @@ LINES: dict[str, Look] = {
 }
 
 
-def follower(results: Results, task: EnvelopeTask) -> Figure:
+def graph_follower_steps(results: Results, task: EnvelopeTask) -> Figure:
     """Figs. 21 to 25: five steps of the Graph Follower, for one output at the lowest level.
 
     A graph is the trajectory of one point of the inputs. At each node (of time) and side (lower,

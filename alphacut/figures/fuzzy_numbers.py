@@ -18,7 +18,7 @@ CUTS = 6
 """Levels in Fig. 37."""
 
 
-def kinds_of(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
+def number_of_each_kind(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
     """A fuzzy number of each kind, by its name: four made of an input, and a computed result."""
     half, three_quarters = given.cut(0.5), given.cut(0.75)
     ends = (given.support.lower, *three_quarters, given.support.upper)
@@ -31,7 +31,7 @@ def kinds_of(given: FuzzyNumber, result: FuzzyNumber) -> dict[str, FuzzyNumber]:
     }
 
 
-def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
+def kinds_of_numbers(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     """Fig. 36: membership functions of crisp, interval, triangular … numbers, side by side.
 
     Args:
@@ -40,7 +40,7 @@ def kinds(given: FuzzyNumber, result: FuzzyNumber) -> Figure:
     """
     import matplotlib.pyplot as plt
 
-    numbers = kinds_of(given, result)
+    numbers = number_of_each_kind(given, result)
     figure, panels = plt.subplots(1, len(numbers), figsize=(11.0, 2.6), sharey=True)
     for axes, (name, number) in zip(panels, numbers.items(), strict=True):
         number.plot(axes, color=BLUE, lw=1.6)

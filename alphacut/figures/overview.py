@@ -40,6 +40,7 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
     radius = reference_radius(cell.radius, cell.outline)
     grid = extrude(size=size, radius=radius, layers=layers, outline=cell.outline)
     points = grid.positions(cell.radius)
+    # corner nodes come first, level by level of θ
     levels = points[: (layers + 1) * len(grid.plane.points)].reshape(layers + 1, -1, 3)
     figure = plt.figure(figsize=(11.0, 4.2))
     widths = figure.add_gridspec(1, 3, width_ratios=(1, 0.8, 1.2))
@@ -50,7 +51,7 @@ def domains(cell: Cell, size: float, layers: int) -> Figure:
 
 
 def draw_plane_mesh(axes: Axes, grid: PrismGrid, level: Array) -> None:
-    """Physical domain: the triangles of the middle level, coloured by phase."""
+    """Physical domain: triangles at one level of θ, with nodes (x1, x2, θ), coloured by phase."""
     from matplotlib.collections import PolyCollection
 
     corners = level[grid.plane.triangles[:, :3], :2]

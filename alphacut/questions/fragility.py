@@ -58,12 +58,12 @@ class FragilityQuestion(Question):
             "limits": {
                 name: self._document(measures_of_limit)
                 | {"limit": limits.get(name, 1.0), "nature": str(natures[name])}
-                | self._shown(name, response.structure)
+                | self._output_and_unit(name, response.structure)
                 for name, measures_of_limit in critical.items()
             },
         }
 
-    def _shown(self, name: str, structure: Structure) -> Document:
+    def _output_and_unit(self, name: str, structure: Structure) -> Document:
         shown = self.section.peak_and_unit(name, structure)
         return {"output": shown["output"], "output_unit": shown["unit"]}
 

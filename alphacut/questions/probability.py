@@ -18,7 +18,7 @@ from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row,
 
 
 def shaped_like(number: FuzzyNumber) -> Callable[[np.random.Generator, int], Array]:
-    """A function that draws random values with a density proportional to the membership."""
+    """A function (generator, count) that draws values with a density like the membership."""
     grid = np.unique(np.concatenate([np.linspace(*number.support, 4001), *number.cuts[1:]]))
     membership = number.membership(grid)
     areas = np.diff(grid) * (membership[1:] + membership[:-1]) / 2

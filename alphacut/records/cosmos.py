@@ -100,7 +100,7 @@ def _step(file: TextFile, channel: _Channel, count: int, duration: float) -> flo
 def _acceleration_channels(file: TextFile) -> list[_Channel]:
     """Channels of acceleration, without those of velocity and displacement, in the file's order."""
     channels: list[_Channel] = []
-    reals, names = -1, list[str]()
+    reals, names = -1, list[str]()  # line of the real header and names read last
     for row, line in enumerate(file.lines):
         if REALS.fullmatch(line):
             reals = row
@@ -108,7 +108,7 @@ def _acceleration_channels(file: TextFile) -> list[_Channel]:
             names = [match[1].lower(), match[2].strip().lower()]
         elif DATA.fullmatch(line):
             channels.append(_Channel(row, reals, tuple(filter(None, names))))
-        elif (match := CODE.fullmatch(line)) and channels and "acc" in line.lower():
+        elif (match := CODE.fullmatch(line)) and channels and "acc" in line.lower():  # at its end
             last = channels[-1]
             code = (match[1].lower(),) if match[1].lower() not in last.names else ()
             channels[-1] = _Channel(last.data, last.reals, (*last.names, *code))

@@ -74,7 +74,7 @@ def _number(file: TextFile, row: int, cells: Sequence[str], column: int) -> floa
 
 
 def even_step(file: TextFile, time: Array, lines: list[int]) -> float:
-    """The step of times in s, which must rise evenly from 0; `lines` are theirs in the file."""
+    """The step in s of times that must rise evenly from 0; `lines` are their lines in the file."""
     even = np.linspace(0, time[-1], len(time))
     deviation = np.abs(time - even)
     worst = int(deviation.argmax())

@@ -154,7 +154,10 @@ class Page:
         self.unshown = {PurePosixPath(x).stem: x for x in pictures}  # that no section has shown yet
 
     def sections(self) -> Iterator[tuple[str, list[Piece]]]:
-        """Yields title and pieces of each section that the results allow, in reading order."""
+        """Yields title and pieces of each section that the results allow, in reading order.
+
+        A piece is the name of a macro of the template, and what the macro shows.
+        """
         summary = self.summary
         key_tables = (material(summary), peak_table(summary), (ANSWERS, answers(summary)))
         remarks = [*natures(summary), *drivers(summary)]

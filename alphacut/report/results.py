@@ -53,9 +53,8 @@ def material(summary: Document) -> Table:
         nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
         cuts = cut(young, -1, nature), cut(young, 0, nature, error)
-        error_cell = (
-            "not declared" if part.get("particles") == "mesh" else error_text(error, nature)
-        )
+        has_error = part.get("particles") != "mesh"
+        error_cell = error_text(error, nature) if has_error else "not declared"
         rows.append((name, *cuts, str(nature), error_cell))
         further = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
         for label, values in further.items():

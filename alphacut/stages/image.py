@@ -130,13 +130,14 @@ def image_loss_bounds(energies: PhaseEnergies, cuts: LossCuts, average: str) -> 
     def constants_of(moduli: Array) -> Array:
         return plane_constants(moduli, average)
 
-    shares, _ = energies.energy_fractions(constants_of)
-    equal = np.array([bulk_and_shear_losses(None, False)] * len(shares))
-    corners = cuts.corners(shares, equal)
-    bounds = np.einsum("lecpx,pxc->lec", corners, shares)
-    widest = corners[0, 1, 0]
-    _, errors = first_order(energies, widest, constants_of)
-    return bounds, errors + np.ptp(widest) ** 2 * bounds[0, 1]
+    fractions, _ = energies.energy_fractions(constants_of)
+    same_losses = np.array([bulk_and_shear_losses(None, False)] * len(fractions))  # of K and G
+    corners = cuts.corners(fractions, same_losses)
+    bounds = np.einsum("lecpx,pxc->lec", corners, fractions)  # letters as in `LossCuts.corners`
+    largest = corners[0, 1, 0]
+    _, errors = first_order(energies, largest, constants_of)
+    # what the first order leaves out is of the order of the squared difference of losses
+    return bounds, errors + np.ptp(largest) ** 2 * bounds[0, 1]
 
 
 def _widths(

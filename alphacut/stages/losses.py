@@ -43,18 +43,19 @@ class LossCuts:
         has_bulk = tuple(bulk is not None for _, bulk in losses)
         return cls(np.moveaxis(np.array(cuts), -1, 1), has_bulk)  # the ends after the levels
 
-    def corners(self, shares: Array, to_moduli: Array) -> Array:
+    def corners(self, fractions: Array, to_moduli: Array) -> Array:
         """Phases' loss factors where those of E, G and K are least and greatest, to first order.
 
         Args:
-            shares: ∂ln c/∂ln X by K and G of each phase, shape (phases, 2, 3).
+            fractions: ∂ln c/∂ln X by X = K and G of each phase, shape (phases, 2, 3).
             to_moduli: Loss factors of K and G from those of Young's and the bulk modulus, shape
                 (phases, 2, 2).
 
         Returns:
             Of K and G of the phases, shape (levels, 2, 3, phases, 2).
         """
-        slopes = np.einsum("pxj,pxc->cpj", to_moduli, shares)
+        # level l, end e, constant c (E, G, K), phase p, modulus x (K, G), loss factor j (η_E, η_K)
+        slopes = np.einsum("pxj,pxc->cpj", to_moduli, fractions)
         lower, upper = np.moveaxis(self.bounds[:, :, None], 1, 0)
         least, most = np.where(slopes >= 0, lower, upper), np.where(slopes >= 0, upper, lower)
         return np.asarray(np.einsum("pxj,elcpj->lecpx", to_moduli, np.array([least, most])))
@@ -63,14 +64,14 @@ class LossCuts:
 def loss_bounds(result: HomogenisedStiffness, cuts: LossCuts) -> tuple[Array, Array]:
     """Bounds of the loss factors of E, G and K, (levels, 2, 3), and their largest errors, (3,)."""
     assert result.energies is not None
-    shares, _ = result.energies.energy_fractions(result.constants_of)
+    fractions, _ = result.energies.energy_fractions(result.constants_of)
     # phases of a mesh, whose result knows no cell, have no bulk losses of their own
     phases = (None,) * len(cuts.has_bulk) if result.cell is None else result.cell.phases
     pairs = zip(phases, cuts.has_bulk, strict=True)
-    corners = cuts.corners(shares, np.array([bulk_and_shear_losses(*pair) for pair in pairs]))
+    corners = cuts.corners(fractions, np.array([bulk_and_shear_losses(*pair) for pair in pairs]))
     errors = [loss_factors(result, corners[0, 1, k]).errors[x] for k, x in enumerate(CONSTANTS)]
-    if corners.max() <= MAX_FIRST_ORDER:
-        return np.einsum("lecpx,pxc->lec", corners, shares), np.array(errors)
+    if corners.max() <= MAX_FIRST_ORDER:  # letters as in `LossCuts.corners`
+        return np.einsum("lecpx,pxc->lec", corners, fractions), np.array(errors)
     bounds = np.empty(corners.shape[:3])
     for corner in product(*map(range, bounds.shape)):
         bounds[corner] = loss_factors(result, corners[corner]).values[CONSTANTS[corner[-1]]]

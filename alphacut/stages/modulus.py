@@ -237,7 +237,8 @@ class CellCampaign:
         )
         cuts, error = np.stack(result.bounds("E"), 1), sum(self.errors(result).values())
         levels = result.alpha[[-1, 0]]
-        points = [{x: float(np.mean(n.cut(a))) for x, n in result.inputs.items()} for a in levels]
+        inputs = result.inputs.items()
+        points = [{name: float(np.mean(x.cut(alpha))) for name, x in inputs} for alpha in levels]
         for alpha, sample in zip(levels, coarse_campaign.task(points), strict=True):
             value = float(np.asarray(sample["E"]))
             slack = value * (error + sample["error:space"] + sample["error:theta"])

@@ -146,7 +146,7 @@ class Pipeline:
         """Computes identified inputs, then envelopes or a suite, then answers, into the results."""
         results, content = self.results, self.content
         assert content.envelope is not None
-        (task,) = envelope.tasks(content.envelope, ())
+        (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself
         if content.identify is not None:
             measured, alpha = content.identify, task.section.alpha
             results.learned, structure = identify.identify_inputs(measured, structure, alpha)

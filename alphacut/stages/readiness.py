@@ -43,7 +43,7 @@ def _require_material(content: Content) -> None:
     if content.picture is not None:
         image.image_study(content.picture)
     elif "microstructure" not in content.stages:
-        _ = campaign_of(content).propagation
+        _ = campaign_of(content).propagation  # builds the model and the plan
     elif content.round is not None:
         model_of(content.round, content.mesh, content.modulus)
 
@@ -68,7 +68,7 @@ def _require_motion(content: Content) -> None:
         structure = suite.with_record(structure, records[0])
     for task in envelope.tasks(content.envelope, content.study):
         frame.require_envelope(**task.arguments(structure))
-    (task,) = envelope.tasks(content.envelope, ())
+    (task,) = envelope.tasks(content.envelope, ())  # of [envelope] itself
     response = FuzzyResponse(structure, task.fuzzy, alpha, task.duration, task.section.step)
     for question in questions_of(content.questions):
         question.require_answerable(response)

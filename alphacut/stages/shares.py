@@ -35,10 +35,13 @@ def stage(
     campaign: CellCampaign | None, structure: Structure | None, task: EnvelopeTask | None
 ) -> Stage:
     """The stage of the shares of a cell's inputs in its modulus, and of a study's in its peaks."""
-    cell = campaign and [campaign.identity, campaign.inputs, campaign.modulus.alpha]
-    motion = structure and [structure.model, structure.numbers, task]
+    inputs: list[object] = [None, None]
+    if campaign is not None:
+        inputs[0] = [campaign.identity, campaign.inputs, campaign.modulus.alpha]
+    if structure is not None:
+        inputs[1] = [structure.model, structure.numbers, task]
     compute = partial(compute_shares, campaign, structure, task)
-    return Stage("shares", [cell, motion], (*NESTED, "alphacut"), compute)
+    return Stage("shares", inputs, (*NESTED, "alphacut"), compute)
 
 
 def compute_shares(
