@@ -136,7 +136,7 @@ def subspace_series(
     if lower is None:
         unit = np.eye(len(centre.basis))[block][None]
         lower = [np.diag(middle)[None]], [unit], [unit]
-    rate, shape, moved = (list(parts) for parts in lower)
+    rate, shape, mass_shape = (list(parts) for parts in lower)
     for m in range(len(rate), degree + 1):
         of_mass, of_stiffness = (
             sum(
@@ -150,12 +150,12 @@ def subspace_series(
         )
         right = middle[:, None] * of_mass - of_stiffness
         for a in range(1, m):
-            right += convolve(rate[a], moved[m - a], (a, m - a), d, matmul)
+            right += convolve(rate[a], mass_shape[m - a], (a, m - a), d, matmul)
         rate.append(-right[:, :, block])
         shape.append(right / gaps)
         weight = np.arange(len(centre.basis)) < centre.modes
-        moved.append(of_mass + shape[m] * weight)
-    return rate, shape, moved
+        mass_shape.append(of_mass + shape[m] * weight)
+    return rate, shape, mass_shape
 
 
 def narrowest_block(
@@ -192,11 +192,15 @@ def _max_degree(d: int) -> int:
     return degree
 
 
-def _turned(series: Series, rotation: Array) -> Series:
+def _rotated(series: Series, rotation: Array) -> Series:
     """The series of the rotated columns Rᵀ x."""
-    rate, shape, moved = series
+    rate, shape, mass_shape = series
     turn = rotation.T
-    return [turn @ x @ rotation for x in rate], [turn @ x for x in shape], [turn @ x for x in moved]
+    return (
+        [turn @ x @ rotation for x in rate],
+        [turn @ x for x in shape],
+        [turn @ x for x in mass_shape],
+    )
 
 
 def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatrices) -> Block | None:
@@ -214,12 +218,12 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatric
     mass, stiffness = centre.mass, centre.stiffness
     n, d, N = len(centre.basis), mass.inputs, len(series[0]) - 1
     o = np.setdiff1d(np.arange(n), block)
-    rate, shape, moved = _turned(series, rotation)
+    rate, shape, mass_shape = _rotated(series, rotation)
     order = {"inputs": d, "order": N}
     L = TaylorModel(tuple(rate), np.zeros(rotation.shape), **order)
     x = TaylorModel(tuple(shape), np.zeros(shape[0].shape[1:]), **order)
     rounding = _rounding(x, mass, 0)
-    Mx = TaylorModel(tuple(moved), _higher_terms(mass, x.sizes(), N) + rounding, **order)
+    Mx = TaylorModel(tuple(mass_shape), _higher_terms(mass, x.sizes(), N) + rounding, **order)
     pencils = [
         Pencil.from_rate([part[:, j, j] for part in rate], mass, stiffness)
         for j in range(len(block))
@@ -236,20 +240,21 @@ def enclosed(block: Rows, rotation: Array, series: Series, centre: CentredMatric
         return None
     off = 1.0 - np.eye(len(block))
     data = _Unknowns(
-        missed=_missed(pencils, L, x, Mx) + _rounded(L, x, Mx, stiffness, rotation, rounding),
+        residual=_series_residual(pencils, L, x, Mx)
+        + _residual_rounding(L, x, Mx, stiffness, rotation, rounding),
         size=x.size(),
-        side=Mx.size(),
+        mass_size=Mx.size(),
         coupling=L.size() * off,
         difference=_differences(L),
         heavy=mass.size(),
         inverse_norm=inverse_bound(norm),
         others=o,
     )
-    bounds = data.bounded(systems)
+    bounds = data.self_mapped_bounds(systems)
     if bounds is None:
         return None
     Y, E = bounds
-    wrong = Y @ data.side.T
+    wrong = Y @ data.mass_size.T
     norm = norm.loosened(wrong + wrong.T + Y @ data.heavy @ Y.T)
     return Block(block, L.loosened(E), x.loosened(Y), Mx.loosened(Y @ data.heavy), norm)
 
@@ -278,7 +283,7 @@ def _rounding(x: TaylorModel, matrix: TaylorModel, least: int) -> Array:
     return total
 
 
-def _rounded(
+def _residual_rounding(
     L: TaylorModel,
     x: TaylorModel,
     Mx: TaylorModel,
@@ -305,19 +310,21 @@ def _rounded(
     return total
 
 
-def _missed(pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel) -> Array:
+def _series_residual(
+    pencils: list[Pencil], L: TaylorModel, x: TaylorModel, Mx: TaylorModel
+) -> Array:
     """Bound of R = K x̃_j − Σ_i L̃_ji M x̃_i over the box, shape (p, n)."""
     of_x, N, off = x.sizes(), L.order, 1.0 - np.eye(len(pencils))
     of_L, of_Mx = [size * off for size in L.sizes()], Mx.sizes()
-    missed: Array = np.zeros(x.shape)
+    residual: Array = np.zeros(x.shape)
     for j, pencil in enumerate(pencils):
         t = pencil.sizes
-        missed[j] += t[-1] @ np.sum(of_x, 0)[j]
+        residual[j] += t[-1] @ np.sum(of_x, 0)[j]
         for m in range(1, N + 1):
-            missed[j] += t[m] @ np.sum(of_x[N + 1 - m :], 0)[j]
+            residual[j] += t[m] @ np.sum(of_x[N + 1 - m :], 0)[j]
     for a in range(N + 1):
-        missed += of_L[a] @ (sum(of_Mx[N + 1 - a :], np.zeros(x.shape)) + Mx.remainder)
-    return missed
+        residual += of_L[a] @ (sum(of_Mx[N + 1 - a :], np.zeros(x.shape)) + Mx.remainder)
+    return residual
 
 
 def _differences(L: TaylorModel) -> Array:
@@ -332,9 +339,9 @@ class _Unknowns:
     """What bounds of Z and D depend on; rows as in `Block`.
 
     Args:
-        missed: Bound of |R|, shape (p, n).
+        residual: Bound of |R|, shape (p, n).
         size: Of |x̃|, shape (p, n).
-        side: Of |M x̃|, shape (p, n).
+        mass_size: Of |M x̃|, shape (p, n).
         coupling: Of |F|, shape (p, p).
         difference: Of |L̃_jj − L̃_ii|, shape (p, p).
         heavy: Of |M|, shape (n, n).
@@ -342,18 +349,22 @@ class _Unknowns:
         others: Coordinates o outside the block.
     """
 
-    missed: Array
+    residual: Array
     size: Array
-    side: Array
+    mass_size: Array
     coupling: Array
     difference: Array
     heavy: Array
     inverse_norm: Array
     others: Rows
 
-    def bounded(self, systems: list[Comparison]) -> tuple[Array, Array] | None:
-        """Bounds Y of |Z|, (p, n), and E of |D|, (p, p), that give themselves back, if any."""
-        Y, E = np.zeros_like(self.missed), np.zeros_like(self.coupling)
+    def self_mapped_bounds(self, systems: list[Comparison]) -> tuple[Array, Array] | None:
+        """Bounds Y of |Z|, (p, n), and E of |D|, (p, p), that `_images` maps into themselves.
+
+        Returns:
+            Y and E; None if none were found.
+        """
+        Y, E = np.zeros_like(self.residual), np.zeros_like(self.coupling)
         for _ in range(ROUNDS):
             new_Y, new_E = self._images(systems, Y, E)
             if not (new_Y.max() < MAX_SHAPE and np.isfinite(new_E).all()):
@@ -369,11 +380,11 @@ class _Unknowns:
         Products of Z and D count twice, so that the map contracts.
         """
         o, F = self.others, self.coupling
-        right = self.missed + E @ self.side + (F + 2 * E) @ Y @ self.heavy
+        right = self.residual + E @ self.mass_size + (F + 2 * E) @ Y @ self.heavy
         new_Y = np.zeros_like(Y)
         for j, system in enumerate(systems):
             new_Y[j, o] = system.solved(right[j, o])
-        W = Y @ self.side.T
-        within = self.missed @ self.size.T + Y @ self.missed.T + self.difference * W
+        W = Y @ self.mass_size.T
+        within = self.residual @ self.size.T + Y @ self.residual.T + self.difference * W
         within = within + W @ F.T + F @ W + 2 * E @ W
         return new_Y, within @ self.inverse_norm

@@ -83,7 +83,7 @@ class Box:
     ) -> LevelModels:
         """Models of the motion of `outputs` at `nodes`, both all unless given.
 
-        `allowed` is the doubt of each output that modes may leave which are not enclosed, (m,).
+        `allowed` is the truncation error of each output that is allowed, (m,).
 
         Raises:
             UnprovedError: None of its modes can be enclosed.

@@ -54,7 +54,7 @@ class Subspaces:
 
 
 def subspaces(
-    centre: CentredMatrices, used: Rows, wanted: int, doubts: Array | None = None
+    centre: CentredMatrices, used: Rows, wanted: int, tolerances: Array | None = None
 ) -> Subspaces:
     """Blocks of the lowest modes, from below until one is not enclosed.
 
@@ -62,7 +62,7 @@ def subspaces(
         centre: The structure in the coordinates of the middle of the box.
         used: Inputs that it depends on, among all.
         wanted: How many modes.
-        doubts: Doubt of each mode's λ, as a share of it, that suffices; none unless given.
+        tolerances: Relative error of each mode's λ that suffices; 0 unless given.
 
     Raises:
         UnprovedError: The box is so wide that the structure may lose its mass or stiffness.
@@ -75,8 +75,8 @@ def subspaces(
         steepest = int(used[(np.abs(slopes) / centre.squared[:, None]).max(0).argmax()])
         what = "the structure may lose its stiffness"
         raise UnprovedError(what, "take narrower inputs", steepest)
-    doubts = np.zeros(centre.modes) if doubts is None else doubts
-    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), doubts)
+    tolerances = np.zeros(centre.modes) if tolerances is None else tolerances
+    blocks, pair = _from_below(centre, slopes, min(wanted, centre.modes), tolerances)
     along = None if pair is None else int(used[np.abs(slopes[pair[0]] - slopes[pair[1]]).argmax()])
     slack = gamma(100 * len(weight))  # of norms
     low, high = (1 - slack) * (1 - stiff) / (1 + heavy), (1 + slack) * (1 + stiff) / (1 - heavy)
@@ -165,7 +165,7 @@ def _nearness(centre: CentredMatrices, slopes: Array) -> Array:
 
 
 def _from_below(
-    centre: CentredMatrices, slopes: Array, wanted: int, doubts: Array
+    centre: CentredMatrices, slopes: Array, wanted: int, tolerances: Array
 ) -> tuple[list[Block], tuple[int, int] | None]:
     """Enclosed blocks of the lowest modes, up to the first that cannot be enclosed.
 
@@ -173,7 +173,7 @@ def _from_below(
         centre: M and K in the coordinates of the box's middle.
         slopes: ∂λ_j/∂u_i in the middle, shape (modes, d).
         wanted: Number of modes to enclose.
-        doubts: Relative error of each mode's λ that suffices, shape (modes,).
+        tolerances: Relative error of each mode's λ that suffices, shape (modes,).
 
     Returns:
         The blocks, and the closest pair of modes at which it ended early; None if it did not.
@@ -183,7 +183,7 @@ def _from_below(
     while len(free) and free[0] < wanted:
         modes = _component(near > NEAR, free[:1], free)
         while True:
-            enough = float(doubts[modes].min())
+            enough = float(tolerances[modes].min())
             if (
                 found := narrowest_block(modes, rotation(centre, modes), centre, enough)
             ) is not None:

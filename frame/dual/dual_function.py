@@ -55,7 +55,7 @@ class Data(NamedTuple):
         size: Their sizes over the box, shape (Z,).
         remainder: Remainders with `EXPECTED` of `size`, shape (Z,).
         group_wave: Middle and half range of the group's responses, shape (2 sources, T), or (0, 1).
-        group_linear: Linear parts of its shares and of their doubt, shape (2 sources, L).
+        group_linear: Linear parts of its shares and of their amplitude, shape (2 sources, L).
         group_quadratic: Quadratic parts.
         grain: Distance of the values that multipliers take, shape (1,).
     """

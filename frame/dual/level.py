@@ -163,7 +163,7 @@ class LevelModels:
             loads: Histories by name.
             time: Nodes, shape (T,), in s.
             sources: Names of what moves the structure.
-            allowed: Doubt of each output that modes may leave which are not enclosed, shape (m,);
+            allowed: Truncation error of each output that is allowed, shape (m,);
                 None to enclose as many modes as possible.
 
         Raises:
@@ -393,9 +393,9 @@ def _group(level: LevelModels, o: int, side: float) -> tuple[list[Array], Array]
     for truncated in level.models.truncated:
         middle, half = truncated.middle[:, o], truncated.half[:, o]
         waves += [middle, side * half]
-        models += [truncated.share[:, o], truncated.doubt[:, o]]
+        models += [truncated.share[:, o], truncated.amplitude[:, o]]
         constant[0] += side * truncated.share.value[:, o] @ middle
-        constant[1] += truncated.doubt.value[:, o] @ half
+        constant[1] += truncated.amplitude.value[:, o] @ half
     wave, model = np.concatenate(waves), concatenate(models, -1)
     linear, quadratic, cubic, remainder = _scaled(model, np.ones(len(wave)))
     constant[1] += (remainder + np.abs(cubic).sum(1)) @ np.abs(wave)

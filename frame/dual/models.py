@@ -38,14 +38,19 @@ class MotionModels:
     def within(self, low: Array, high: Array) -> MotionModels:
         """The models over the part low ≤ u ≤ high of the box, in unit coordinates of the part."""
         models = [x for mode in self.oscillators for x in mode.models]
-        models += [x for truncated in self.truncated for x in (truncated.share, truncated.doubt)]
+        models += [
+            x for truncated in self.truncated for x in (truncated.share, truncated.amplitude)
+        ]
         restricted = all_within(models, low, high)
         count = 4 * len(self.oscillators)
         single = [
             mode.on_part(restricted[4 * k : 4 * k + 4]) for k, mode in enumerate(self.oscillators)
         ]
         pairs = zip(self.truncated, restricted[count::2], restricted[count + 1 :: 2], strict=True)
-        rests = [replace(truncated, share=share, doubt=doubt) for truncated, share, doubt in pairs]
+        rests = [
+            replace(truncated, share=share, amplitude=amplitude)
+            for truncated, share, amplitude in pairs
+        ]
         return replace(self, oscillators=single, truncated=rests)
 
     @classmethod
@@ -57,18 +62,17 @@ class MotionModels:
         Args:
             structure: The structure.
             excitation: The loads, the nodes and the names of the sources.
-            allowed: Doubt of each output that modes may leave which are not enclosed, shape (m,);
-                none unless given.
+            allowed: Truncation error of each output that is allowed, shape (m,); none unless given.
 
         Raises:
             UnprovedError: None of its modes can be enclosed.
         """
         centre, used = centred_matrices(structure.mass, structure.stiffness)
         excited = sources_of(structure, excitation[2]) @ inverse(centre.basis, structure.start).T
-        wanted, doubts = centre.modes, np.asarray(np.zeros(centre.modes))
+        wanted, tolerances = centre.modes, np.asarray(np.zeros(centre.modes))
         if allowed is not None:
-            wanted, doubts = modes_wanted(structure, centre, excited, excitation, allowed)
-        found = subspaces(centre, used, wanted, doubts)
+            wanted, tolerances = modes_wanted(structure, centre, excited, excitation, allowed)
+        found = subspaces(centre, used, wanted, tolerances)
         if not found.blocks:
             raise UnprovedError(
                 "no mode keeps clear of the others", "take narrower inputs", found.along
@@ -101,7 +105,8 @@ class MotionModels:
             of_block: What the block takes from the sources and gives to the outputs.
             found: All enclosed blocks.
             excitation: The loads, the nodes and the names of the sources.
-            allowed: Allowed doubt of each output, shape (m,); None for the size of the coupling.
+            allowed: Truncation error of each output that is allowed, shape (m,); None for the size
+                of the coupling.
         """
         more = oscillators(structure, of_block, found)
         if len(more) == 1:

@@ -48,7 +48,10 @@ def _linear_norm(terms: Array, enough: float = 0.0) -> float:
 
 
 def _norm_of_terms(terms: Array, squares: Mask) -> float:
-    """Norm of Σ_α |V_α| in the order of forms, of squares u_i² without what raises the form."""
+    """Norm of Σ_α |V_α|, |V| the absolute value of a symmetric matrix, shape (n, n) each.
+
+    Of a square u_i² ≥ 0 only the negative part of V counts, since bounds from below are wanted.
+    """
     some = terms.any((1, 2))
     if not some.any():
         return 0.0
@@ -81,7 +84,13 @@ class Pencil:
 
     @classmethod
     def from_rate(cls, rate: list[Array], mass: TaylorModel, stiffness: TaylorModel) -> Pencil:
-        """The pencil of ℓ with coefficients (monomials,) of degree 0 to N."""
+        """The pencil T = K − ℓ M over the box, as the variation of its entries by degree.
+
+        Args:
+            rate: Coefficients (monomials,) of ℓ, of degree 0 to N.
+            mass: M.
+            stiffness: K.
+        """
         N, d = len(rate) - 1, mass.inputs
         ell, of_k, of_m = (
             [float(np.abs(part).sum()) for part in rate],
@@ -107,7 +116,13 @@ class Pencil:
         return cls(sizes, parts[0], parts[1], rounding)
 
     def loss(self, o: Rows, distance: Array, sign: float) -> float:
-        """Bound of how far the block o, scaled by distances, of its sign × T falls over the box."""
+        """Bound of the fall over the box of sign × T on rows and columns o, scaled by distances.
+
+        Args:
+            o: Rows and columns.
+            distance: |T_jj| of these in the middle, by the roots of which T is divided.
+            sign: −1 or 1.
+        """
         if not len(o):
             return 0.0
         block, weight = np.ix_(o, o), sign / np.sqrt(np.outer(distance, distance))
@@ -144,7 +159,13 @@ class Comparison:
 
     @classmethod
     def over_box(cls, pencil: Pencil, gaps: Array, o: Rows) -> Comparison:
-        """Bounds over the box; `gaps` are the T_jj in its middle, o all but the block."""
+        """Comparison matrix (Ostrowski) of a pencil T over the box.
+
+        Args:
+            pencil: T.
+            gaps: T_jj in the middle of the box, shape (n,).
+            o: Modes outside the block, the rows and columns of T that are taken.
+        """
         total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
         distance, above = np.abs(gaps[o]), gaps[o] > 0
         blocks = ((above, 1.0), (~above, -1.0))
@@ -161,7 +182,7 @@ class Comparison:
         return self.inverse is not None or self.least > 0
 
     def solved(self, right: Array) -> Array:
-        """Bounds of |y|, T y = r, entry by entry for |r| ≤ right, shape (n − p,)."""
+        """Bounds of |y| for all T y = r with |r| ≤ `right`, entry by entry, shape (n − p,)."""
         scale = self.distance**-0.5
         y: Array = np.full(len(right), np.inf)
         if self.least > 0:

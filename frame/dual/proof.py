@@ -53,7 +53,7 @@ be proved."""
 
 CORNERS = 3
 """Corners of the box that a descent to the smallest peak visits."""
-DOUBT = 0.1
+TRUNCATION = 0.1
 """Share of a gap that modes may take which are not enclosed."""
 
 
@@ -176,7 +176,7 @@ class _Bounding:
         self.nodes: Rows = np.flatnonzero(self.needed.any((1, 2)))
         gap = proof.gap if self.needed.all() else proof.peaks
         self.outputs: Rows = np.flatnonzero(self.needed.any((0, 2)))
-        allowed = DOUBT * gap * goal.peak[self.outputs]
+        allowed = TRUNCATION * gap * goal.peak[self.outputs]
         self.level = box.level(self.nodes, allowed, self.outputs)
         d = len(box.active)
         self.unit = np.zeros((*self.outer.shape, d))

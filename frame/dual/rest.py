@@ -41,14 +41,14 @@ class TruncatedModes:
 
     Args:
         share: C, V = (sources, m).
-        doubt: Bound of √(A B), V = (sources, m).
+        amplitude: Bound of √(A B), V = (sources, m).
         middle: Middle of the responses that the share is multiplied by, shape (sources, m, T).
-        half: Half their range, that the doubt is multiplied by.
+        half: Half their range, that the amplitude is multiplied by.
         line_deviation: Bound of the motion's distance from straight lines between nodes, (T, m).
     """
 
     share: TaylorModel
-    doubt: TaylorModel
+    amplitude: TaylorModel
     middle: Array
     half: Array
     line_deviation: Array
@@ -56,7 +56,7 @@ class TruncatedModes:
     @property
     def width(self) -> Array:
         """Bound of the half width at the node where it is greatest, shape (m,)."""
-        return np.asarray((self.doubt.size()[..., None] * self.half).max(-1).sum(0))
+        return np.asarray((self.amplitude.size()[..., None] * self.half).max(-1).sum(0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +103,10 @@ def rest_of_modes(
         return None
     sums = _sums_over_modes(found, *coordinates, max(x.block.norm.order for x in shares))
     for of_block in shares:
-        sums = sums.less(_of_block(of_block))
+        sums = sums.less(_sums_over_block(of_block))
     low, high = float(found.low[other_modes].min()), float(found.high[other_modes].max())
     ends = damped_range(structure, low, high, other_modes)
-    return _known_by(sums, ends, structure, found, excitation)
+    return _truncated_modes(sums, ends, structure, found, excitation)
 
 
 def rest_of_block(
@@ -117,10 +117,10 @@ def rest_of_block(
     excitation: Excitation,
 ) -> TruncatedModes:
     """The modes of a block, known by their sums; `ends` are those of ω and g/ω."""
-    return _known_by(_of_block(of_block), ends, structure, found, excitation)
+    return _truncated_modes(_sums_over_block(of_block), ends, structure, found, excitation)
 
 
-def _known_by(
+def _truncated_modes(
     sums: _Sums,
     ends: tuple[Ends, Ends],
     structure: Classical,
@@ -131,7 +131,7 @@ def _known_by(
     orders = sorted({int(order) for order in structure.order})
     (omega, quotient), (ground, time, sources) = ends, excitation
     ranges = response_ranges(omega, quotient, ground, time, sources, orders)
-    return _least(structure, _bounds(sums, structure, found), ranges)
+    return _with_best_powers(structure, _amplitude_bounds(sums, structure, found), ranges)
 
 
 def _sums_over_modes(
@@ -223,7 +223,7 @@ def _terms(matrix: TaylorModel, degree: int) -> int:
     return len(matrix.remainder) * 2**degree + degree + 4
 
 
-def _of_block(of_block: BlockShares) -> _Sums:
+def _sums_over_block(of_block: BlockShares) -> _Sums:
     """Sums over the modes of a block, whose projected stiffness is N L."""
     projected = of_block.block.norm @ of_block.block.rate.T
     read, driven = of_block.read, of_block.source_forces
@@ -240,7 +240,7 @@ def _diagonal(matrix: TaylorModel) -> TaylorModel:
     return matrix[at, at]
 
 
-def _bounds(
+def _amplitude_bounds(
     sums: _Sums, structure: Classical, found: Subspaces
 ) -> list[tuple[TaylorModel, TaylorModel]]:
     """C and the bound of √(A B) for each power of λ, V = (sources, m), with outputs' factors."""
@@ -261,7 +261,7 @@ def _root(A: TaylorModel, B: TaylorModel) -> TaylorModel:
     return A[None] * (t / 2) + B[:, None] * (0.5 / t)
 
 
-def _least(
+def _with_best_powers(
     structure: Classical, bounds: list[tuple[TaylorModel, TaylorModel]], ranges: dict[int, Ranges]
 ) -> TruncatedModes:
     """Truncated modes, for each source and output by the power of λ that bounds them best.
@@ -278,11 +278,11 @@ def _least(
     )
     middle, half = (low + high) / 2, (high - low) / 2
     middle[1], half[1] = 0.0, np.abs(middle[1]) + half[1]
-    doubts = np.stack([doubt.size() for _, doubt in bounds])
-    best = (doubts * half.max(-1)).argmin(0)
-    share, doubt = bounds[0][0] * 0.0, bounds[0][1] * 0.0
+    amplitudes = np.stack([amplitude.size() for _, amplitude in bounds])
+    best = (amplitudes * half.max(-1)).argmin(0)
+    share, amplitude = bounds[0][0] * 0.0, bounds[0][1] * 0.0
     for k, pair in enumerate(bounds):
-        share, doubt = share + pair[0] * (best == k), doubt + pair[1] * (best == k)
+        share, amplitude = share + pair[0] * (best == k), amplitude + pair[1] * (best == k)
     s, o = np.indices(best.shape)
-    strays = (doubts[..., None] * deviation).min(0).sum(0)
-    return TruncatedModes(share, doubt, middle[best, s, o], half[best, s, o], strays.T)
+    deviations = (amplitudes[..., None] * deviation).min(0).sum(0)
+    return TruncatedModes(share, amplitude, middle[best, s, o], half[best, s, o], deviations.T)

@@ -27,20 +27,20 @@ def modes_wanted(
     excitation: Excitation,
     allowed: Array,
 ) -> tuple[int, Array]:
-    """Least number of modes from below beside which the others' doubt is allowed.
+    """Least number of lowest modes beside which the truncation error of the others is allowed.
 
-    The doubt is that of `rest`, with sums and responses in the middle of the box.
+    The error is that of `TruncatedModes`, with sums and responses in the middle of the box.
 
     Returns:
-        The number, and the doubt of each mode's λ, as a share of it, that moves an output by what
-        is allowed, shape (n,).
+        The number, and the relative error of each mode's λ that changes an output by what is
+        allowed, shape (n,).
 
     Args:
         structure: The structure.
         centre: Its modes in the middle of the box.
         excited: Sources in the coordinates of `centre`, V = (sources, n).
         excitation: The loads, the nodes and the names of the sources.
-        allowed: Doubt of each output, shape (m,).
+        allowed: Truncation error of each output that is allowed, shape (m,).
     """
     loads, time, sources = excitation
     time = time[:: -(-len(time) // MAX_NODES)]
@@ -51,29 +51,43 @@ def modes_wanted(
     a, b = structure.rayleigh.value
     decay = (a + b * squared) / 2 + structure.ratio.value[:n] * np.sqrt(squared)
     omega = np.sqrt(np.maximum(squared - decay**2, 1e-6 * squared))
-    doubt, moved = np.zeros((n, len(allowed))), np.zeros((n, len(allowed)))
+    error, sensitivity = np.zeros((n, len(allowed))), np.zeros((n, len(allowed)))
     sigma = -decay + 1j * omega
     motions = {source: _motion(source, sigma, loads, time) for source in sources}
     for o, order in enumerate(structure.order):
         for s, source in enumerate(sources):
             waves = _waves(source, sigma, motions[source][0], int(order))
             waves = waves + feedthrough(source, loads, int(order), time)
-            steep = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
-            moved[:, o] += np.abs(read[o] * given[s]) * steep  # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
-            shares = []
-            for power in POWERS:
-                row, share = (
-                    _above(x**2 / squared**p)
-                    for x, p in ((read[o], float(power > 0)), (given[s], float(power == 1)))
-                )
-                scaled = waves * squared[:, None] ** power
-                high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
-                half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2
-                shares.append(np.sqrt(row * share) * half.max(1))
-            doubt[:, o] += np.min(shares[light[o] :], axis=0)
-    enough = np.flatnonzero((doubt <= allowed).all(1))
+            slope = np.abs(motions[source][1]).max(1) * omega ** (order + (source == "start")) / 2
+            # λ |de/dλ|, as |dσ/dλ| ≈ 1/(2 ω)
+            sensitivity[:, o] += np.abs(read[o] * given[s]) * slope
+            errors = [_truncation_error(read[o], given[s], waves, squared, x) for x in POWERS]
+            error[:, o] += np.min(errors[light[o] :], axis=0)
+    enough = np.flatnonzero((error <= allowed).all(1))
     wanted = max(int(enough[0]), 1) if len(enough) else n
-    return wanted, np.min(allowed / np.maximum(moved, 1e-300), axis=1)
+    return wanted, np.min(allowed / np.maximum(sensitivity, 1e-300), axis=1)
+
+
+def _truncation_error(
+    read: Array, given: Array, waves: Array, squared: Array, power: float
+) -> Array:
+    """Error of an output without the modes from k on, for each k, by sums over λ^power, (n,).
+
+    By Cauchy and Schwarz the root of Σ a² Σ β² over these modes times half the range of λ^power e.
+
+    Args:
+        read: Output's coefficients a, shape (n,).
+        given: Source's participations β, shape (n,).
+        waves: Responses e, shape (n, T).
+        squared: λ, shape (n,).
+        power: One of `POWERS`.
+    """
+    outputs = _above(read**2 / squared ** float(power > 0))
+    sources = _above(given**2 / squared ** float(power == 1))
+    scaled = waves * squared[:, None] ** power
+    high, low = (np.maximum.accumulate(sign * scaled[::-1])[::-1] for sign in (1, -1))
+    half = np.maximum(high, low) if power == POWERS[1] else _with_below(high + low) / 2
+    return np.asarray(np.sqrt(outputs * sources) * half.max(1))
 
 
 def _motion(source: str, sigma: Array, loads: Mapping[str, History], time: Array) -> Array:

@@ -57,7 +57,7 @@ class Walk(NamedTuple):
         interval: Interval in which each node lies, rising, shape (T,).
         phases: Different times from an interval's beginning to a node in it, shape (P,), in s.
         phase: Which of them is each node's, shape (T,).
-        doubt: Rounding of each node's time since its interval began, shape (T,), in s.
+        time_rounding: Rounding of each node's time since its interval began, shape (T,), in s.
     """
 
     first: Array
@@ -66,7 +66,7 @@ class Walk(NamedTuple):
     interval: Rows
     phases: Array
     phase: Rows
-    doubt: Array
+    time_rounding: Array
 
 
 def walk(history: History, time: Array) -> Walk:
@@ -94,8 +94,8 @@ def walk(history: History, time: Array) -> Walk:
     phase[order] = np.cumsum(is_new) - 1
     phases = since[order][is_new]
     phases[phases <= same] = 0.0
-    doubt = np.abs(since - phases[phase]) + UNIT_ROUNDOFF * time
-    return Walk(first[:count], last[:count], step, interval, phases, phase, doubt)
+    time_rounding = np.abs(since - phases[phase]) + UNIT_ROUNDOFF * time
+    return Walk(first[:count], last[:count], step, interval, phases, phase, time_rounding)
 
 
 def impulses(history: History, time: Array) -> Array:
@@ -109,7 +109,7 @@ def absolute_moments(decay: float, history: History, time: Array) -> Array:
     """Bounds of ∫₀ᵗ τⁿ exp(−g τ) |f(t − τ)| dτ at nodes t, n = 0 … 4, shape (5, T); g = `decay`."""
     path = walk(history, time)
     sizes = np.maximum(np.abs(path.first), np.abs(path.last))
-    since = path.phases[path.phase] + path.doubt
+    since = path.phases[path.phase] + path.time_rounding
     out: Array = np.empty((5, len(time)))
     _walk_moments(sizes, path.interval, since, decay, path.step, out)
     return out
@@ -253,7 +253,7 @@ def _with_sine(
 def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Array) -> None:
     """Walks each σ (S,) to all nodes and writes `out` (derivatives, T, S) and `error` (T, S)."""
     for s in prange(len(sigma)):
-        nodes = walk.interval, walk.phase, walk.doubt
+        nodes = walk.interval, walk.phase, walk.time_rounding
         parts = _parts(sigma[s], walk.phases)
         _walk_along(sigma[s], walk, orders, nodes, parts, (0, 0j), out[:, :, s], error[:, s])
 
@@ -265,7 +265,7 @@ def _walk_to_given(
     """Walks each σ (S, n) to the node of its row and writes `out` (…, S, n) and `error`."""
     for s in prange(len(sigma)):
         here, phase = slice(node[s], node[s] + 1), walk.phase[node[s]]
-        nodes = walk.interval[here], np.zeros(1, np.int64), walk.doubt[here]
+        nodes = walk.interval[here], np.zeros(1, np.int64), walk.time_rounding[here]
         for k in range(sigma.shape[1]):
             parts = _parts(sigma[s, k], walk.phases[phase : phase + 1])
             end = out[:, s : s + 1, k], error[s : s + 1, k]
@@ -287,7 +287,7 @@ def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
             moved = (walk.first[begin] + slope * x) * P[walk.phase[first], 0]
             moved -= slope * P[walk.phase[first], 1]
             start = begin, -moved / parts[1][walk.phase[first]]
-            nodes = walk.interval[inside], walk.phase[inside], walk.doubt[inside]
+            nodes = walk.interval[inside], walk.phase[inside], walk.time_rounding[inside]
             _walk_along(sigma[s], walk, (), nodes, parts, start, out[:, inside, s], error)
 
 
@@ -329,13 +329,13 @@ def _walk_along(
         sigma: σ.
         walk: The record.
         orders: As many zeros as derivatives.
-        nodes: Interval, phase and doubt of each node, shape (N,).
+        nodes: Interval, phase and rounding of each node, shape (N,).
         of_phases: As of `_parts`.
         start: The first interval, and ρ at its beginning.
         out: Written: ρ and its derivatives, shape (derivatives, N).
         error: Written: bounds of the rounding of ρ, shape (N,).
     """
-    interval, phase, doubt = nodes
+    interval, phase, time_rounding = nodes
     phases, turns, parts, rounding = of_phases
     h, rate = walk.step, abs(sigma.real) + abs(sigma.imag)
     J, turn = np.empty(4, np.complex128), np.exp(sigma * h)
@@ -357,7 +357,9 @@ def _walk_along(
                 abs(moved.real) + abs(moved.imag)
             )
             step_rounding += rounding[j, 1] * (abs(a) + abs(slope) * x / 2)
-            step_rounding += doubt[node] * (rate * (abs(value.real) + abs(value.imag)) + abs(a))
+            step_rounding += time_rounding[node] * (
+                rate * (abs(value.real) + abs(value.imag)) + abs(a)
+            )
             out[0, node], error[node] = value, step_rounding
             if len(orders) > 0:
                 out[1, node] = w * (r1 + x * r0) + a * P[1] - slope * P[2]

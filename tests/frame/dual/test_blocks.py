@@ -174,13 +174,13 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
     )
     structure, centre, radius = over(own, {"a": 0.05, "b": 0.05})
     time = np.linspace(0, 3, 61)
-    least = rest._least
+    least = rest._with_best_powers
 
     def chosen(structure, bounds, ranges):
-        narrow = [(C, doubt if k == power else doubt + 1e6) for k, (C, doubt) in enumerate(bounds)]
+        narrow = [(C, size if k == power else size + 1e6) for k, (C, size) in enumerate(bounds)]
         return least(structure, narrow, ranges)
 
-    monkeypatch.setattr(rest, "_least", chosen)
+    monkeypatch.setattr(rest, "_with_best_powers", chosen)
     monkeypatch.setattr("alphacut.frame.dual.models.modes_wanted", lambda *_: (1, np.zeros(9)))
     models = MotionModels.from_structure(structure, ({"load": RECORD}, time, ("load",)), np.ones(1))
     (others,) = models.truncated
@@ -193,8 +193,8 @@ def test_modes_known_by_sums_stay_within_each_of_three_norms(power, monkeypatch)
         point = spanned((omega, omega), (0.03 / np.sqrt(1 - 0.03**2),) * 2, (2, 2))
         wave = Oscillators(point, {"load": RECORD}, time).waves("load", 0).value[:, 0, 0]
         motion = shape[0, 1] * shape[:, 1].sum() * wave
-        share, doubt = (x.at(u[None])[0, 0, 0] for x in (others.share, others.doubt))
-        width = (doubt + others.doubt.remainder[0, 0]) * others.half[0, 0]
+        share, size = (x.at(u[None])[0, 0, 0] for x in (others.share, others.amplitude))
+        width = (size + others.amplitude.remainder[0, 0]) * others.half[0, 0]
         off = np.abs(motion - share * others.middle[0, 0])
         slack = others.share.remainder[0, 0] * np.abs(others.middle[0, 0])
         assert (off <= width + slack + 1e-12).all()
