@@ -64,7 +64,7 @@ def enclosed(
     frontier, size, used = Frontier.of_box(len(lower), tree.numbers), len(tree.numbers), 0
     while len(frontier) and used + len(frontier) <= budget * size:
         used += len(frontier)
-        frontier = tree.examined(frontier, workers)
+        frontier = tree.next_frontier(frontier, workers)
         if progress:
             progress(1 - len(np.unique(frontier.problem)) / size)
     return tree.proved(frontier), used  # what the budget left open keeps its own bound
@@ -98,14 +98,14 @@ class Tree:
         self.jets = np.zeros((total, 1 + d + d * (d + 1) // 2))
         self._renew(np.arange(len(self.numbers)))
 
-    def examined(self, frontier: Frontier, workers: int) -> Frontier:
-        """Boxes and items still open after one examination of all boxes of a frontier."""
+    def next_frontier(self, frontier: Frontier, workers: int) -> Frontier:
+        """Boxes and items that are still open after all boxes of a frontier are examined."""
 
-        def tables_of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
+        def outcome_of(part: tuple[slice, slice]) -> tuple[Array, Array, Array]:
             return self.examine(frontier, *part)
 
         with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(tables_of, frontier.pieces(PIECE)))
+            results = list(pool.map(outcome_of, frontier.pieces(PIECE)))
         code, value, _ = (np.concatenate(part) for part in zip(*results, strict=True))
         higher = np.flatnonzero(value > self.best[frontier.problem] + HIGHER)
         if len(higher):
@@ -121,7 +121,7 @@ class Tree:
         return np.asarray(upper[self.numbers])
 
     def examine(self, frontier: Frontier, boxes: slice, items: slice) -> tuple[Array, Array, Array]:
-        """Codes, side × output at the centres and upper bounds of some items; see `kernel`."""
+        """Codes, values at the centres and upper bounds of some items; see `kernel.examine`."""
         model, over, d = self.model, self.remainder, len(self.lower)
         n, m = model.count, len(model.outputs)
         centre, radius, edges = frontier.geometry(self.lower, self.upper, boxes)
@@ -169,7 +169,7 @@ class Tree:
         self._renew(which)
 
     def _renew(self, which: Array) -> None:
-        """Values, points and jets of the problems at places `which` of the optima."""
+        """Take over best values, points and jets of the optima in rows `which`."""
         optima, numbers = self.optima, self.numbers[which]
         point = optima.point[which]
         f, g, H = self.model.at(point, optima.node[which], optima.output[which])
@@ -231,7 +231,7 @@ class Frontier:
             start = stop
 
     def children(self, code: Array) -> Frontier:
-        """Boxes and items that the examination's codes (I,) leave open."""
+        """Halves and faces of boxes with the items left open by the codes of `kernel.examine`."""
         d = self.position.shape[1]
         split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
         count, box = 2 * d + 3**d, self.box[split]
@@ -247,7 +247,7 @@ class Frontier:
         return Frontier(positions, *np.divmod(items, most))
 
     def _places(self, keys: Array, count: int) -> Array:
-        """Intervals of the children with these keys, shape (K, d)."""
+        """Positions of child boxes, shape (K, d); a key is box × count + number of half or face."""
         d = self.position.shape[1]
         positions: Array = self.position[keys // count].copy()
         local = keys % count

@@ -24,8 +24,8 @@ FACES = 16
 SWEEPS = 8
 NEAR = 2.0
 """Radii within which the best point counts as near."""
-TURN = 4.0
-"""Radians within which modes are turned."""
+MAX_PHASE = 4.0
+"""Largest change of phase, in rad, over a box for which linear phases are used."""
 SWELL = 1.7
 """Largest z for which 1 + z + z² lies above exp(z)."""
 
@@ -113,29 +113,33 @@ def stays_below(
 
 
 @compiled
-def along(bound: Array, r: Array, out: Array) -> None:
+def contract(bound: Array, r: Array, out: Array) -> None:
     """Write to `out` (K,) the tensors `bound` (d^order, K) contracted with radii r on each axis."""
     d = len(r)
     out[:] = 0.0
     for a in range(len(bound)):
-        weight, left, count = 1.0, a, len(bound)
+        weight, index, count = 1.0, a, len(bound)
         while count > 1:
-            weight *= r[left % d]
-            left, count = left // d, count // d
+            weight *= r[index % d]
+            index, count = index // d, count // d
         for k in range(len(out)):
             out[k] += weight * bound[a, k]
 
 
 @compiled
-def left_out(reach: float, e: Array, c: Array) -> float:
-    """Bound of what C = C₀, λ = λ₀ + i ω·x leave out of C exp((λ − λ₀ − i ω·x) t + i s).
+def linear_phase_remainder(reach: float, e: Array, c: Array) -> float:
+    """Bound, over |wave|, of the cubic remainder of a mode C exp(λ t) with a phase taken as linear.
 
-    Over |wave|, a sixth of a bound of the third derivative of their difference, by Leibniz' rule,
-    with bounds along the radii of the derivatives of λ t, `e` (0 … 3, the first of the real part),
-    and of C, `c` (0 … 3). Beyond `TURN` it is infinite.
+    It is a sixth of a bound of the third derivative, by Leibniz' rule, of the difference from the
+    mode with C = C₀ and λ = λ₀ + i ω·x; infinite beyond `MAX_PHASE`.
+
+    Args:
+        reach: Largest change of phase |ω·x| t over the box.
+        e: Bounds over the box of the derivatives of λ t of order 0 to 3, order 1 of the real part.
+        c: The same of C.
     """
     z0, z1 = e[1] + e[2] / 2, e[1] + e[2]
-    if not (reach < TURN and z0 < SWELL):
+    if not (reach < MAX_PHASE and z0 < SWELL):
         return inf
     swell, curved = 1 + z0 + z0 * z0, e[2] + z1 * z1
     p0, p1 = c[1] + c[0] * z0 * swell, c[1] + c[0] * z1
@@ -146,10 +150,10 @@ def left_out(reach: float, e: Array, c: Array) -> float:
 
 
 @compiled
-def turned(
+def linear_phase_bound(
     f: float, g: Array, H: Array, w: Array, t: float, side: float, modes: tuple[Array, ...], o: int
 ) -> float:
-    """Bound of a sum of modes A exp(i s) whose phases s = ω·x are linear, less the quadratic's f.
+    """Bound of a sum of modes A exp(i s) with linear phases s = ω·x, less its value in the centre.
 
     With |s| ≤ S, Re A exp(i s) exceeds its quadratic Taylor model by at most |Im A| S³/24 + Im A S²
     s/8 (Chebyshev) + max(Re A, 0) S² s²/24 + |Im A| S⁵/120 + |Re A| S⁶/720. The terms in x are
@@ -163,7 +167,7 @@ def turned(
         y = 2 * side * (share[k, o, 0] * im + share[k, o, 1] * re)
         S = phase[k] * t
         rates[1], rates[2], rates[3] = decay[k] * t, e[0, k] * t, e[1, k] * t
-        remainder += 2 * sqrt(re * re + im * im) * left_out(S, rates, c[:, k, o])
+        remainder += 2 * sqrt(re * re + im * im) * linear_phase_remainder(S, rates, c[:, k, o])
         remainder += abs(y) * (S**3 / 24 + S**5 / 120) + abs(x) * S**6 / 720
         tilt, soft = y * S * S * t / 8, max(x, 0.0) * S * S * t * t / 12
         for i in range(len(g)):
@@ -205,9 +209,13 @@ def examine(
     remainder: tuple[Array, ...],
     best: tuple[Array, ...],
     gap: float,
-    turning: bool,
+    linear_phases: bool,
 ) -> tuple[Rows, Array, Array]:
-    """Codes, side × output at the centres, and upper bounds of all items.
+    """Examine all items: what is done next with each, its value and its upper bound.
+
+    Returns:
+        Codes (0: closed; 1 + i: bisect along axis i; `FACES` and more: confine to faces), side ×
+        output at the centres, and upper bounds over the boxes, each with an entry for each item.
 
     Args:
         frame: First row of each box, first item of each row, node of each row, column of each item
@@ -220,7 +228,7 @@ def examine(
             the axes of rates, orders 2 and 3, (d², n) and (d³, n), and shares, orders 0 to 3.
         best: Best values by problem, their points and jets there.
         gap: What the bounds may lie above the best values by.
-        turning: Whether modes are turned.
+        linear_phases: Whether modes with linear phases are tried as bounds.
     """
     row_start, item_start, nodes, column = frame
     centre, radius, edges, tables, shares, rates = boxes
@@ -239,14 +247,14 @@ def examine(
     slope = np.empty((n, d))
     for b in range(len(centre)):
         r = radius[b]
-        if turning and (b == 0 or (r != radius[b - 1]).any()):
-            along(rate2, r, e[0])
-            along(rate3, r, e[1])
+        if linear_phases and (b == 0 or (r != radius[b - 1]).any()):
+            contract(rate2, r, e[0])
+            contract(rate3, r, e[1])
             flat = c.reshape(4, n * m)
             flat[0] = share0
-            along(share1, r, flat[1])
-            along(share2, r, flat[2])
-            along(share3, r, flat[3])
+            contract(share1, r, flat[1])
+            contract(share2, r, flat[2])
+            contract(share3, r, flat[3])
         for k in range(n):
             phase[k] = decay[k] = 0.0
             for i in range(d):
@@ -288,9 +296,9 @@ def examine(
                 bound[item] = f + separable(g, S, r) + missing
                 if inner or bound[item] <= target:
                     continue
-                if turning:
+                if linear_phases:
                     room = target - f - noise
-                    room -= turned(f, g, S, waves[row], time[node], side, modes, o)
+                    room -= linear_phase_bound(f, g, S, waves[row], time[node], side, modes, o)
                     for i in range(d):
                         low[i], high[i] = -r[i], r[i]
                     if separable(g, S, r) <= room or stays_below(g, S, low, high, room, work, L):
