@@ -19,7 +19,7 @@ from alphacut.fuzzy.arrays import Rows
 from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.refused import require, require_numbers
 from alphacut.fuzzy.result import Nature
-from alphacut.fuzzy.sets.numbers import rising
+from alphacut.fuzzy.sets.numbers import checked_levels
 
 ALPHA = (0.0, 0.25, 0.5, 0.75, 1.0)
 FAR_APART = 1.5
@@ -61,7 +61,7 @@ class Boxes:
         require(
             bool(self.names), "inputs", value=None, allowed="fuzzy numbers by name, one at least"
         )
-        rising(self.alpha)
+        checked_levels(self.alpha)
 
     @property
     def inputs(self) -> Mapping[str, FuzzyNumber]:

@@ -36,8 +36,8 @@ from alphacut.frame.verification.step_error import (
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.blas import on_one_blas_thread
-from alphacut.fuzzy.progress_bar import Progress, showing, subprogress
-from alphacut.fuzzy.refused import chosen, require
+from alphacut.fuzzy.progress_bar import Progress, progress_reporter, subprogress
+from alphacut.fuzzy.refused import require, require_choice
 
 FIRST_STEPS = 3
 """Steps of the motions that show whether they exist."""
@@ -123,7 +123,7 @@ def envelope(
     flow = replace(problem.flow, relative=relative, store=folder, interruptible=interruptible)
     steps = step_error(flow)
     proof = _proof_beside(problem.method, flow)
-    with showing(progress) as tick:
+    with progress_reporter(progress) as tick:
         bounds = problem.method.run(flow, subprogress(tick, 0.0, 0.5) if proof else tick)
         bounds = with_step_error(bounds, flow, steps)
         if proof:
@@ -264,9 +264,11 @@ def _method(
         allowed = "none beside a method that is no name"
         require(not options, "options", value=[*options], allowed=allowed)
         return method
-    chosen("method", method, METHODS)
+    require_choice("method", method, METHODS)
     for option in options:
-        chosen(f"option of {method}", option, [field.name for field in fields(METHODS[method])])
+        require_choice(
+            f"option of {method}", option, [field.name for field in fields(METHODS[method])]
+        )
     chosen_method: Method = METHODS[method](**options)
     return chosen_method
 

@@ -15,11 +15,11 @@ T = TypeVar("T")
 
 
 def on_one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """Return the function wrapped so that BLAS uses one thread while it runs."""
+    """Decorator: BLAS uses one thread while the function runs."""
 
     @wraps(function)
-    def limited(*args: P.args, **kwargs: P.kwargs) -> T:
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> T:
         with threadpool_limits(limits=1, user_api="blas"):
             return function(*args, **kwargs)
 
-    return limited
+    return wrapper

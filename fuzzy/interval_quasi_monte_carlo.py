@@ -24,7 +24,7 @@ from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.design import Plan
 from alphacut.fuzzy.plans.transformation import Reduced
 from alphacut.fuzzy.propagation import propagate
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
 from alphacut.fuzzy.sets.numbers import FuzzyNumber, PiecewiseLinear
@@ -64,14 +64,15 @@ class RandomInput:
             u: Probability in (0, 1).
             alpha: Levels in [0, 1] of the cuts, beside 0 and 1.
         """
-        numbers = fuzzy_inputs(self.parameters)
-        rows = []
-        for level in (grid := sorted({0.0, *alpha, 1.0})):
+        numbers, levels = fuzzy_inputs(self.parameters), sorted({0.0, *alpha, 1.0})
+        quantiles = []  # by level, at all corners
+        for level in levels:
             corners = product(*(number.cut(level) for number in numbers.values()))
-            rows.append([self.quantile(u, **dict(zip(numbers, x, strict=True))) for x in corners])
-        low = np.maximum.accumulate(np.min(rows, axis=1))  # nested despite round-off
-        high = np.maximum(np.minimum.accumulate(np.max(rows, axis=1)), low[-1])
-        return PiecewiseLinear(tuple(grid), tuple(low), tuple(high))
+            parameters = (dict(zip(numbers, corner, strict=True)) for corner in corners)
+            quantiles.append([self.quantile(u, **values) for values in parameters])
+        low = np.maximum.accumulate(np.min(quantiles, axis=1))  # nested despite round-off
+        high = np.maximum(np.minimum.accumulate(np.max(quantiles, axis=1)), low[-1])
+        return PiecewiseLinear(tuple(levels), tuple(low), tuple(high))
 
 
 class Estimate(NamedTuple):
@@ -115,7 +116,7 @@ class IntervalResponse:
         return self._estimate(output, lambda bounds: np.asarray(bounds.mean(axis=0)))
 
     def p_box(self, at: ArrayLike, output: str = "y") -> Estimate:
-        """Return bounds of the distribution function at the responses `at` (m,), (levels, m)."""
+        """Bounds of the distribution function at responses (m,): arrays of shape (levels, m)."""
         responses = np.atleast_1d(np.asarray(at, float))
 
         def cdf(bounds: Array) -> Array:
@@ -126,11 +127,11 @@ class IntervalResponse:
         return Estimate(upper, lower, upper_error, lower_error)
 
     def quantile(self, probability: ArrayLike, output: str = "y") -> Estimate:
-        """Return bounds of the quantiles at probabilities (m,), arrays of shape (levels, m)."""
-        at = np.atleast_1d(np.asarray(probability, float))
+        """Bounds of the quantiles at probabilities (m,): arrays of shape (levels, m)."""
+        probabilities = np.atleast_1d(np.asarray(probability, float))
 
         def quantiles(bounds: Array) -> Array:
-            return np.asarray(np.quantile(bounds, at, axis=0).T)
+            return np.asarray(np.quantile(bounds, probabilities, axis=0).T)
 
         return self._estimate(output, quantiles)
 
@@ -145,14 +146,14 @@ class IntervalResponse:
         from scipy.stats import t
 
         bounds = np.array([x.bounds(output) for x in self.bounds])  # (points, 2, levels)
-        by_scrambling = np.split(bounds, SCRAMBLINGS)
         factor = t.ppf((1 + CONFIDENCE) / 2, SCRAMBLINGS - 1) / np.sqrt(SCRAMBLINGS)
-        values = [average(bounds[:, side]) for side in (0, 1)]
-        errors = [
-            factor * np.std([average(x[:, side]) for x in by_scrambling], axis=0, ddof=1)
-            for side in (0, 1)
-        ]
-        return Estimate(*values, *errors)
+
+        def half_width(end: Array) -> Array:
+            averages = [average(part) for part in np.split(end, SCRAMBLINGS)]
+            return np.asarray(factor * np.std(averages, axis=0, ddof=1))
+
+        lower, upper = bounds[:, 0], bounds[:, 1]
+        return Estimate(average(lower), average(upper), half_width(lower), half_width(upper))
 
 
 @dataclass(frozen=True)
@@ -179,10 +180,10 @@ class IntervalQuasiMonteCarlo:
     method: Plan = field(default_factory=Reduced)
 
     def __post_init__(self) -> None:
-        real("points", self.points, positive=True, whole=True)
+        checked_number("points", self.points, positive=True, whole=True)
         allowed = f"multiples of {SCRAMBLINGS}, one part for each scrambling"
         require(self.points % SCRAMBLINGS == 0, "points", value=self.points, allowed=allowed)
-        real("seed", self.seed, whole=True)
+        checked_number("seed", self.seed, whole=True)
 
     def run(
         self,
@@ -193,7 +194,7 @@ class IntervalQuasiMonteCarlo:
         alpha: Sequence[float],
         knowledge: Knowledge | None = None,
     ) -> IntervalResponse:
-        """Return the bounds of the response at every quasi-random point, on every level.
+        """Bounds of the response on every level at each quasi-random point of the random inputs.
 
         Args:
             function: Gets random and fuzzy inputs by name.
@@ -205,13 +206,13 @@ class IntervalQuasiMonteCarlo:
         Raises:
             RefusedError: There is no random input, or an input is named twice.
         """
-        separate = bool(random) and not set(random) & set(inputs)
+        is_disjoint = bool(random) and not set(random) & set(inputs)
         allowed = "one or more, none of them fuzzy"
-        require(separate, "random inputs", value=tuple(random), allowed=allowed)
+        require(is_disjoint, "random inputs", value=tuple(random), allowed=allowed)
         results = []
-        for u in self._probabilities(len(random)):
-            pairs = zip(random.items(), u, strict=True)
-            quantiles = {name: number.at(p, alpha) for (name, number), p in pairs}
+        for point in self._probabilities(len(random)):
+            pairs = zip(random.items(), point, strict=True)
+            quantiles = {name: number.at(u, alpha) for (name, number), u in pairs}
             bounds = propagate(
                 function,
                 {**quantiles, **inputs},
@@ -224,12 +225,11 @@ class IntervalQuasiMonteCarlo:
         return IntervalResponse(results)
 
     def _probabilities(self, inputs: int) -> Array:
-        """Return Sobol points of the unit cube, one scrambling after another, (points, inputs)."""
+        """Sobol points of the unit cube, one scrambling after another, shape (points, inputs)."""
         from scipy.stats import qmc
 
-        return np.concatenate(
-            [
-                qmc.Sobol(inputs, rng=rng).random(self.points // SCRAMBLINGS)
-                for rng in np.random.default_rng(self.seed).spawn(SCRAMBLINGS)
-            ]
+        count, rngs = (
+            self.points // SCRAMBLINGS,
+            np.random.default_rng(self.seed).spawn(SCRAMBLINGS),
         )
+        return np.concatenate([qmc.Sobol(inputs, rng=rng).random(count) for rng in rngs])

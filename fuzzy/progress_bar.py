@@ -16,9 +16,12 @@ _FORETOLD = 0.05  # share of the work from which the time left is told; less for
 
 
 def subprogress(progress: Progress | None, first: float, last: float) -> Progress:
-    """Return a function that reports a part of a task, which runs from fraction `first` to `last`.
+    """Function that reports the progress of a part of a task to `progress`, that of the task.
 
-    It takes the fraction of the part that is done and calls `progress` with that of the task.
+    Args:
+        progress: Takes the completed fraction of the task; None for no report.
+        first: Fraction of the task at which the part begins.
+        last: Fraction at which it ends.
     """
     if progress is None:
         return lambda done: None
@@ -26,8 +29,8 @@ def subprogress(progress: Progress | None, first: float, last: float) -> Progres
 
 
 @contextmanager
-def showing(progress: Progress | bool | None) -> Iterator[Progress | None]:
-    """Context manager whose value reports progress; it takes the completed fraction, 0 to 1.
+def progress_reporter(progress: Progress | bool | None) -> Iterator[Progress | None]:
+    """Context with a function that reports the completed fraction, 0 to 1.
 
     Args:
         progress: The caller's function. None or True: a bar on a terminal, or a line every ten

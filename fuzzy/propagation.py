@@ -22,8 +22,8 @@ from alphacut.fuzzy.knowledge.joint import joined_inputs
 from alphacut.fuzzy.knowledge.known import Knowledge
 from alphacut.fuzzy.plans.automatic import Automatic
 from alphacut.fuzzy.plans.design import Plan
-from alphacut.fuzzy.progress_bar import Progress, showing
-from alphacut.fuzzy.refused import chosen, require
+from alphacut.fuzzy.progress_bar import Progress, progress_reporter
+from alphacut.fuzzy.refused import require, require_choice
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain, fuzzy_inputs, levels
 from alphacut.fuzzy.sets.interaction import Interaction
@@ -100,20 +100,28 @@ def propagate(
     """
     start = perf_counter()
     domain = Domain(joined_inputs(inputs), levels(4) if alpha is None else alpha, interactions)
-    method = _checked(method or Automatic(), on_failure)
-    holds = executor is None or (isinstance(executor, Executor) and workers == 1)
+    method = method or Automatic()
+    _require_method(method)
+    require_choice("on_failure", on_failure, ("raise", "skip"))
+    is_allowed = executor is None or (isinstance(executor, Executor) and workers == 1)
     allowed = "one of concurrent.futures (of dask client.get_executor()), without workers"
-    require(holds, "executor", value=executor, allowed=allowed)
-    call = Call(function, domain.names, tuple(shared), vectorised)
-    key = b"" if store is None else model_key(identity or {})
+    require(is_allowed, "executor", value=executor, allowed=allowed)
     with (
-        showing(progress) as report,
-        nullcontext(executor) if executor else pool(workers) as workers_pool,
-        nullcontext(store) if isinstance(store, Store | None) else Store(store) as file,
+        progress_reporter(progress) as report,
+        nullcontext(executor) if executor else pool(workers) as sample_executor,
+        nullcontext(store) if isinstance(store, Store | None) else Store(store) as sample_store,
     ):
-        facts, skip = knowledge or Knowledge(), on_failure == "skip"
-        campaign = Campaign(call, facts, budget, workers_pool, report, file, key, skip)
-        bounds = _without_failed(method.run(campaign, domain), campaign.failed)
+        campaign = Campaign(
+            Call(function, domain.names, tuple(shared), vectorised),
+            knowledge=knowledge or Knowledge(),
+            budget=budget,
+            executor=sample_executor,
+            progress=report,
+            store=sample_store,
+            model=b"" if store is None else model_key(identity or {}),
+            skip=on_failure == "skip",
+        )
+        bounds = _note_failures(method.run(campaign, domain), campaign.failed)
         campaign.report(1.0)
     return replace(
         bounds,
@@ -125,24 +133,17 @@ def propagate(
     )
 
 
-def _checked(method: Plan, on_failure: str) -> Plan:
-    """Return the method unchanged; refuse one without a method `run(campaign, domain)`."""
-    runs = hasattr(method, "run") and not isinstance(method, type)
-    runs = runs and len(signature(method.run).parameters) == 2  # campaign and domain
+def _require_method(method: Plan) -> None:
+    """Refuse an object without a method `run(campaign, domain)`, such as a class."""
+    is_plan = hasattr(method, "run") and not isinstance(method, type)
+    is_plan = is_plan and len(signature(method.run).parameters) == 2  # campaign and domain
+    allowed = "an object such as General() or Signed()"
     cure = "IntervalQuasiMonteCarlo().run(…) takes random inputs besides"
-    require(
-        runs,
-        "method",
-        value=repr(method),
-        allowed="an object such as General() or Signed()",
-        cure=cure,
-    )
-    chosen("on_failure", on_failure, ("raise", "skip"))
-    return method
+    require(is_plan, "method", value=repr(method), allowed=allowed, cure=cure)
 
 
-def _without_failed(bounds: Bounds, failed: int) -> Bounds:
-    """Return the bounds as they are, or as attained ones with a note if samples were left out."""
+def _note_failures(bounds: Bounds, failed: int) -> Bounds:
+    """The bounds if no sample failed, else a copy as attained bounds with a note on the number."""
     if not failed:
         return bounds
     note = f"{failed} samples failed and were left out: the true range may reach further there"
@@ -158,13 +159,19 @@ def _without_failed(bounds: Bounds, failed: int) -> Bounds:
 
 
 def _units(units: Mapping[str, str], outputs: Sequence[str]) -> tuple[str, ...]:
-    """Return the unit of each output, "" without one; entries of an array have the array's unit."""
-    names = {name.partition("[")[0] for name in outputs}.union(outputs)
+    """Unit of each output, "" if none is given; empty without any unit.
+
+    Args:
+        units: Unit by the name of an output, or of an array such as "s11" for "s11[0]".
+        outputs: Names of all outputs.
+    """
+    arrays = [name.partition("[")[0] for name in outputs]
     for name in units:
-        chosen("unit of", name, sorted(names))
+        require_choice("unit of", name, sorted({*arrays, *outputs}))
     if not units:
         return ()
-    return tuple(units.get(name, units.get(name.partition("[")[0], "")) for name in outputs)
+    pairs = zip(outputs, arrays, strict=True)
+    return tuple(units.get(name, units.get(array, "")) for name, array in pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,10 +226,15 @@ def width_shares(
     """
     numbers = fuzzy_inputs(inputs)
     members = groups or {name: (name,) for name in numbers}
-    for name in (name for group in members.values() for name in group):
-        chosen("input of a group", name, numbers)
+    for group in members.values():
+        for name in group:
+            require_choice("input of a group", name, numbers)
+
+    def width_with(crisp: Mapping[str, FuzzyNumber]) -> Array:
+        result = propagation({**numbers, **crisp})
+        lower, upper = (result.lower, result.upper) if isinstance(result, Bounds) else result
+        return np.asarray(upper - np.asarray(lower))
+
+    width = width_with({})
     fixed = [{x: Crisp(numbers[x].modal) for x in group} for group in members.values()]
-    runs = [propagation({**numbers, **crisp}) for crisp in ({}, *fixed)]
-    ends = [(run.lower, run.upper) if isinstance(run, Bounds) else run for run in runs]
-    width, *narrower = (np.asarray(upper) - lower for lower, upper in ends)
-    return Shares(tuple(members), width, np.array([width - reduced for reduced in narrower]))
+    return Shares(tuple(members), width, np.array([width - width_with(crisp) for crisp in fixed]))

@@ -24,22 +24,24 @@ def printable(value: object, most: int = LONGEST) -> str:
     return line if len(line) <= most else f"{line[: most - 1]}…"
 
 
-def fitted(value: str, allowed: str, line: Callable[[str, str], str], cure: str = "") -> str:
-    """Return a message of at most `LONGEST` characters, whose cure is never cut off.
+def fit_message(
+    value: str, allowed: str, compose: Callable[[str, str], str], cure: str = ""
+) -> str:
+    """Message of at most `LONGEST` characters, whose cure is never cut off.
 
     Args:
         value: Refused value, which is cut off first.
         allowed: Allowed values, which are cut off next.
-        line: Function from the two to the message without its cure.
+        compose: Function from the two to the message without its cure.
         cure: Advice that is appended after a semicolon.
     """
     end = f"; {cure}" if cure else ""
     room = max(LONGEST - len(end), LEAST_SHOWN)
-    excess = len(line(value, allowed)) - room
-    value = printable(value, max(LEAST_SHOWN, len(value) - max(excess, 0)))
-    excess = len(line(value, allowed)) - room
-    allowed = printable(allowed, max(LEAST_SHOWN, len(allowed) - max(excess, 0)))
-    return printable(line(value, allowed), room) + end
+    excess = max(len(compose(value, allowed)) - room, 0)
+    value = printable(value, max(LEAST_SHOWN, len(value) - excess))
+    excess = max(len(compose(value, allowed)) - room, 0)
+    allowed = printable(allowed, max(LEAST_SHOWN, len(allowed) - excess))
+    return printable(compose(value, allowed), room) + end
 
 
 class RefusedError(ValueError):
@@ -63,7 +65,7 @@ class RefusedError(ValueError):
             has = "is missing" if value is None else f"is {value_text}"
             return f"{key} {has}; allowed: {allowed_text}"
 
-        super().__init__(fitted(printable(value), allowed, line, cure))
+        super().__init__(fit_message(printable(value), allowed, line, cure))
 
     def __reduce__(self) -> tuple[type[RefusedError], tuple[str, str | None, str, str]]:
         """For pickle, which sends it to other processes: the value as text."""
@@ -85,10 +87,10 @@ class FailedError(RuntimeError):
 
     def __init__(self, what: str, cure: str = "") -> None:
         self.what, self.cure = what, cure
-        super().__init__(fitted(what, "", lambda text, _: text, cure))
+        super().__init__(fit_message(what, "", lambda text, _: text, cure))
 
 
-def real(
+def checked_number(
     key: str,
     value: object,
     *,
@@ -111,17 +113,20 @@ def real(
         RefusedError: It is not such a number.
     """
     least, kind = (max(least, 0), Integral) if whole else (least, Real)
-    truth = type(value).__name__ in ("bool", "bool_")
+    is_bool = type(value).__name__ in ("bool", "bool_")
     try:
-        number = float(value) if isinstance(value, kind) and not truth else nan
+        number = float(value) if isinstance(value, kind) and not is_bool else nan
     except OverflowError:  # of an integer
         number = inf
     allowed = "whole numbers" if whole else "finite numbers"
-    allowed += " greater than 0" if positive else f" from {least:g} on" if least > -inf else ""
+    if positive:
+        allowed += " greater than 0"
+    elif least > -inf:
+        allowed += f" from {least:g} on"
     allowed += f", up to {most:g}" if most < inf else ""
-    inside = isfinite(number) and least <= number <= most and (number > 0 or not positive)
+    is_allowed = isfinite(number) and least <= number <= most and (number > 0 or not positive)
     shown = printable(value) if isinstance(value, Integral) else repr(value)
-    require(inside, key, value=shown, allowed=allowed)
+    require(is_allowed, key, value=shown, allowed=allowed)
     return number
 
 
@@ -131,19 +136,19 @@ def require_numbers(name: str, values: object) -> None:
     Raises:
         RefusedError: They are a text or a single number, or contain something else.
     """
-    listed = isinstance(values, Collection) and not isinstance(values, str)
-    require(listed, name, value=repr(values), allowed="a list of numbers")
+    is_list = isinstance(values, Collection) and not isinstance(values, str)
+    require(is_list, name, value=repr(values), allowed="a list of numbers")
     if isinstance(values, np.ndarray) and values.dtype.kind in "iuf" and np.isfinite(values).all():
-        return  # at once: matrices have many entries
+        return  # without a loop: matrices have many entries
     for value in np.ravel(values).tolist() if isinstance(values, np.ndarray) else values:  # type: ignore[attr-defined]
-        real(name, value)
+        checked_number(name, value)
 
 
-def chosen(key: str, value: object, names: Iterable[str]) -> None:
+def require_choice(key: str, value: object, names: Iterable[str]) -> None:
     """Refuse a value that is not one of the allowed names.
 
     Raises:
-        RefusedError: It is not.
+        RefusedError: The message lists the names.
     """
     allowed = tuple(names)
     require(value in allowed, key, value=value, allowed=", ".join(allowed))

@@ -13,9 +13,9 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
 from alphacut.fuzzy.knowledge.joint import JointClaim
-from alphacut.fuzzy.refused import FailedError, chosen, require
-from alphacut.fuzzy.sets.claimed import Claimed
-from alphacut.fuzzy.sets.numbers import Stepwise, new_axes, outer_steps, rising
+from alphacut.fuzzy.refused import FailedError, require, require_choice
+from alphacut.fuzzy.sets.claimed import ClaimedNumber
+from alphacut.fuzzy.sets.numbers import Stepwise, checked_levels, new_axes, outer_steps
 
 if TYPE_CHECKING:
     import xarray
@@ -153,7 +153,7 @@ class Bounds:
     samples: Samples | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "alpha", np.array(rising(self.alpha)))
+        object.__setattr__(self, "alpha", np.array(checked_levels(self.alpha)))
         self._check_shapes()
         self._check_values()
         self._check_proof()
@@ -186,18 +186,18 @@ class Bounds:
         """
         round_off, error = self._round_off, np.nan_to_num(self.error)
         estimated = np.where(self._guaranteed, 0.0, error)
-        of_levels = 2 * round_off + error[1:] + error[:-1]
+        slack = 2 * round_off + error[1:] + error[:-1]  # between two levels
         inner, outer = self.attained, self.proved
         for what, excess in (
             ("lower bounds lie above upper ones", self.lower - self.upper - round_off - estimated),
-            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - of_levels),
-            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - of_levels),
+            ("lower ends of the α-cuts are not nested", -np.diff(self.lower, axis=0) - slack),
+            ("upper ends of the α-cuts are not nested", np.diff(self.upper, axis=0) - slack),
             ("attained bounds lie outside the proved ones", outer.lower - inner.lower - round_off),
             ("attained bounds lie outside the proved ones", inner.upper - outer.upper - round_off),
         ):
             if (excess > 0).any():
-                worst = self.outputs[int(np.nanargmax(excess) % len(self.outputs))]
-                raise FailedError(f"{what}: of {worst}, by up to {np.nanmax(excess):.3g}")
+                output = self.outputs[int(np.nanargmax(excess) % len(self.outputs))]
+                raise FailedError(f"{what}: of {output}, by up to {np.nanmax(excess):.3g}")
 
     @property
     def _round_off(self) -> Array:
@@ -235,24 +235,20 @@ class Bounds:
         """Claim of the cuts, and which inputs are opinions."""
         return JointClaim.from_inputs(self.inputs, self.nature)
 
-    def number(self, output: str = "y") -> Stepwise | Claimed:
+    def number(self, output: str = "y") -> Stepwise | ClaimedNumber:
         """Return one output as a fuzzy number; between two levels the wider α-cut holds.
 
-        It is a `Claimed` number if the inputs carry a claim of coverage.
+        It is a `ClaimedNumber` number if the inputs carry a claim of coverage.
 
         Raises:
             RefusedError: The levels do not run from 0 to 1, and the inputs carry no claim.
         """
-        steps = outer_steps(self.alpha, *self.bounds(output))
-        if (claim := self.claim.claim) is not None:
-            return Claimed(steps, claim, float(self.alpha[0]))
-        complete = (self.alpha[0], self.alpha[-1]) == (0, 1)
-        require(
-            complete,
-            "alpha",
-            value=self.alpha.tolist(),
-            allowed="levels from 0 to 1: alpha=levels(4)",
-        )
+        steps, claim = outer_steps(self.alpha, *self.bounds(output)), self.claim.claim
+        if claim is not None:
+            return ClaimedNumber(steps, claim, float(self.alpha[0]))
+        is_complete = (self.alpha[0], self.alpha[-1]) == (0, 1)
+        allowed = "levels from 0 to 1: alpha=levels(4)"
+        require(is_complete, "alpha", value=self.alpha.tolist(), allowed=allowed)
         return steps
 
     def column(self, output: str = "y") -> int:
@@ -261,7 +257,7 @@ class Bounds:
         Raises:
             RefusedError: There is no such output.
         """
-        chosen("output", output, self.outputs)
+        require_choice("output", output, self.outputs)
         return self.outputs.index(output)
 
     def bounds(self, output: str = "y") -> Ends:
@@ -279,24 +275,25 @@ class Bounds:
 
         Of more than 25 lines only the first outputs are shown.
         """
-        count = max(1, _MAX_LINES // len(self.alpha))
-        shown = range(len(self.outputs))[:count]
-        lines = [line for column in shown for line in self._lines(column)]
+        count = max(1, _MAX_LINES // len(self.alpha))  # outputs that are shown
+        lines = [self._head]
+        for column in range(len(self.outputs))[:count]:
+            lines += self._lines(column)
         hidden = len(self.outputs) - count
-        more = [f"… and {hidden} outputs more: bounds(NAME) has them"] if hidden > 0 else []
-        claim = [str(self.claim)] if self.claim.rule else []
-        return "\n".join([self._head, *lines, *more, *self.notes, *claim])
+        if hidden > 0:
+            lines.append(f"… and {hidden} outputs more: bounds(NAME) has them")
+        return "\n".join([*lines, *self.notes, *([str(self.claim)] if self.claim.rule else [])])
 
     __repr__ = __str__
 
     @property
     def _head(self) -> str:
         """Nature, what it rests on, and what it cost."""
-        rests = f" (given that {' and '.join(self.basis)})" if self.basis else ""
-        over = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
-        most = f" of at most {self.budget:,}" if self.budget else ""
-        cost = f"{self.evaluations:,} evaluations{most}, {self.seconds:.2g} s"
-        return f"bounds {self.nature}{rests}{over} by the method {self.method}: {cost}"
+        basis = f" (given that {' and '.join(self.basis)})" if self.basis else ""
+        time = "" if self.time is None else f" over {self.time[0]:g} … {self.time[-1]:g} s"
+        budget = f" of at most {self.budget:,}" if self.budget else ""
+        cost = f"{self.evaluations:,} evaluations{budget}, {self.seconds:.2g} s"
+        return f"bounds {self.nature}{basis}{time} by the method {self.method}: {cost}"
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -309,18 +306,18 @@ class Bounds:
 
         Of an output over time it shows the extremes over time.
         """
-        low, high, error = (x[..., column] for x in (self.lower, self.upper, self.error))
+        lowers, uppers, errors = (x[..., column] for x in (self.lower, self.upper, self.error))
         if self.time is not None:
-            low, high, error = low.min(axis=1), high.max(axis=1), error.max(axis=1)
+            lowers, uppers, errors = lowers.min(axis=1), uppers.max(axis=1), errors.max(axis=1)
         nature = self.nature_of(self.outputs[column])
-        differs = f", {nature}" if nature != self.nature else ""
-        words = "gap to attained" if nature is Nature.GUARANTEED else "error"
-        for alpha, least, most, miss in zip(self.alpha, low, high, error, strict=True):
-            pair = rounded(least, "lower", nature, 6), rounded(most, "upper", nature, 6)
-            # attained ends of nearly one value, rounded inwards, may cross
-            ends = pair if pair[0] <= pair[1] else (least, most)
+        suffix = f", {nature}" if nature != self.nature else ""
+        error_name = "gap to attained" if nature is Nature.GUARANTEED else "error"
+        for alpha, lower, upper, error in zip(self.alpha, lowers, uppers, errors, strict=True):
+            ends = rounded(lower, "lower", nature, 6), rounded(upper, "upper", nature, 6)
+            if ends[0] > ends[1]:  # attained ends of nearly one value, rounded inwards
+                ends = lower, upper
             head = f"{self.named[column]}, α = {_digits(alpha)}: {' … '.join(map(_digits, ends))}"
-            yield f"{head}, {words} {_digits(miss)}{differs}"
+            yield f"{head}, {error_name} {_digits(error)}{suffix}"
 
     def plot(self, axes: Axes | None = None, output: str = "", **line: Any) -> Axes:
         """Draw an output and return the axes: its membership function, or its α-cuts over time.
@@ -333,10 +330,11 @@ class Bounds:
         output = output or self.outputs[0]
         if self.time is None:
             return self.number(output).plot(axes, **line)
-        axes, ends = new_axes() if axes is None else axes, self.bounds(output)
-        look: dict[str, Any] = {"color": "tab:blue", "alpha": 0.8 / len(self.alpha), "lw": 0} | line
-        for lower, upper in zip(*ends, strict=True):
-            axes.fill_between(self.time, lower, upper, **look)
+        axes = new_axes() if axes is None else axes
+        opacity = 0.8 / len(self.alpha)  # bands of all levels lie on one another
+        style: dict[str, Any] = {"color": "tab:blue", "alpha": opacity, "lw": 0} | line
+        for lower, upper in zip(*self.bounds(output), strict=True):
+            axes.fill_between(self.time, lower, upper, **style)
         return axes
 
     def to_dataset(self) -> xarray.Dataset:
@@ -348,15 +346,16 @@ class Bounds:
         """
         import xarray
 
-        middle = {} if self.time is None else {"time": self.time}
-        axes = {"alpha": self.alpha, **middle, "output": list(self.outputs)}
-        places = {**axes, "parameter": list(self.inputs)}
-        tables = {name: (tuple(axes), getattr(self, name)) for name in ("lower", "upper", "error")}
-        tables |= {name: (tuple(places), getattr(self, name)) for name in ("lower_at", "upper_at")}
-        tables["nature"] = (("output",), np.array([str(self.nature_of(x)) for x in self.outputs]))
-        tables["label"] = (("output",), np.array(self.named))
+        time = {} if self.time is None else {"time": self.time}
+        axes = {"alpha": self.alpha, **time, "output": list(self.outputs)}
+        coordinates = {**axes, "parameter": list(self.inputs)}
+        variables = {x: (tuple(axes), getattr(self, x)) for x in ("lower", "upper", "error")}
+        variables |= {x: (tuple(coordinates), getattr(self, x)) for x in ("lower_at", "upper_at")}
+        natures = [str(self.nature_of(output)) for output in self.outputs]
+        variables["nature"] = (("output",), np.array(natures))
+        variables["label"] = (("output",), np.array(self.named))
         facts = {"method": self.method, "evaluations": self.evaluations, "seconds": self.seconds}
-        return xarray.Dataset(tables, places, {**facts, "basis": "; ".join(self.basis)})
+        return xarray.Dataset(variables, coordinates, {**facts, "basis": "; ".join(self.basis)})
 
 
 def _digits(value: float) -> str:

@@ -14,7 +14,7 @@ from alphacut.case.types import Section, case_file, text
 from alphacut.frame import Force, History, MatrixStructure, StoreyFrame
 from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, chosen, require
+from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io import quantity
 from alphacut.records.force_history import read_force_history
 
@@ -158,7 +158,7 @@ def with_forces(
     ]
     floors = range(1, model.floors + 1) if isinstance(model, StoreyFrame) else ()
     for unknown, _, _ in forces:
-        chosen("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
+        require_choice("force.amplitude", unknown, tuple(map(str, floors)) or unknowns)
     if isinstance(model, StoreyFrame):
         loads = [Force(int(floor), amplitude.modal, x) for floor, amplitude, x in forces]
         model = replace(model, loads=loads)

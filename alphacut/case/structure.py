@@ -18,7 +18,7 @@ from alphacut.frame.structures.quantities import Output
 from alphacut.frame.structures.storey import SYMBOLS
 from alphacut.fuzzy import Crisp, FuzzyNumber, PiecewiseLinear
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, chosen, require
+from alphacut.fuzzy.refused import RefusedError, require, require_choice
 from alphacut.io.problem import suggestion
 from alphacut.records.read import read_recording
 
@@ -159,7 +159,7 @@ class Structure:
     def require_outputs(self, key: str, names: Iterable[str]) -> None:
         """Refuses outputs that are not observed."""
         for name in names:
-            chosen(key, name, self.outputs)
+            require_choice(key, name, self.outputs)
 
     @property
     def linear(self) -> StoreyFrame | MatrixStructure | None:

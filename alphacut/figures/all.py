@@ -15,7 +15,7 @@ from alphacut.export.mesh import draw_mesh
 from alphacut.figures import answers, envelope, follower, frame, fuzzy_numbers, material, overview
 from alphacut.figures.style import report_style, save
 from alphacut.fuzzy import FuzzyNumber, PiecewiseLinear
-from alphacut.fuzzy.campaign.workers import submitted
+from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.cell import GPA, modal_cell
 from alphacut.stages.results import Results
@@ -117,7 +117,7 @@ def draw_all(results: Results, executor: Executor | None, work: Work) -> StageRe
     assert work.folder is not None
     folder = work.folder
     mesh_futures = _submit_mesh(results, folder, executor)
-    parts = [submitted(executor, draw_part, results, folder, part) for part in range(PARTS)]
+    parts = [submit(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
     for count, part in enumerate(parts, start=1):
         names += part.result()
@@ -151,4 +151,4 @@ def _submit_mesh(
         return {}
     name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
     cell = modal_cell(*results.content.round_cell)
-    return {name: submitted(executor, draw_mesh, cell, results.content.mesh, folder / name)}
+    return {name: submit(executor, draw_mesh, cell, results.content.mesh, folder / name)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Self
 
-from alphacut.fuzzy.refused import RefusedError, fitted, printable
+from alphacut.fuzzy.refused import RefusedError, fit_message, printable
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,16 @@ class InputProblem:
         place = f"{self.file}:{self.line}" if self.line else self.file
 
         def line(value: str, allowed: str) -> str:
-            """The line without the cure; `fitted` shortens both texts."""
+            """The line without the cure; `fit_message` shortens both texts."""
             text = f"{place}: {self.key}" if place else self.key
             text += f" is {value}" if value else ""
             if self.what:
                 text += f": {self.what}" if value else f" {self.what}"
             return f"{text}; allowed: {allowed}" if allowed else text
 
-        return fitted(printable(self.value), printable(self.allowed), line, printable(self.cure))
+        return fit_message(
+            printable(self.value), printable(self.allowed), line, printable(self.cure)
+        )
 
 
 class BadInput(Exception):  # noqa: N818 - it names the input, not the program, as the culprit

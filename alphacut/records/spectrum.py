@@ -12,7 +12,7 @@ import numpy as np
 
 from alphacut.frame import Accelerogram
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import checked_number, require
 
 POINTS_PER_PERIOD = 40
 """A peak of a sine read at points this far apart is low by at most 1 − cos(π/40) = 0.3 %."""
@@ -31,8 +31,10 @@ def spectral_acceleration(ground: Accelerogram, period: float, ratio: float) -> 
     Raises:
         RefusedError: The period or the ratio is out of range.
     """
-    real("period", period, positive=True)
-    require(0 <= real("ratio", ratio) < 1, "ratio", value=ratio, allowed="from 0 and below 1")
+    checked_number("period", period, positive=True)
+    require(
+        0 <= checked_number("ratio", ratio) < 1, "ratio", value=ratio, allowed="from 0 and below 1"
+    )
     from scipy.linalg import expm  # which takes time to import
     from scipy.signal import lfilter
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from alphacut.frame.verification.self_test import ContradictionError
 from alphacut.fuzzy.blas import on_one_blas_thread
-from alphacut.fuzzy.progress_bar import Progress, showing
+from alphacut.fuzzy.progress_bar import Progress, progress_reporter
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.io.columns import columns_text
 from alphacut.io.files import Document, as_json, rank, say, write_text
@@ -155,7 +155,7 @@ class StageStore:
         if executor is None or self.folder is None or len(stale) == 1:
             return results | {stage.name: self._compute(stage) for stage in stale}
         stage_of_future = {executor.submit(stage.run, Work()): stage for stage in stale}
-        with showing(self.shown) as tick:
+        with progress_reporter(self.shown) as tick:
             for count, future in enumerate(as_completed(stage_of_future), start=1):
                 stage = stage_of_future[future]
                 with self._report_failures(stage):
@@ -193,14 +193,14 @@ class StageStore:
         """Computes the result of a stage, and writes it into its files if there is a folder."""
         LOG.info("stage %s is computed", stage.name)
         if self.folder is None:
-            with showing(self.shown) as tick:
+            with progress_reporter(self.shown) as tick:
                 result = stage.run(Work(workers=self.workers, tick=tick))
             return replace(result, document=json.loads(as_json(result.document)))
         self.folder.require_free(f"{stage.name}.json")
         self.folder.require_free(f"{stage.name}.nc")
         samples = self._sample_store(self.folder) if stage.has_samples else None
         with TemporaryDirectory() as scratch, self._proof_folder(self.folder, stage) as parts:
-            with showing(self.shown) as tick, self._report_failures(stage):
+            with progress_reporter(self.shown) as tick, self._report_failures(stage):
                 result = stage.run(Work(Path(scratch), samples, self.workers, tick, parts))
             return self._write(stage, result, Path(scratch))
 

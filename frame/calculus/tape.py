@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import chosen
+from alphacut.fuzzy.refused import require_choice
 
 if TYPE_CHECKING:
     from sympy import Expr, Symbol
@@ -78,7 +78,7 @@ class _Writer:
             return reduce(lambda x, y: self._apply(name, x, y), parts)
         if name == "Pow":
             return self._power(*e.args)
-        chosen("function of the lagrangian", name, UNARY)
+        require_choice("function of the lagrangian", name, UNARY)
         return self._apply(name, self.place(e.args[0]))
 
     def _power(self, base: Expr, exponent: Expr) -> int:

@@ -21,7 +21,13 @@ from alphacut.frame.structures.linear import (
     frequencies,
     histories,
 )
-from alphacut.fuzzy.refused import FailedError, RefusedError, chosen, real, require
+from alphacut.fuzzy.refused import (
+    FailedError,
+    RefusedError,
+    checked_number,
+    require,
+    require_choice,
+)
 
 MOST_NODES = 10_000_000
 """Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
@@ -34,8 +40,8 @@ def nodes(duration: float, step: float) -> Array:
         RefusedError: One is no number, the step is not positive, or the duration is not a positive
             multiple of it, or of too many steps.
     """
-    real("step", step, positive=True)
-    count = round(real("duration", duration) / step)
+    checked_number("step", step, positive=True)
+    count = round(checked_number("duration", duration) / step)
     is_multiple = 1 <= count <= MOST_NODES and abs(count * step - duration) <= 1e-9 * duration
     require(
         is_multiple,
@@ -78,7 +84,7 @@ class Flow(ABC):
 
     def __post_init__(self) -> None:
         for name in self.names:
-            chosen("parameter", name, self.system.parameters)
+            require_choice("parameter", name, self.system.parameters)
         nodes(self.duration, self.step)
 
     @property

@@ -16,7 +16,7 @@ from alphacut.frame.dynamics.integrators import INTEGRATORS, Integrator
 from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import chosen
+from alphacut.fuzzy.refused import require_choice
 
 Expressions = tuple[list[Any], list[Any], list[Any]]
 """Components, and the symbols they depend on: those to differentiate by, and others."""
@@ -137,9 +137,9 @@ def flow_of(
         RefusedError: The structure has no such parameter or integrator.
     """
     if isinstance(model, LagrangianSystem):
-        chosen("integrator", integrator, ["midpoint"])
+        require_choice("integrator", integrator, ["midpoint"])
         return LagrangianFlow(model, tuple(names), duration, step)
     if isinstance(integrator, str):
-        chosen("integrator", integrator, INTEGRATORS)
+        require_choice("integrator", integrator, INTEGRATORS)
         integrator = INTEGRATORS[integrator]
     return LinearFlow(model, tuple(names), duration, step, integrator)

@@ -25,7 +25,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.joint import JointClaim
 from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import ROUND_OFF, Ends
-from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
+from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import Cut, outer_steps
 
 ALPHA = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)
@@ -59,14 +59,18 @@ class Evidence:
         return {**self.prior, **measured}
 
     @cached_property
-    def joint(self) -> Joint | None:
+    def joint(self) -> JointRule | None:
         """Rule by which the claims hold together; None where there is none."""
-        names = tuple(name for name, x in self.numbers.items() if isinstance(x, Claimed))
-        return Joint(names, False, "parameter of the measured frame", named=True) if names else None
+        names = tuple(name for name, x in self.numbers.items() if isinstance(x, ClaimedNumber))
+        return (
+            JointRule(names, False, "parameter of the measured frame", named=True)
+            if names
+            else None
+        )
 
     def cut(self, number: FuzzyNumber, alpha: float) -> Cut:
         """Return the α-cut of a number, of a claim at the level where all claims hold jointly."""
-        if self.joint and isinstance(number, Claimed):
+        if self.joint and isinstance(number, ClaimedNumber):
             return number.cut(alpha / len(self.joint.names))
         return number.cut(alpha)
 
@@ -98,7 +102,7 @@ class Evidence:
 
 def widest(number: FuzzyNumber) -> Cut:
     """The widest cut that a number decides."""
-    return number.cut(number.decided) if isinstance(number, Claimed) else number.support
+    return number.cut(number.decided) if isinstance(number, ClaimedNumber) else number.support
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +148,14 @@ class Identified:
         for column, name in enumerate(self.names):
             ends = np.stack([self.lower[:, column], self.upper[:, column]])
             alpha, decided = self.alpha, float(self.alpha[0])
-            if not isinstance(priors[name], Claimed):
+            if not isinstance(priors[name], ClaimedNumber):
                 alpha, decided = np.append(0.0, alpha), 0.0
                 ends = np.column_stack([priors[name].support, ends])
             steps = outer_steps(tuple(alpha), tuple(ends[0]), tuple(ends[1]))
-            claim = Claim("" if rule is None else rule.means, self.claim.conditions)
-            numbers[name] = steps if rule is None else Claimed(steps, claim, decided, joint=rule)
+            claim = CoverageClaim("" if rule is None else rule.means, self.claim.conditions)
+            numbers[name] = (
+                steps if rule is None else ClaimedNumber(steps, claim, decided, joint=rule)
+            )
         return numbers
 
     @property

@@ -11,8 +11,8 @@ from scipy.special import chdtri
 from alphacut.fuzzy import FuzzyNumber, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import from_scatter
-from alphacut.fuzzy.refused import real, require
-from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.refused import checked_number, require
+from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.numbers import Cut
 
 NEAR = 0.8  # share of a mode's largest amplitude from which on a floor may be the reference
@@ -137,7 +137,7 @@ def measured_mode(
     return MeasuredMode(mode, number, shape, reference)
 
 
-def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> Claimed:
+def _mean_ratio(ratios: Array, deviation: float | None, what: str, reference: int) -> ClaimedNumber:
     """Return the mean of amplitude ratios as a fuzzy number, without the bias of the division.
 
     Args:
@@ -173,7 +173,7 @@ def _reference_variance(ratios: Array, deviation: float | None) -> float:
     return float(ratios.var(ddof=1) / (1 + ratios.mean() ** 2)) if len(ratios) > 1 else 0.0
 
 
-def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claimed:
+def _mean(values: Array, deviation: float | None, what: str, key: str) -> ClaimedNumber:
     """Return the mean of measured values as a fuzzy number with a claim.
 
     Args:
@@ -191,7 +191,7 @@ def _mean(values: Array, deviation: float | None, what: str, key: str) -> Claime
         scatters = not np.allclose(values, values[0], 1e-12, 0.0)
         require(scatters, what, value=value, allowed="values that scatter", cure=cure)
         return from_data(values, "mean", law="normal")
-    real(f"{what}: {key}", deviation, positive=True)
+    checked_number(f"{what}: {key}", deviation, positive=True)
     scatter = float(values.std(ddof=1)) if count > 1 else 0.0
     explained = (count - 1) * (scatter / deviation) ** 2 <= chdtri(max(count - 1, 1), CHANCE)
     value, allowed = f"{deviation:.3g}", f"values that explain the scatter, {scatter:.3g}"

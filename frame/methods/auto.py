@@ -32,7 +32,7 @@ from alphacut.frame.parts import WIDE
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 
 LOG = logging.getLogger(__name__)
 
@@ -79,7 +79,7 @@ class Auto:
 
     def __post_init__(self) -> None:
         if self.tolerance is not None:
-            real("tolerance", self.tolerance, positive=True)
+            checked_number("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope on all levels by the methods that the module's docstring lists.

@@ -21,7 +21,7 @@ from alphacut.frame.methods.graph_storage import Index, Places, Storage
 from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.result import Nature
 
 
@@ -83,7 +83,7 @@ class GraphFollower:
             value=self.order,
             allowed="1 and 2, the degrees of a Taylor model",
         )
-        real("tolerance", self.tolerance, positive=True)
+        checked_number("tolerance", self.tolerance, positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope of all outputs on all levels, estimated or attained.

@@ -23,7 +23,7 @@ from alphacut.frame.methods.graph_storage import Places, Storage
 from alphacut.frame.methods.independent import SAFETY, independent_excess, trajectories_diverge
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
 MOST = 64e6
@@ -71,8 +71,8 @@ class ImprovedFollower:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        real("tolerance", self.tolerance, positive=True)
-        real("budget", self.budget, whole=True, least=1)
+        checked_number("tolerance", self.tolerance, positive=True)
+        checked_number("budget", self.budget, whole=True, least=1)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope of two passes from different points, with an estimated error.

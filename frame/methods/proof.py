@@ -31,7 +31,7 @@ from alphacut.frame.parts import prove
 from alphacut.frame.structures.polynomial_dependence import degrees
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 
 PORTION = 0.2
 """Share of the gap that the error of the modal model may take on either side."""
@@ -85,7 +85,7 @@ class Proof:
     def __post_init__(self) -> None:
         for key in ("gap", "tolerance", "boxes", "parts", "budget"):
             if getattr(self, key) is not None:
-                real(key, getattr(self, key), positive=True)
+                checked_number(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the guaranteed envelope of all outputs on all levels.

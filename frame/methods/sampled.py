@@ -12,7 +12,7 @@ from alphacut.frame.boxes import UnitFlow
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
 MOST = 16e6
@@ -40,7 +40,7 @@ class Sampled:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        real("samples", self.samples, whole=True, least=1)
+        checked_number("samples", self.samples, whole=True, least=1)
 
     def points(self, lower: Array, upper: Array) -> Array:
         """Return Sobol points of a box, denser towards its faces, shape (samples, d)."""

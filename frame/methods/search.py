@@ -40,7 +40,7 @@ from alphacut.frame.structures.linear import frequencies, round_off
 from alphacut.frame.structures.modes import ModalError
 from alphacut.fuzzy.arrays import Array, Mask, Rows
 from alphacut.fuzzy.progress_bar import Progress, subprogress
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
 SMALL = 0.05
@@ -99,7 +99,7 @@ class Search:
     def __post_init__(self) -> None:
         for key in ("tolerance", "passes"):
             if getattr(self, key) is not None:
-                real(key, getattr(self, key), positive=True)
+                checked_number(key, getattr(self, key), positive=True)
 
     def run(self, flow: UnitFlow, progress: Progress | None = None) -> Envelope:
         """Return the envelope on all levels: estimated or, with rough polynomials, attained.

@@ -20,7 +20,7 @@ import numpy as np
 
 from alphacut.frame.envelope import Envelope
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import chosen, real, require
+from alphacut.fuzzy.refused import checked_number, require, require_choice
 from alphacut.fuzzy.result import Ends, Nature
 
 ANY = "any of them"
@@ -249,9 +249,9 @@ def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
     """
     require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():
-        chosen("limits", name, outputs)
+        require_choice("limits", name, outputs)
         is_magnitude = not name.startswith(("max ", "min "))
-        real(f"limit of {name}", float(limit), positive=is_magnitude)
+        checked_number(f"limit of {name}", float(limit), positive=is_magnitude)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from alphacut.frame.structures.lagrangian import LagrangianSystem
 from alphacut.frame.structures.linear import LinearSystem
 from alphacut.fuzzy import Crisp, FuzzyNumber, Interval
 from alphacut.fuzzy.progress_bar import Progress
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Nature
 
 
@@ -94,8 +94,8 @@ def tolerances(
         RefusedError: A limit or a number is out of range, or supports at scale `most` reach values
             that are not allowed.
     """
-    real("most", most, positive=True)
-    real("precision", precision, positive=True, most=1)
+    checked_number("most", most, positive=True)
+    checked_number("precision", precision, positive=True, most=1)
     require_limits(limits, model.outputs)
     bounds = partial(
         envelope,

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from alphacut.frame.structures.quantities import Output, Parameter
-from alphacut.fuzzy.refused import RefusedError, real, require
+from alphacut.fuzzy.refused import RefusedError, checked_number, require
 
 if TYPE_CHECKING:
     from sympy import Expr, Matrix
@@ -60,13 +60,13 @@ class LagrangianSystem:
     force: Function | None = None
 
     def __post_init__(self) -> None:
-        real("coordinates", self.coordinates, whole=True, least=1)
+        checked_number("coordinates", self.coordinates, whole=True, least=1)
         for name in ("parameters", "observed"):
             named = getattr(self, name)
             some = isinstance(named, Mapping) and bool(named)
             require(some, name, value=named, allowed="values by name, one at least")
         for name, value in self.parameters.items():
-            real(f"parameter {name}", value)
+            checked_number(f"parameter {name}", value)
         eq = self.symbols
         quadratic = not eq.mass.free_symbols & set(eq.v)
         require(quadratic, "lagrangian", value=eq.mass.tolist(), allowed="functions quadratic in v")
@@ -178,8 +178,8 @@ def pendulum(
         ['force', 'phi']
     """
     for name, value in {"mass": mass, "length": length, "gravity": gravity}.items():
-        real(name, value, positive=True)
-    real("damping", damping, least=0)
+        checked_number(name, value, positive=True)
+    checked_number("damping", damping, least=0)
     return LagrangianSystem(
         coordinates=1,
         parameters=dict(m=mass, l=length, d=damping, g=gravity, phi_0=phi0, omega_0=omega0),

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, real, require
+from alphacut.fuzzy.refused import RefusedError, checked_number, require
 
 Factor = Callable[[Mapping[str, Any]], Any]
 
@@ -60,8 +60,8 @@ class History:
         what = f"{samples.size} samples every {step:g} s"
         require(is_series and 0 < step < np.inf, self.key, value=what, allowed=allowed)
         for name in ("start", "frequency"):
-            real(name, getattr(self, name), least=0)
-        real("phase", self.phase)
+            checked_number(name, getattr(self, name), least=0)
+        checked_number("phase", self.phase)
         object.__setattr__(self, "step", step)
         object.__setattr__(self, "samples", samples)
 
@@ -77,7 +77,7 @@ class History:
         Raises:
             RefusedError: The frequency is not positive.
         """
-        real("frequency", hertz, positive=True)
+        checked_number("frequency", hertz, positive=True)
         frequency = 2 * np.pi * float(hertz)
         return cls(1.0, np.ones(2), start, is_held=True, frequency=frequency, phase=phase)
 

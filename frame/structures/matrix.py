@@ -15,7 +15,7 @@ from alphacut.frame.structures.linear import require_ground
 from alphacut.frame.structures.loads import Accelerogram, Factor, Force, require_forces
 from alphacut.frame.structures.quantities import RATIO, Output, Parameter
 from alphacut.fuzzy.arrays import Array, Rows
-from alphacut.fuzzy.refused import chosen, real, require, require_numbers
+from alphacut.fuzzy.refused import checked_number, require, require_choice, require_numbers
 
 KINDS = ("mass", "damping", "stiffness")
 Terms = Sequence[tuple[Factor | str | float, Array]]
@@ -79,7 +79,7 @@ class MatrixStructure:
 
     def __post_init__(self) -> None:
         for name, value in self.parameters.items():
-            real(f"parameter {name}", value)
+            checked_number(f"parameter {name}", value)
         for kind in ("mass", "stiffness", "observed"):
             require(bool(getattr(self, kind)), kind, value=None, allowed="one entry at least")
         require_ground(self.ground)
@@ -90,7 +90,7 @@ class MatrixStructure:
             object.__setattr__(self, kind, tuple(terms))
         self._require_vectors()
         for name, factor in self.row_factors.items():
-            chosen("row_factors", name, self.observed)
+            require_choice("row_factors", name, self.observed)
             self._require_factor(f"observed: {name}", factor)
         self._require_definite()
         for force in self.loads:

@@ -20,7 +20,7 @@ from alphacut.frame.structures.linear import require_ground
 from alphacut.frame.structures.loads import Accelerogram, Force, require_forces
 from alphacut.frame.structures.quantities import Output, Parameter, of_storey_frame
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import chosen, real, require, require_numbers
+from alphacut.fuzzy.refused import checked_number, require, require_choice, require_numbers
 
 SYMBOLS = {
     **{"masses": "m{}", "lengths": "l{}", "columns": "c{}", "stiffness": "k{}", "dampers": "d{}"},
@@ -126,13 +126,13 @@ class StoreyFrame:
         """Refuse what is no number or out of range, and lists that do not fit the floors."""
         n = len(self.masses)
         require(n > 0, "masses", value=None, allowed="one value a floor, from below")
-        real("gravity", self.gravity, least=0)
+        checked_number("gravity", self.gravity, least=0)
         for name, symbol in {**SYMBOLS, **SINGLE, "rayleigh": "rayleigh_mass"}.items():
             values, parameter = getattr(self, name), of_storey_frame(symbol.format(""))
             if values is None:
                 continue
             single = np.ndim(values) == 0 or name == "modulus"
-            (real if single else require_numbers)(name, values)
+            (checked_number if single else require_numbers)(name, values)
             for value in np.atleast_1d(values):
                 allowed = parameter.range or "finite numbers"
                 require(parameter.admits(value, value), name, value=f"{value:g}", allowed=allowed)
@@ -141,7 +141,7 @@ class StoreyFrame:
             fits = free or np.size(values) in sizes
             what, allowed = f"a list of {np.size(values)}", f"{n}, as masses has, from below"
             require(fits, name, value=what, allowed=allowed)
-        chosen("damper_placement", self.damper_placement, ("ground", "storey"))
+        require_choice("damper_placement", self.damper_placement, ("ground", "storey"))
 
     def _require_springs(self) -> None:
         """Either stiffnesses, or all that makes them; heights where weights press."""
@@ -167,7 +167,7 @@ class StoreyFrame:
         for force in self.loads:
             is_floor = force.at in range(1, self.floors + 1)
             require(is_floor, "floor", value=force.at, allowed=f"1 to {self.floors}")
-            real("amplitude", force.amplitude)
+            checked_number("amplitude", force.amplitude)
 
     @property
     def floors(self) -> int:
@@ -202,7 +202,7 @@ class StoreyFrame:
             **named,
             **damping,
             **self.ratios,
-            **{x: real(x, force.amplitude) for x, force in forces},
+            **{x: checked_number(x, force.amplitude) for x, force in forces},
         }
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import FailedError, chosen, require
+from alphacut.fuzzy.refused import FailedError, require, require_choice
 
 Function = Callable[..., object]
 Output = float | Sequence[float] | Mapping[str, ArrayLike] | ArrayLike
@@ -44,14 +44,14 @@ class Values:
     def output(self, name: str) -> Array:
         """Return the values of an output at all points, shape (n, *shape of the output)."""
         names, shapes = zip(*self.layout, strict=True)
-        chosen("output", name, names)
+        require_choice("output", name, names)
         ends = np.cumsum([prod(shape) for shape in shapes])[:-1]
         index = names.index(name)
         return np.split(self.array, ends, axis=1)[index].reshape(-1, *shapes[index])
 
     def column(self, name: str) -> int:
         """Index of a column."""
-        chosen("output", name, self._column_of)
+        require_choice("output", name, self._column_of)
         return self._column_of[name]
 
     @cached_property
@@ -124,7 +124,7 @@ class Call:
             single, "shared", value=self.shared, allowed="none where the function is vectorised"
         )
         for name in self.shared:
-            chosen("shared input", name, self.names)
+            require_choice("shared input", name, self.names)
 
     def tasks(self, points: Array) -> Iterator[list[int]]:
         """Yield the rows of the points (n, inputs) that are evaluated by one call of the function.
@@ -161,16 +161,16 @@ class Call:
         return [_outcome(output) for output in outputs]
 
     def _outputs(self, points: Array) -> Sequence[Any]:
-        """Return what the function returns at each point (n, inputs), not yet checked."""
+        """Call the function; its unchecked outputs at each of the points (n, inputs)."""
         if self.vectorised:
-            return self._split(points)
+            return self._vectorised_outputs(points)
         named = [named_point(self.names, point) for point in points]
         if self.shared:
             return cast(Sequence[Any], self.function(named))
         return [self.function(**point) for point in named]
 
-    def _split(self, points: Array) -> Sequence[Any]:
-        """Return the outputs of a vectorised function as a mapping of names to values per point."""
+    def _vectorised_outputs(self, points: Array) -> Sequence[Any]:
+        """Call the function once; its outputs at each point, a mapping of names to values."""
         outputs = self.function(**dict(zip(self.names, points.T, strict=True)))
         named = outputs if isinstance(outputs, Mapping) else {"y": outputs}
         arrays = {name: np.atleast_1d(np.asarray(value, float)) for name, value in named.items()}
@@ -203,26 +203,25 @@ def flatten(output: Output) -> tuple[Layout, Array]:
         RefusedError: There is no number, one that is not finite, or two of the same name.
     """
     named = output if isinstance(output, Mapping) else {"y": output}
-    arrays = {str(name): _numbers(str(name), value) for name, value in named.items()}
+    arrays = {str(name): _finite_array(str(name), value) for name, value in named.items()}
     layout = tuple((name, array.shape) for name, array in arrays.items())
     columns = Values(layout, np.zeros((0, 0))).columns
-    distinct = bool(columns) and len(set(columns)) == len(columns)
-    require(
-        distinct, "outputs", value=columns, allowed="one number or more, all of different names"
-    )
+    are_distinct = bool(columns) and len(set(columns)) == len(columns)
+    allowed = "one number or more, all of different names"
+    require(are_distinct, "outputs", value=columns, allowed=allowed)
     return layout, np.concatenate([array.ravel() for array in arrays.values()])
 
 
-def _numbers(name: str, value: ArrayLike | None) -> Array:
-    """Return an output as an array of finite real numbers.
+def _finite_array(name: str, value: ArrayLike | None) -> Array:
+    """Return the output `name` as an array of finite real numbers.
 
     Raises:
         RefusedError: A number is not real or not finite, is masked, or has a unit.
     """
     array = np.ma.asanyarray(value)  # type: ignore[no-untyped-call]
-    plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
-    real_numbers = plain and not hasattr(value, "units") and np.isfinite(array).all()
+    is_plain = array.dtype.kind in "biuf" and not np.ma.is_masked(array)  # type: ignore[no-untyped-call]
+    is_allowed = is_plain and not hasattr(value, "units") and np.isfinite(array).all()
     shown = " ".join(repr(value).split())[:80]
     allowed = "finite real numbers; of one with a unit its magnitude in the unit you want"
-    require(real_numbers, f"output {name}", value=shown, allowed=allowed)
+    require(is_allowed, f"output {name}", value=shown, allowed=allowed)
     return np.asarray(array, float)

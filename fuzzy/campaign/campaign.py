@@ -25,7 +25,7 @@ from alphacut.fuzzy.campaign.call import (
 from alphacut.fuzzy.campaign.store import Store, point_key
 from alphacut.fuzzy.campaign.workers import Task, completed
 from alphacut.fuzzy.knowledge.known import Knowledge
-from alphacut.fuzzy.refused import FailedError, real
+from alphacut.fuzzy.refused import FailedError, checked_number
 
 LOG = logging.getLogger(__name__)
 
@@ -71,7 +71,7 @@ class Campaign:
         knowledge: What the caller knows about the model.
         budget: Evaluations that are allowed.
         executor: Any `concurrent.futures` executor; None runs in this process.
-        progress: Called with the share done, 0 … 1.
+        progress: Called with the completed fraction, 0 … 1.
         store: Where samples are kept; None keeps none.
         model: Key of the model in the store.
         skip: Whether samples that fail are left out (NaN) instead of ending the campaign.
@@ -96,18 +96,18 @@ class Campaign:
     layout: Layout = ()
     _rows: dict[bytes, Array] = field(default_factory=dict)  # outputs by the bytes of the point
     _samples: Samples | None = None
-    _share: float = 0.0
+    _reported: float = 0.0  # completed fraction
 
     def __post_init__(self) -> None:
         self.knowledge.check_inputs(self.call.names)
-        real("budget", self.budget, positive=True, whole=True)
+        checked_number("budget", self.budget, positive=True, whole=True)
 
     def __len__(self) -> int:
         """Evaluations so far, those from the store among them."""
         return len(self._rows)
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         """Evaluations that the budget still allows."""
         return self.budget - len(self)
 
@@ -130,13 +130,13 @@ class Campaign:
             CampaignError: Samples failed; raised after all others have been evaluated.
         """
         keys = [point.tobytes() for point in points + 0.0]  # no -0.0
-        fresh = [key for key in dict.fromkeys(keys) if key not in self._rows]
-        if len(fresh) > self.left:
-            what = f"{len(self):,} evaluations are done, the next {len(fresh):,} would pass"
+        new_keys = [key for key in dict.fromkeys(keys) if key not in self._rows]
+        if len(new_keys) > self.remaining:
+            what = f"{len(self):,} evaluations are done, the next {len(new_keys):,} would pass"
             raise SpentError(f"{what} the budget of {self.budget:,}", "take a larger budget")
-        if fresh:
-            rows = self._run(np.frombuffer(b"".join(fresh)).reshape(len(fresh), -1))
-            self._rows |= dict(zip(fresh, rows, strict=True))
+        if new_keys:
+            rows = self._run(np.frombuffer(b"".join(new_keys)).reshape(len(new_keys), -1))
+            self._rows |= dict(zip(new_keys, rows, strict=True))
             self._samples = None
         return Values(self.layout, np.array([self._rows[key] for key in keys]))
 
@@ -150,27 +150,24 @@ class Campaign:
         batch = _Batch(self, points)
         batch.run()
         LOG.debug("%d samples, %d before", len(points), len(self))
-        failures = {
-            row: outcome.error
-            for row, outcome in batch.outcomes.items()
-            if isinstance(outcome, Failure)
-        }
-        if failures and (not self.skip or (len(failures) == len(points) and not self._rows)):
+        failures = {row: x.error for row, x in batch.outcomes.items() if isinstance(x, Failure)}
+        none_succeeded = len(failures) == len(points) and not self._rows
+        if failures and (not self.skip or none_succeeded):
             names = self.call.names
             pairs = [(named_point(names, points[row]), failures[row]) for row in sorted(failures)]
             raise CampaignError(pairs, len(points))
         self.failed += len(failures)
         width = len(Values(self.layout, np.zeros((0, 0))).columns)
-        array = np.full((len(points), width), np.nan)
+        outputs = np.full((len(points), width), np.nan)
         for row, outcome in batch.outcomes.items():
             if isinstance(outcome, Sample):
-                array[row] = outcome.row
-        return array if self._rows else self._arranged(array, batch.layouts)
+                outputs[row] = outcome.row
+        return outputs if self._rows else self._reorder_columns(outputs, batch.layouts)
 
-    def _arranged(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
-        """Return the outputs (n, columns) of the first batch with columns in its first row's order.
+    def _reorder_columns(self, array: Array, layouts: Mapping[int, Layout]) -> Array:
+        """Outputs (n, columns) of the first batch, with columns in the order of its first row.
 
-        Workers end in any order, so that another row may have set the order before.
+        Workers end in any order, so that another row may have set the layout before.
         """
         values = Values(self.layout, array)
         self.layout = layouts[min(layouts)]
@@ -194,11 +191,11 @@ class Campaign:
         row = np.concatenate([values.output(name).ravel() for name, _ in self.layout])
         return Sample(self.layout, row)
 
-    def report(self, share: float) -> None:
+    def report(self, fraction: float) -> None:
         """Report the completed fraction, which never falls."""
-        if self.progress and share > self._share:
-            self._share = share
-            self.progress(share)
+        if self.progress and fraction > self._reported:
+            self._reported = fraction
+            self.progress(fraction)
 
 
 class _Batch:
@@ -217,8 +214,8 @@ class _Batch:
         self.campaign, self.points = campaign, points
         self.outcomes: dict[int, Outcome] = {}
         self.layouts: dict[int, Layout] = {}  # as the function returned them
-        self._gathered: dict[str, Sample] = {}
-        self._written, self._cost = perf_counter(), 0.0
+        self._unwritten: dict[str, Sample] = {}
+        self._written, self._write_seconds = perf_counter(), 0.0  # time and cost of the last write
 
     def run(self) -> None:
         """Set `outcomes`: read stored samples, evaluate the others, and store what was evaluated.
@@ -226,13 +223,14 @@ class _Batch:
         Samples are stored even if the evaluation is interrupted.
         """
         campaign, count = self.campaign, len(self.points)
-        self._take_stored()
+        self._read_stored()
         try:
             for rows, outcomes in completed(campaign.call, self._tasks(), campaign.executor):
                 for row, outcome in zip(rows, outcomes, strict=True):
                     self._record(row, outcome)
                 self._write()
-                if not len(campaign) and count > 1:  # of later ones nobody knows how many come
+                # the first batch of a design is most of the work; later ones are not foreseen
+                if not len(campaign) and count > 1:
                     campaign.report(0.99 * len(self.outcomes) / count)
         finally:
             self._write(now=True)
@@ -240,7 +238,7 @@ class _Batch:
     def _key(self, row: int) -> str:
         return point_key(self.campaign.call.names, self.points[row])
 
-    def _take_stored(self) -> None:
+    def _read_stored(self) -> None:
         """Set the outcomes of the points that are in the store."""
         campaign = self.campaign
         if campaign.store is None:
@@ -264,14 +262,14 @@ class _Batch:
     def _record(self, row: int, outcome: Outcome) -> None:
         self._keep(row, outcome)
         if self.campaign.store and isinstance(outcome, Sample) and row in self.layouts:
-            self._gathered[self._key(row)] = outcome
+            self._unwritten[self._key(row)] = outcome
 
     def _write(self, *, now: bool = False) -> None:
-        """Store gathered samples if `now`, or if storing has taken under a tenth of the time."""
+        """Store new samples if `now`, or if storing has taken under a tenth of the time."""
         start, store = perf_counter(), self.campaign.store
-        due = start - self._written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * self._cost)
-        if store and self._gathered and (now or due):
-            store.put(self.campaign.model, self._gathered)
-            self._gathered = {}
+        is_due = start - self._written > max(_MIN_PAUSE, _MIN_PAUSE_RATIO * self._write_seconds)
+        if store and self._unwritten and (now or is_due):
+            store.put(self.campaign.model, self._unwritten)
+            self._unwritten = {}
             self._written = perf_counter()
-            self._cost = self._written - start
+            self._write_seconds = self._written - start

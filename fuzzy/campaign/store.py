@@ -135,35 +135,35 @@ class Store:
         return self._with_intact_rows(connection) if damaged else connection
 
     def _read(self, connection: sqlite3.Connection) -> bool:
-        """Read rows up to the first that SQLite cannot read; return whether all are intact."""
-        intact = True
+        """Read the intact rows; False if a row is damaged, or SQLite could not read all."""
+        all_intact = True
         try:
-            for row in connection.execute(f"select {_COLUMNS} from sample"):
-                stored = Row(*row)
-                intact &= stored.is_intact
-                if stored.is_intact:
-                    self._rows[stored.model, stored.point] = stored
+            for columns in connection.execute(f"select {_COLUMNS} from sample"):
+                row = Row(*columns)
+                all_intact &= row.is_intact
+                if row.is_intact:
+                    self._rows[row.model, row.point] = row
         except (sqlite3.DatabaseError, UnicodeDecodeError):
             return False
-        return intact
+        return all_intact
 
     def _with_intact_rows(self, connection: sqlite3.Connection) -> sqlite3.Connection:
         """Close the damaged file, rename it, and return a new file with the rows that were read."""
         connection.close()
-        aside = self.path.with_name(f"{self.path.name}.damaged")
+        damaged = self.path.with_name(f"{self.path.name}.damaged")
         with suppress(FileNotFoundError):
             os.remove(f"{self.path}-journal")
-        if os.path.lexists(aside):  # of an earlier damage, or of somebody else
+        if os.path.lexists(damaged):  # of an earlier damage, or of somebody else
             os.remove(self.path)
         else:
-            os.rename(self.path, aside)
-        fresh = self._connect(self.path)
+            os.rename(self.path, damaged)
+        new_connection = self._connect(self.path)
         with self.reported():
-            _prepare(fresh)
-        self._write(fresh, self._rows.values())
-        said = f"{len(self._rows)} samples are intact, the others are evaluated anew"
-        warnings.warn(f"the store {self.path} was damaged: {said}", stacklevel=2)
-        return fresh
+            _prepare(new_connection)
+        self._write(new_connection, self._rows.values())
+        outcome = f"{len(self._rows)} samples are intact, the others are evaluated anew"
+        warnings.warn(f"the store {self.path} was damaged: {outcome}", stacklevel=2)
+        return new_connection
 
     def _connect(self, path: Path) -> sqlite3.Connection:
         with self.reported():
@@ -220,8 +220,8 @@ def _is_store(path: Path) -> bool:
     Raises:
         OSError: The file cannot be read.
     """
-    beside = (path.with_name(f"{path.name}{end}") for end in ("-journal", "-wal", "-shm"))
-    if not all(_is_regular(file, missing=True) for file in (path, *beside)):
+    sqlite_files = (path.with_name(f"{path.name}{end}") for end in ("", "-journal", "-wal", "-shm"))
+    if not all(_is_regular(file, missing=True) for file in sqlite_files):
         return False
     if not os.path.lexists(path):
         return True
@@ -251,9 +251,10 @@ def model_key(identity: Identity) -> bytes:
         text = json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
     except (TypeError, ValueError):
         text = ""
-    named = isinstance(identity, Mapping) and bool(identity) and bool(text)
+    is_allowed = isinstance(identity, Mapping) and bool(identity) and bool(text)
+    allowed = "a mapping, as {'version': 1}"
     cure = "it says what a sample depends on besides its inputs; texts and numbers"
-    require(named, "identity", value=identity, allowed="a mapping, as {'version': 1}", cure=cure)
+    require(is_allowed, "identity", value=identity, allowed=allowed, cure=cure)
     return blake2b(text.encode(), digest_size=16).digest()
 
 

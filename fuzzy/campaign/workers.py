@@ -16,7 +16,7 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import Call, Outcome
-from alphacut.fuzzy.refused import FailedError, real
+from alphacut.fuzzy.refused import FailedError, checked_number
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -34,7 +34,7 @@ def pool(workers: int) -> Iterator[Executor | None]:
     Under `python -m mpi4py.futures` it is the pool of all MPI processes instead, whatever `workers`
     says. Functions are sent by value where the processes cannot import them.
     """
-    real("workers", workers, positive=True, whole=True)
+    checked_number("workers", workers, positive=True, whole=True)
     if {"mpi4py.run", "mpi4py.futures"} <= sys.modules.keys():
         from mpi4py.futures import MPIPoolExecutor
 
@@ -83,10 +83,10 @@ def _end_with_parent(parent: int) -> None:
     Thread(target=watch, daemon=True).start()
 
 
-def submitted(
+def submit(
     executor: Executor | None, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
 ) -> Future[T]:
-    """Return the future of a call by the executor; without executor the call is made at once."""
+    """Future of a call of a function by an executor; without executor the call is made at once."""
     if executor is not None:
         return executor.submit(function, *args, **kwargs)
     done: Future[T] = Future()
@@ -123,8 +123,8 @@ def completed(
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
                 batch = pending.pop(future)
                 outcomes, seconds = _result(future, f" at or near {_sample_words(call, batch)}")
-                fitting = _BATCH_SECONDS * len(batch) / max(seconds, 1e-9)
-                batch_size = int(min(max(fitting, 1), _MAX_BATCH))
+                ideal_size = _BATCH_SECONDS * len(batch) / max(seconds, 1e-9)
+                batch_size = int(min(max(ideal_size, 1), _MAX_BATCH))
                 pairs = zip(batch, outcomes, strict=True)
                 yield from ((rows, results) for (rows, _), results in pairs)
     finally:
@@ -147,10 +147,10 @@ def _run(call: Call, batch: list[Array]) -> tuple[list[list[Outcome]], float]:
 
 
 def _result(future: Future[T], at: str = "") -> T:
-    """Result of the future of a batch.
+    """Wait for the result of a future.
 
     Args:
-        future: The batch, whose calls catch their own exceptions.
+        future: Of a batch, whose calls catch their own exceptions.
         at: Words on the samples that it computes, for the message.
 
     Raises:

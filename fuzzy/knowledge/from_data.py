@@ -12,8 +12,8 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.named_law import LEVELS, Law, law_cuts
 from alphacut.fuzzy.knowledge.observations import Limits, Observations, Values
 from alphacut.fuzzy.knowledge.order_statistics import rank_cuts
-from alphacut.fuzzy.refused import chosen, require
-from alphacut.fuzzy.sets.claimed import Claim, Claimed
+from alphacut.fuzzy.refused import require, require_choice
+from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim
 from alphacut.fuzzy.sets.numbers import Stepwise
 
 CLAIMS = "'next value', 'mean', 'median' or 'quantile Q' with Q in (0, 1)"
@@ -26,7 +26,7 @@ def from_data(
     *,
     bounds: Limits | None = None,
     law: Law | None = None,
-) -> Claimed:
+) -> ClaimedNumber:
     """Return the fuzzy number of measured values: P(claimed quantity in its α-cut) >= 1 − α.
 
     The probability is over repeated samples. Censored values may decide no cut at α, in one sample
@@ -63,7 +63,7 @@ def from_data(
     """
     quantile = _quantile(claim)
     if law is not None:
-        chosen("law", law, ("normal",) if claim == "mean" else get_args(Law))
+        require_choice("law", law, ("normal",) if claim == "mean" else get_args(Law))
     data = Observations.from_values(values, bounds)
     if law is not None:
         number, decided = law_cuts(data, law, quantile, mean=claim == "mean")
@@ -71,7 +71,7 @@ def from_data(
         number, decided = mean_cuts(data), 0.0
     else:
         number, decided = rank_cuts(data, quantile)
-    return Claimed(number, Claim(claim, _conditions(data, law, bounds)), decided)
+    return ClaimedNumber(number, CoverageClaim(claim, _conditions(data, law, bounds)), decided)
 
 
 def _quantile(claim: str) -> float | None:
@@ -86,10 +86,12 @@ def _quantile(claim: str) -> float | None:
 def _conditions(data: Observations, law: Law | None, bounds: Limits | None) -> tuple[str, ...]:
     """Conditions of the claim, in words."""
     low, high = data.bounds
-    drawn = f"{data.count} values drawn alike and independently"
-    drawn += f" from a {law} law" if law else ""
-    bounded = () if bounds is None else (f"bounds [{low:g}, {high:g}]",)
-    return (drawn, *bounded, *((UNDECIDED,) if data.is_censored else ()))
+    conditions = [f"{data.count} values drawn alike and independently"]
+    if law:
+        conditions[0] += f" from a {law} law"
+    if bounds is not None:
+        conditions.append(f"bounds [{low:g}, {high:g}]")
+    return (*conditions, *((UNDECIDED,) if data.is_censored else ()))
 
 
 def mean_cuts(data: Observations) -> Stepwise:
@@ -105,25 +107,27 @@ def mean_cuts(data: Observations) -> Stepwise:
         RefusedError: A bound is missing.
     """
     low, high = data.bounds
+    are_finite, allowed = np.isfinite(data.bounds).all(), "finite ends for a mean of any law"
     cure = "give both, or law='normal'"
-    finite = np.isfinite(data.bounds).all()
-    require(
-        finite, "bounds", value=data.bounds, allowed="finite ends for a mean of any law", cure=cure
+    require(are_finite, "bounds", value=data.bounds, allowed=allowed, cure=cure)
+    band, fraction = _band_half_width(data.count), np.arange(data.count + 1) / data.count
+    lower_sums, upper_sums = (
+        np.append(0.0, np.cumsum(row)) / data.count for row in (data.lower, data.upper)
     )
-    band, count = _band(data.count), np.arange(data.count + 1) / data.count
-    sums = [np.append(0.0, np.cumsum(row)) / data.count for row in (data.lower, data.upper)]
-    lower = low * band + np.interp(1 - band, count, sums[0])
-    upper = high * band + sums[1][-1] - np.interp(band, count, sums[1])
-    lower, upper = np.maximum(lower, low), np.minimum(upper, high)  # but for round-off they are
-    least, most = np.maximum.accumulate(lower), np.minimum.accumulate(upper)
-    return Stepwise((0.0, *LEVELS), (low, *least), (high, *most))
+    # the largest fraction `band` of the values moved to the lower bound, or the least to the upper
+    lower = low * band + np.interp(1 - band, fraction, lower_sums)
+    upper = high * band + upper_sums[-1] - np.interp(band, fraction, upper_sums)
+    # within the bounds and nested, despite round-off
+    lower = np.maximum.accumulate(np.maximum(lower, low))
+    upper = np.minimum.accumulate(np.minimum(upper, high))
+    return Stepwise((0.0, *LEVELS), (low, *lower), (high, *upper))
 
 
 @lru_cache(maxsize=64)
-def _band(n: int) -> Array:
-    """Return the half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1].
+def _band_half_width(n: int) -> Array:
+    """Half width of Smirnov's band for n values at each of the `LEVELS`, in [0, 1].
 
-    Each side of the band is left with half the probability of the level.
+    The distribution function leaves either side of the band with half the level's probability.
     """
     from scipy.stats import ksone
 

@@ -15,14 +15,14 @@ import numpy as np
 
 from alphacut.fuzzy.refused import require
 from alphacut.fuzzy.sets.boxes import fuzzy_inputs
-from alphacut.fuzzy.sets.claimed import Claim, Claimed, Joint
+from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim, JointRule
 from alphacut.fuzzy.sets.numbers import FuzzyNumber, Stepwise
 
 
 def jointly(
     inputs: Mapping[str, FuzzyNumber | float], *, independent: bool = False, means: str = ""
 ) -> dict[str, FuzzyNumber | float]:
-    """Return the inputs with claimed ones widened, so that their α-cuts hold jointly: P >= 1 − α.
+    """Inputs whose α-cuts contain all claimed quantities jointly with P >= 1 − α: wider cuts.
 
     Args:
         inputs: Fuzzy numbers by name; plain numbers are crisp.
@@ -40,16 +40,14 @@ def jointly(
         >>> numbers["a"].decided, jointly(numbers)["a"].decided
         (0.015625, 0.03125)
     """
-    claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
+    claimed = {name: number for name, number in inputs.items() if isinstance(number, ClaimedNumber)}
     if not claimed:
         return dict(inputs)
-    rule = Joint(tuple(claimed), independent, means or _common(claimed), named=bool(means))
+    quantity = means or _common_quantity(claimed)
+    rule = JointRule(tuple(claimed), independent, quantity, named=bool(means))
     if independent:
         _require_different_values(claimed)
-    return {
-        name: _widened(number, rule) if isinstance(number, Claimed) else number
-        for name, number in inputs.items()
-    }
+    return {**inputs, **{name: _join_levels(number, rule) for name, number in claimed.items()}}
 
 
 def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNumber]:
@@ -59,48 +57,42 @@ def joined_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyN
         RefusedError: As `fuzzy_inputs` and `jointly`.
     """
     numbers = fuzzy_inputs(inputs)
-    rules = {number.joint for number in numbers.values() if isinstance(number, Claimed)}
-    joined = len(rules) == 1 and None not in rules
-    return numbers if joined else fuzzy_inputs(jointly(numbers))
+    rules = {number.joint for number in numbers.values() if isinstance(number, ClaimedNumber)}
+    are_joined = len(rules) == 1 and None not in rules
+    return numbers if are_joined else fuzzy_inputs(jointly(numbers))
 
 
-def _common(claimed: Mapping[str, Claimed]) -> str:
-    """Return the claimed quantity, such as "median", which must be the same for all inputs."""
-    kinds = {number.claim.about for number in claimed.values()}
+def _common_quantity(claimed: Mapping[str, ClaimedNumber]) -> str:
+    """The claimed quantity, such as "median"; refuses numbers of different quantities."""
+    kinds = sorted({number.claim.about for number in claimed.values()})
     cure = "say what the joint one means: jointly(inputs, means='drift of the next frame')"
-    require(
-        len(kinds) == 1,
-        "claims of the inputs",
-        value=sorted(kinds),
-        allowed="of one kind",
-        cure=cure,
-    )
-    return kinds.pop()
+    allowed = "of one kind"
+    require(len(kinds) == 1, "claims of the inputs", value=kinds, allowed=allowed, cure=cure)
+    return kinds[0]
 
 
-def _require_different_values(claimed: Mapping[str, Claimed]) -> None:
+def _require_different_values(claimed: Mapping[str, ClaimedNumber]) -> None:
     """Refuse inputs stated to be independent of which two have the same cuts, from one sample."""
-    for (first, number), (second, partner) in combinations(claimed.items(), 2):
+    for (first, number), (second, other) in combinations(claimed.items(), 2):
         cure = f"{first} and {second} rest on the same values"
-        require(
-            number.number != partner.number, "independent", value=True, allowed="False", cure=cure
-        )
+        is_other = number.number != other.number
+        require(is_other, "independent", value=True, allowed="False", cure=cure)
 
 
-def _widened(number: Claimed, rule: Joint) -> Claimed:
-    """Return the number with its cut at β moved to the joint level α(β), which is higher."""
-    steps = number.number
-    level = rule.joined(np.asarray(steps.alpha))
-    last = np.append(np.diff(level) > 0, True) & (level <= 1)  # of equal levels the last cut
-    lower, upper = (tuple(np.asarray(ends)[last]) for ends in (steps.lower, steps.upper))
-    moved = Stepwise(tuple(level[last]), lower, upper)
-    decided = float(rule.joined(np.asarray(number.decided)))
-    return replace(number, number=moved, decided=decided, joint=rule)
+def _join_levels(number: ClaimedNumber, rule: JointRule) -> ClaimedNumber:
+    """Copy of a number whose cut at level β has the joint level α(β) ≥ β."""
+    cuts = number.number
+    levels = rule.joint_level(np.asarray(cuts.alpha))
+    is_last = np.append(np.diff(levels) > 0, True) & (levels <= 1)  # of equal levels the last cut
+    lower, upper = (tuple(np.asarray(ends)[is_last]) for ends in (cuts.lower, cuts.upper))
+    joint_cuts = Stepwise(tuple(levels[is_last]), lower, upper)
+    decided = float(rule.joint_level(np.asarray(number.decided)))
+    return replace(number, number=joint_cuts, decided=decided, joint=rule)
 
 
 @dataclass(frozen=True)
 class JointClaim:
-    """Claim of a result of several inputs.
+    """Coverage claim of a result of several inputs.
 
     Args:
         rule: How the claims were joined; None where no input has one.
@@ -108,7 +100,7 @@ class JointClaim:
         opinions: Fuzzy inputs without a claim.
     """
 
-    rule: Joint | None
+    rule: JointRule | None
     conditions: tuple[str, ...]
     opinions: tuple[str, ...]
 
@@ -123,31 +115,38 @@ class JointClaim:
             nature: "attained", "estimated" or "guaranteed"; unless guaranteed, that the true range
                 stays inside the bounds is a condition.
         """
-        claimed = {name: number for name, number in inputs.items() if isinstance(number, Claimed)}
+        claimed = {
+            name: number for name, number in inputs.items() if isinstance(number, ClaimedNumber)
+        }
         opinions = tuple(
             name
             for name, number in inputs.items()
             if name not in claimed and number.support.width > 0
         )
-        alike: dict[str, list[str]] = {}
+        names_by_condition: dict[str, list[str]] = {}
         for name, number in claimed.items():
             if number.claim.conditions:
-                alike.setdefault(", ".join(number.claim.conditions), []).append(name)
-        conditions = [f"{', '.join(names)}: {words}" for words, names in alike.items()]
-        rules = (x.joint or Joint((name,), False, x.claim.about) for name, x in claimed.items())
-        rule, where = next(rules, None), "their cuts" if len(opinions) > 1 else "its cut"
-        assumptions = [f"{', '.join(opinions)} in {where} at α (opinions)"] if opinions else []
-        words = [rule.words] if rule and rule.words else []
+                words = ", ".join(number.claim.conditions)
+                names_by_condition.setdefault(words, []).append(name)
+        conditions = [f"{', '.join(names)}: {x}" for x, names in names_by_condition.items()]
+        rule = None
+        if claimed:
+            name, first = next(iter(claimed.items()))
+            rule = first.joint or JointRule((name,), False, first.claim.about)
+            conditions += [rule.words] if rule.words else []
+        if opinions:
+            cuts = "their cuts" if len(opinions) > 1 else "its cut"
+            conditions.append(f"{', '.join(opinions)} in {cuts} at α (opinions)")
         if rule and nature != "guaranteed":
-            assumptions.append(
+            conditions.append(
                 f"if the true range stays inside the {nature} bounds, which is not proved"
             )
-        return cls(rule, (*conditions, *words, *assumptions), opinions)
+        return cls(rule, tuple(conditions), opinions)
 
     @property
-    def claim(self) -> Claim | None:
+    def claim(self) -> CoverageClaim | None:
         """The claim of a number computed from the inputs; None where no input has one."""
-        return None if self.rule is None else Claim(self.rule.means, self.conditions)
+        return None if self.rule is None else CoverageClaim(self.rule.means, self.conditions)
 
     def __str__(self) -> str:
         """Return the claim as a sentence; without claims the names of the opinions, or nothing."""
@@ -158,4 +157,4 @@ class JointClaim:
         subject = (
             self.rule.means if self.rule.named else f"result of the {self.rule.means} of {names}"
         )
-        return str(Claim(subject, self.conditions))
+        return str(CoverageClaim(subject, self.conditions))

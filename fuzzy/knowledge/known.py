@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import chosen, real, require
+from alphacut.fuzzy.refused import checked_number, require, require_choice
 
 Signs = NDArray[np.int8]
 ROUND_OFF = 1e-11
@@ -44,7 +44,7 @@ class Knowledge:
 
     def __post_init__(self) -> None:
         """Refuse signs other than 1 and −1 and a number of tests that is no whole number."""
-        real("tests", self.tests, whole=True)
+        checked_number("tests", self.tests, whole=True)
         for name, sign in self.signs.items():
             for value in sign.values() if isinstance(sign, Mapping) else (sign,):
                 require(
@@ -61,20 +61,20 @@ class Knowledge:
             f"the signs of {', '.join(self.signs)} hold": self.signs,
             f"the outputs are monotone in {', '.join(self.monotone)}": self.monotone,
         }
-        return tuple(f"{fact}, {self.source}" for fact, there in facts.items() if there)
+        return tuple(f"{fact}, {self.source}" for fact, names in facts.items() if names)
 
     def check_inputs(self, inputs: Iterable[str]) -> None:
         """Refuse names that are no input."""
         for name in (*self.signs, *self.monotone):
-            chosen("input of knowledge", name, inputs)
+            require_choice("input of knowledge", name, inputs)
 
     def check_outputs(self, outputs: Iterable[str]) -> None:
         """Refuse names that are no output."""
         for sign in self.signs.values():
             for name in sign if isinstance(sign, Mapping) else ():
-                chosen("output of knowledge", name, outputs)
+                require_choice("output of knowledge", name, outputs)
 
-    def stated(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
+    def stated_signs(self, inputs: Sequence[str], outputs: Sequence[str]) -> Signs:
         """Return the stated signs, shape (outputs, inputs), 0 where none is stated."""
         table = np.zeros((len(outputs), len(inputs)), np.int8)
         for name, sign in self.signs.items():
@@ -86,7 +86,7 @@ class Knowledge:
     def monotone_in(self, inputs: Sequence[str], outputs: Sequence[str]) -> Mask:
         """Return whether each output is stated to be monotone in each input, (outputs, inputs)."""
         named = np.array([name in self.monotone for name in inputs])
-        return np.asarray((self.stated(inputs, outputs) != 0) | named)
+        return np.asarray((self.stated_signs(inputs, outputs) != 0) | named)
 
 
 def negligible(values: Array) -> Array:
@@ -107,11 +107,12 @@ def contradiction(points: Array, values: Array, signs: Signs) -> tuple[Array, Ar
     Returns:
         Two points (inputs,): by the signs the output cannot be smaller at the second, but it is.
     """
-    rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MAX_COMPARED)).astype(int))]
+    rows = np.argsort(values)[: np.count_nonzero(~np.isnan(values))]  # NaN are sorted last
+    evenly = np.linspace(0, len(rows) - 1, min(len(rows), _MAX_COMPARED)).astype(int)
+    rows = rows[np.unique(evenly)]
     step = (points[rows][None] - points[rows][:, None]) * np.where(signs, signs, 1)
-    ordered = ((step >= 0) & ((signs != 0) | (step == 0))).all(axis=2)
-    fall = np.where(ordered, values[rows][:, None] - values[rows][None], 0.0)
+    may_not_fall = ((step >= 0) & ((signs != 0) | (step == 0))).all(axis=2)
+    fall = np.where(may_not_fall, values[rows][:, None] - values[rows][None], 0.0)
     first, second = np.unravel_index(fall.argmax(), fall.shape)
     if fall[first, second] <= negligible(values[:, None])[0]:
         return None

@@ -13,8 +13,8 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.knowledge.observations import Observations
-from alphacut.fuzzy.refused import real, require
-from alphacut.fuzzy.sets.claimed import Claim, Claimed
+from alphacut.fuzzy.refused import checked_number, require
+from alphacut.fuzzy.sets.claimed import ClaimedNumber, CoverageClaim
 from alphacut.fuzzy.sets.numbers import Stepwise
 
 Law = Literal["normal", "log-normal"]
@@ -45,58 +45,56 @@ def law_cuts(
         RefusedError: The values do not fit the law: fewer than two, all equal, not positive, or
             censored without an end.
     """
-    logarithmic, finite = law == "log-normal", np.isfinite([data.lower, data.upper]).all()
+    is_logarithmic = law == "log-normal"
     cure = "give bounds=(lower, upper) in place of a law, or measure more"
-    positive = not logarithmic or data.lower[0] > 0
+    is_positive, allowed = data.lower[0] > 0, "positive ones with a log-normal law"
     require(
-        positive,
+        is_positive or not is_logarithmic,
         "least value",
         value=data.lower[0],
-        allowed="positive ones with a log-normal law",
+        allowed=allowed,
         cure=cure,
     )
+    are_finite = np.isfinite([data.lower, data.upper]).all()
     are_distinct = not data.exact or data.lower[0] < data.lower[-1]
+    is_enough = data.count > 1 and are_finite and are_distinct
     values = f"{data.count} from {data.lower[0]:g} to {data.upper[-1]:g}"
-    enough = data.count > 1 and finite and are_distinct
-    require(
-        enough,
-        f"values of a {law} law",
-        value=values,
-        allowed="two or more, finite, unlike",
-        cure=cure,
-    )
-    about = data.mapped(np.log) if logarithmic else data
-    lower, upper = _student(about, 0.5 if mean else quantile)
-    with np.errstate(over="ignore"):
-        lower, upper = (np.exp(lower), np.exp(upper)) if logarithmic else (lower, upper)
-    return _within(lower, upper, data.bounds)
+    allowed = "two or more, finite, unlike"
+    require(is_enough, f"values of a {law} law", value=values, allowed=allowed, cure=cure)
+    normal_data = data.mapped(np.log) if is_logarithmic else data
+    lower, upper = _normal_cuts(normal_data, 0.5 if mean else quantile)
+    if is_logarithmic:
+        with np.errstate(over="ignore"):
+            lower, upper = np.exp(lower), np.exp(upper)
+    return _clip_cuts(lower, upper, data.bounds)
 
 
-def _student(data: Observations, quantile: float | None) -> tuple[Array, Array]:
-    """Return lower and upper bounds of the cuts at the `LEVELS`: mean + factor · deviation.
+def _normal_cuts(data: Observations, quantile: float | None) -> tuple[Array, Array]:
+    """Lower and upper ends at the `LEVELS` under a normal law: mean + factor · deviation.
 
-    The widest cuts over all values within their intervals are taken.
+    They are the widest over all values within their intervals; see `_factors` for the quantile.
     """
-    below, above = _factors(data.count, quantile)
-    least, most = _scatter(data)
-    lower = data.lower.mean() + below * np.where(below < 0, most, least)
-    upper = data.upper.mean() + above * np.where(above > 0, most, least)
+    lower_factor, upper_factor = _factors(data.count, quantile)
+    least, greatest = _deviation_range(data)
+    lower = data.lower.mean() + lower_factor * np.where(lower_factor < 0, greatest, least)
+    upper = data.upper.mean() + upper_factor * np.where(upper_factor > 0, greatest, least)
     return lower, upper
 
 
-def _scatter(data: Observations) -> tuple[float, float]:
-    """Return least and greatest standard deviation of values anywhere within their intervals.
+def _deviation_range(data: Observations) -> tuple[float, float]:
+    """Least and greatest standard deviation of values anywhere within their intervals.
 
     By the triangle inequality it differs from that of the middles by the norm of the half widths.
     """
-    middle, half = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
-    spread, give = float(middle.std(ddof=1)), float(np.sqrt((half**2).sum() / (data.count - 1)))
-    return max(spread - give, 0.0), spread + give
+    middle, half_width = (data.lower + data.upper) / 2, (data.upper - data.lower) / 2
+    deviation = float(middle.std(ddof=1))
+    change = float(np.sqrt((half_width**2).sum() / (data.count - 1)))
+    return max(deviation - change, 0.0), deviation + change
 
 
 @lru_cache(maxsize=64)
 def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
-    """Return the factors of the standard deviation for lower and upper end at the `LEVELS`.
+    """Factors of the standard deviation for the lower and the upper ends at the `LEVELS`.
 
     Student's t for next value, mean and median, the non-central t for other quantiles.
 
@@ -108,18 +106,18 @@ def _factors(n: int, quantile: float | None) -> tuple[Array, Array]:
     if quantile is None or quantile == 0.5:
         from scipy.stats import t
 
-        reach = np.maximum(t.isf(tail, n - 1), 0.0) * np.sqrt(
-            (1 + 1 / n) if quantile is None else 1 / n
-        )
-        return -reach, reach
+        variance = 1 + 1 / n if quantile is None else 1 / n
+        factor = np.maximum(t.isf(tail, n - 1), 0.0) * np.sqrt(variance)
+        return -factor, factor
     from scipy.stats import nct, norm
 
-    shift = norm.ppf(quantile) * np.sqrt(n)
-    return nct.ppf(tail, n - 1, shift) / np.sqrt(n), nct.isf(tail, n - 1, shift) / np.sqrt(n)
+    noncentrality = norm.ppf(quantile) * np.sqrt(n)
+    lower, upper = nct.ppf(tail, n - 1, noncentrality), nct.isf(tail, n - 1, noncentrality)
+    return lower / np.sqrt(n), upper / np.sqrt(n)
 
 
-def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
-    """Return the cuts clipped to physical bounds, and the level from which on they are finite.
+def _clip_cuts(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[Stepwise, float]:
+    """Cuts at the `LEVELS` clipped to physical bounds, and the level from which they are finite.
 
     Below that level the cuts repeat the first finite one; with two bounds the level is 0.
     """
@@ -128,14 +126,14 @@ def _within(lower: Array, upper: Array, bounds: tuple[float, float]) -> tuple[St
     # at α = 1 both are one point, to round-off
     lower = np.minimum(np.maximum.accumulate(np.clip(lower, low, high)), upper[-1])
     first = int((np.isfinite(lower) & np.isfinite(upper)).argmax())
-    bounded = bool(np.isfinite(bounds).all())
-    least, most = (low, high) if bounded else (lower[first], upper[first])
+    is_bounded = bool(np.isfinite(bounds).all())
+    least, greatest = (low, high) if is_bounded else (lower[first], upper[first])
     lower[:first], upper[:first] = lower[first], upper[first]
-    steps = Stepwise((0.0, *LEVELS), (least, *lower), (most, *upper))
-    return steps, 0.0 if bounded else float(LEVELS[first])
+    cuts = Stepwise((0.0, *LEVELS), (least, *lower), (greatest, *upper))
+    return cuts, 0.0 if is_bounded else float(LEVELS[first])
 
 
-def from_scatter(mean: float, deviation: float, count: int) -> Claimed:
+def from_scatter(mean: float, deviation: float, count: int) -> ClaimedNumber:
     """Return the fuzzy number of the mean of a normal law with known standard deviation.
 
     Args:
@@ -148,10 +146,10 @@ def from_scatter(mean: float, deviation: float, count: int) -> Claimed:
     """
     from scipy.stats import norm
 
-    real("mean", mean)
-    real("deviation", deviation, positive=True)
-    real("count", count, positive=True, whole=True)
-    reach = deviation / np.sqrt(count) * np.maximum(norm.isf(LEVELS / 2), 0.0)
+    checked_number("mean", mean)
+    checked_number("deviation", deviation, positive=True)
+    checked_number("count", count, positive=True, whole=True)
+    half_width = deviation / np.sqrt(count) * np.maximum(norm.isf(LEVELS / 2), 0.0)
     law = f"{count} values drawn alike and independently from a normal law of known deviation"
-    steps, decided = _within(mean - reach, mean + reach, (-np.inf, np.inf))
-    return Claimed(steps, Claim("mean", (law,)), decided)
+    cuts, decided = _clip_cuts(mean - half_width, mean + half_width, (-np.inf, np.inf))
+    return ClaimedNumber(cuts, CoverageClaim("mean", (law,)), decided)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import RefusedError, real, require
+from alphacut.fuzzy.refused import RefusedError, checked_number, require
 
 Values = Sequence[float] | Sequence[tuple[float, float]] | NDArray[np.float64]
 Limits = tuple[float | None, float | None]
@@ -44,13 +44,13 @@ class Observations:
                 value lies outside the bounds.
         """
         low, high = _limits(bounds)
-        ends = np.array([_pair(number, value) for number, value in enumerate(values, 1)])
+        ends = np.array([_ends(number, value) for number, value in enumerate(values, 1)])
         require(len(ends) > 0, "values", value=list(values), allowed="one or more")
         lower, upper = ends.T
-        inside = (upper >= low) & (lower <= high)
-        row = int(np.argmin(inside))
+        is_possible = (upper >= low) & (lower <= high)
+        row = int(np.argmin(is_possible))
         allowed = f"values within the bounds [{low:g}, {high:g}]"
-        require(inside.all(), f"value {row + 1}", value=ends[row].tolist(), allowed=allowed)
+        require(is_possible.all(), f"value {row + 1}", value=ends[row].tolist(), allowed=allowed)
         return cls(np.sort(np.maximum(lower, low)), np.sort(np.minimum(upper, high)), (low, high))
 
     @property
@@ -78,14 +78,10 @@ class Observations:
 def _limits(bounds: Limits | None) -> tuple[float, float]:
     """Return the physical bounds as two floats, infinite where there is none."""
     lower, upper = (None, None) if bounds is None else bounds
-    low = -np.inf if lower is None else real("lower bound", lower)
-    high = np.inf if upper is None else real("upper bound", upper)
-    require(
-        low < high,
-        "bounds",
-        value=bounds,
-        allowed="(lower, upper) with lower < upper, None for none",
-    )
+    low = -np.inf if lower is None else checked_number("lower bound", lower)
+    high = np.inf if upper is None else checked_number("upper bound", upper)
+    allowed = "(lower, upper) with lower < upper, None for none"
+    require(low < high, "bounds", value=bounds, allowed=allowed)
     return low, high
 
 
@@ -96,17 +92,17 @@ def _is_number(value: object) -> bool:
     return not isinstance(value, int) or abs(value) < sys.float_info.max
 
 
-def _pair(number: int, value: object) -> tuple[float, float]:
-    """Return the lower and upper end of a measured value, which is a number or a pair.
+def _ends(number: int, value: object) -> tuple[float, float]:
+    """Lower and upper end of a measured value, which is a number or a pair.
 
     Args:
         number: Position of the value in the list, from 1, for the message.
         value: The value.
     """
     ends = np.atleast_1d(np.asarray(value, object))
-    plain = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
-    if plain and all(_is_number(end) for end in ends):
+    is_pair = ends.ndim == 1 and len(ends) in (1, 2) and not np.ma.is_masked(value)  # type: ignore[no-untyped-call]
+    if is_pair and all(_is_number(end) for end in ends):
         low, high = float(ends[0]), float(ends[-1])
-        if low <= high and low < np.inf and high > -np.inf and np.isfinite((low, high)).any():
+        if low <= high and np.isfinite((low, high)).any():  # neither both −∞ nor both ∞
             return low, high
     raise RefusedError(f"value {number}", value, "finite numbers, or pairs (lower, upper) in order")

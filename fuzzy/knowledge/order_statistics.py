@@ -41,7 +41,7 @@ class Windows:
 
 @lru_cache(maxsize=64)
 def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Windows:
-    """Return the nested windows of gaps between n sorted values, and the level of each.
+    """Nested windows of gaps between n sorted values, and the level of each.
 
     The largest window holds all n + 1 gaps; `_removes_lowest` says which gap is removed next.
 
@@ -51,22 +51,22 @@ def windows(n: int, quantile: float | None, open_ends: tuple[bool, bool]) -> Win
         open_ends: Ends without a physical bound: their gaps are removed first.
     """
     inside, below, above = _gaps(n, quantile)
-    low, high = 0, n
-    rows = [(0.0, low, high)]
+    low, high, level = 0, n, 0.0
+    windows_by_level = {level: (low, high)}
     while low < high:
         if _removes_lowest((inside, below, above), low, high, open_ends):
             low += 1
         else:
             high -= 1
-        rows.append((min(below[low] + above[high], 1.0), low, high))
-    pairs = zip(rows, [*rows[1:], (2.0, 0, 0)], strict=True)
-    last = [row for row, after in pairs if after[0] > row[0] and row[0] < 1]
-    level, first, final = zip(*last, strict=True)
-    return Windows(np.array(level), np.array(first), np.array(final))
+        level = max(level, min(below[low] + above[high], 1.0))
+        windows_by_level[level] = low, high  # of equal levels the last window
+    windows_by_level.pop(1.0, None)
+    first, last = np.array(list(windows_by_level.values())).T
+    return Windows(np.array(list(windows_by_level)), first, last)
 
 
 def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
-    """Return the probability of each gap, of all gaps below it and of all above, each (n + 1,).
+    """Probability of each gap, of all gaps below it, and of all above it, shape (n + 1,) each.
 
     Args:
         n: Number of values.
@@ -84,7 +84,7 @@ def _gaps(n: int, quantile: float | None) -> tuple[Array, Array, Array]:
 def _removes_lowest(
     gaps: tuple[Array, Array, Array], low: int, high: int, open_ends: tuple[bool, bool]
 ) -> bool:
-    """Return True if the next gap to remove is the lowest of the window, False if the highest.
+    """True if the next gap to remove is the lowest of the window, False if it is the highest.
 
     A gap at an open end is removed first, then the less probable one, then the one at the end from
     which less was removed.
@@ -95,12 +95,13 @@ def _removes_lowest(
         high: Last gap of the window.
         open_ends: Whether the lowest and the highest gap of all have no physical bound.
     """
-    inside, below, above = gaps
-    left, right = open_ends[0] and low == 0, open_ends[1] and high == len(inside) - 1
-    if left != right:
-        return left
-    if inside[low] != inside[high]:
-        return bool(inside[low] < inside[high])
+    probability, below, above = gaps
+    low_is_open = open_ends[0] and low == 0
+    high_is_open = open_ends[1] and high == len(probability) - 1
+    if low_is_open != high_is_open:
+        return low_is_open
+    if probability[low] != probability[high]:
+        return bool(probability[low] < probability[high])
     return bool(below[low] <= above[high])
 
 
@@ -119,22 +120,21 @@ def rank_cuts(data: Observations, quantile: float | None) -> tuple[Stepwise, flo
         RefusedError: The values decide no cut at all.
     """
     low, high = data.bounds
-    rows = windows(data.count, quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
-    levels = np.append(rows.level, 1.0)
-    lower, upper = np.append(low, data.lower)[rows.low], np.append(data.upper, high)[rows.high]
+    nested = windows(data.count, quantile, (bool(np.isinf(low)), bool(np.isinf(high))))
+    levels = np.append(nested.level, 1.0)
+    lower = np.append(low, data.lower)[nested.low]
+    upper = np.append(data.upper, high)[nested.high]
     centre = _centre(data, 0.5 if quantile is None else quantile)
     finite = np.flatnonzero(np.isfinite(lower) & np.isfinite(upper))
     if not len(finite):
-        decided = np.isfinite(centre)
-        require(
-            decided, "bounds", value=data.bounds, allowed="finite ends: the values decide no cut"
-        )
+        has_centre, allowed = np.isfinite(centre), "finite ends: the values decide no cut"
+        require(has_centre, "bounds", value=data.bounds, allowed=allowed)
         return Stepwise((0.0,), (centre,), (centre,)), 1.0
     first = finite[0]
     lower[:first], upper[:first] = lower[first], upper[first]
     centre = float(np.clip(centre, lower[-1], upper[-1]))
-    steps = Stepwise(tuple(levels), (*lower, centre), (*upper, centre))
-    return steps, float(levels[first])
+    cuts = Stepwise(tuple(levels), (*lower, centre), (*upper, centre))
+    return cuts, float(levels[first])
 
 
 def _centre(data: Observations, quantile: float) -> float:

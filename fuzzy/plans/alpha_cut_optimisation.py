@@ -11,7 +11,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.campaign.call import SpentError
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.cut import Bound, CutSearch, attained_bounds, cuts_with_width
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -49,7 +49,7 @@ class Optimisation:
 
     def __post_init__(self) -> None:
         for key in ("starts", "look"):
-            real(key, getattr(self, key), positive=True, whole=True)
+            checked_number(key, getattr(self, key), positive=True, whole=True)
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Return the bounds of all outputs on all levels that the search attains in its budget."""
@@ -69,7 +69,7 @@ class Optimisation:
         if len(allowed):
             cut.campaign(cut.points(allowed))
         for output, sign in product(outputs, (1.0, -1.0)):
-            for start in _best(cut, Bound(output, sign), self.starts):
+            for start in _best_samples(cut, Bound(output, sign), self.starts):
                 cut.descend(start, Bound(output, sign))
 
 
@@ -81,8 +81,8 @@ def _spread(inputs: int, look: int, level: int) -> Array:
     return np.asarray(qmc.Halton(inputs, rng=rng).random(look * inputs))
 
 
-def _best(cut: CutSearch, bound: Bound, count: int) -> Array:
-    """Return up to `count` of the best samples in the cut, from which descents begin.
+def _best_samples(cut: CutSearch, bound: Bound, count: int) -> Array:
+    """Up to `count` of the best samples in the cut, the starts of descents.
 
     Any two of them differ by more than a quarter of the cut's width in an input.
 
@@ -95,7 +95,7 @@ def _best(cut: CutSearch, bound: Bound, count: int) -> Array:
     values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
     starts: list[Array] = []
     for row in np.argsort(values, kind="stable"):
-        distant = all(np.abs(unit[row] - start).max() > _START_DISTANCE for start in starts)
-        if distant and len(starts) < count:
+        is_distant = all(np.abs(unit[row] - start).max() > _START_DISTANCE for start in starts)
+        if is_distant and len(starts) < count:
             starts.append(unit[row])
     return np.array(starts)

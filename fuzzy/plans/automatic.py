@@ -14,7 +14,7 @@ from alphacut.fuzzy.plans.cut import attained_bounds, cuts_with_width
 from alphacut.fuzzy.plans.sign_walk import SignWalk
 from alphacut.fuzzy.plans.single_linkage import ROUNDING, VALUE_TOLERANCE, SingleLinkage
 from alphacut.fuzzy.plans.transformation import Reduced, corners_suffice
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.fuzzy.result import Bounds, Nature
 from alphacut.fuzzy.sets.boxes import Domain
 
@@ -52,11 +52,11 @@ class Automatic:
     name = "automatic"
 
     def __post_init__(self) -> None:
-        real("uncovered", self.uncovered, positive=True, most=1)
-        real("seed", self.seed, whole=True)
+        checked_number("uncovered", self.uncovered, positive=True, most=1)
+        checked_number("seed", self.seed, whole=True)
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
-        """Bounds of every output."""
+        """Bounds of every output: by corners if the knowledge allows, else by a search."""
         outputs = campaign(domain.modal[None]).columns
         monotone = campaign.knowledge.monotone_in(domain.names, outputs)
         if not domain.interactions and corners_suffice(domain, monotone).all():
@@ -86,15 +86,14 @@ class _Search:
         self.ended = False
 
     def run(self) -> Bounds:
-        """Return the bounds of every output, estimated or attained as the search found out."""
+        """Search within the budget; the bounds of every output, each estimated or attained only."""
         try:
             if self.cuts:
                 self._search()
         except SpentError:
             self.ended = True
-        return self._judge(
-            attained_bounds(self.campaign, self.domain, Automatic.name, ended=self.ended)
-        )
+        bounds = attained_bounds(self.campaign, self.domain, Automatic.name, ended=self.ended)
+        return self._with_natures(bounds)
 
     def _search(self) -> None:
         """Evaluate the corners for outputs whose effects keep their signs, and search the others.
@@ -123,22 +122,22 @@ class _Search:
         else:
             self.linkage.sample()
 
-    def _judge(self, bounds: Bounds) -> Bounds:
-        """Return the attained bounds with the error and nature of each output and the notes.
+    def _with_natures(self, bounds: Bounds) -> Bounds:
+        """Copy of attained bounds with the error and nature of each output, and notes.
 
         Bounds of monotone outputs, and of those whose search met its stopping rule, are estimated.
         """
-        estimated = self.monotone.copy()
+        is_estimated = self.monotone.copy()
         for column, output in enumerate(self.outputs):
-            estimated[column] |= self.linkage is not None and self.linkage.is_estimate(output)
+            is_estimated[column] |= self.linkage is not None and self.linkage.is_estimate(output)
         size = np.maximum(np.abs(bounds.lower), np.abs(bounds.upper)).max(axis=0)
         error = VALUE_TOLERANCE * (bounds.upper - bounds.lower)[0] + ROUNDING * size
         lower, upper = self.domain.boxes
-        crisp = (lower == upper).all(axis=1)[:, None]
-        natures = tuple(Nature.ESTIMATED if holds else Nature.ATTAINED for holds in estimated)
+        is_crisp = (lower == upper).all(axis=1)[:, None]
+        natures = tuple(Nature.ESTIMATED if x else Nature.ATTAINED for x in is_estimated)
         return replace(
             bounds,
-            error=np.where(estimated & ~crisp, error, 0.0),
+            error=np.where(is_estimated & ~is_crisp, error, 0.0),
             natures=natures,
             nature=Nature.weakest(natures),
             notes=(*self._notes(), *bounds.notes),

@@ -17,7 +17,7 @@ from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.plans.design import bounds_of_samples
 from alphacut.fuzzy.result import Bounds
 from alphacut.fuzzy.sets.boxes import Domain
-from alphacut.fuzzy.sets.interaction import pulled
+from alphacut.fuzzy.sets.interaction import first_allowed_point
 
 _DIFFERENCE = 1e-6  # step of a derivative, as a share of the width of the cut
 # the same of the slope at the end of a descent: models that solve to 1e-8 are as noisy
@@ -88,15 +88,15 @@ class CutSearch:
         return np.asarray(self.domain.inside(points)[self.level])
 
     def values(self, unit: Array, bound: Bound) -> Array:
-        """Return sign · output at points (n, uncertain inputs) of the unit cube, shape (n,).
+        """Evaluate sign · output at points (n, uncertain inputs) of the unit cube, shape (n,).
 
         It is infinite where the interactions do not allow a point or its sample failed.
         """
-        inside = self.slack(unit) >= 0
+        is_allowed = self.slack(unit) >= 0
         values: Array = np.full(len(unit), np.inf)
-        if inside.any():
-            rows = self.campaign(self.points(unit[inside]))
-            values[inside] = bound.sign * rows.array[:, rows.column(bound.output)]
+        if is_allowed.any():
+            outputs = self.campaign(self.points(unit[is_allowed]))
+            values[is_allowed] = bound.sign * outputs.array[:, outputs.column(bound.output)]
         return np.where(np.isnan(values), np.inf, values)
 
     def output_range(self, output: str) -> float:
@@ -106,8 +106,8 @@ class CutSearch:
         span = float(np.nanmax(column) - np.nanmin(column))
         return span if span >= np.finfo(float).tiny else 1.0
 
-    def steepest(self, point: Array, output: str) -> float:
-        """Return the largest slope of an output at a point, along inputs inside their cuts there.
+    def largest_slope(self, point: Array, output: str) -> float:
+        """Largest slope of an output at a point, along the inputs that are inside their cuts there.
 
         Differences to both sides are taken, so that kinks and jumps show.
 
@@ -129,7 +129,7 @@ class CutSearch:
         return float(slopes.max(initial=0.0))
 
     def descend(self, start: Array, bound: Bound, first_step: float = inf) -> Optimum:
-        """Return the local optimum that a gradient descent inside the cut reaches.
+        """Local optimum that a gradient descent inside the cut reaches.
 
         L-BFGS-B, or SLSQP with interactions, on differences; all samples stay in the campaign.
 
@@ -142,18 +142,20 @@ class CutSearch:
         objective = _Objective(self, bound, start, first_step)
         if self.domain.interactions:
             return self._descend_with_interactions(objective, start)
-        ends = {"ftol": _LEAST_CHANGE * objective.factor, "gtol": _LEAST_SLOPE * objective.factor}
-        end = objective.minimise(start, "L-BFGS-B", ends)
-        value = objective.start_value + objective.unit * float(end.fun) / objective.factor
-        slope = _free_slope(end.x, end.jac / objective.factor)
-        return Optimum(self, bound, self.points(end.x[None])[0], value, slope)
+        factor = objective.factor
+        tolerances = {"ftol": _LEAST_CHANGE * factor, "gtol": _LEAST_SLOPE * factor}
+        result = objective.minimise(start, "L-BFGS-B", tolerances)
+        value = objective.start_value + objective.unit * float(result.fun) / factor
+        slope = _free_slope(result.x, result.jac / factor)
+        return Optimum(self, bound, self.points(result.x[None])[0], value, slope)
 
     def _descend_with_interactions(self, objective: _Objective, start: Array) -> Optimum:
-        """Return the better of the start and SLSQP's result, moved back until it is allowed."""
+        """Better of the start and SLSQP's result, which is moved back until it is allowed."""
         slack = {"type": "ineq", "fun": lambda unit: float(self.slack(unit[None])[0])}
-        ends = {"ftol": _LEAST_MODEL_CHANGE * objective.factor}
-        end = objective.minimise(start, "SLSQP", ends, constraints=[slack])
-        candidates = np.stack([start, pulled(np.clip(end.x, 0, 1), start, self.slack)])
+        tolerances = {"ftol": _LEAST_MODEL_CHANGE * objective.factor}
+        result = objective.minimise(start, "SLSQP", tolerances, constraints=[slack])
+        end = first_allowed_point(np.clip(result.x, 0, 1), start, self.slack)
+        candidates = np.stack([start, end])
         values = self.values(candidates, objective.bound)
         best = int(values.argmin())
         point = self.points(candidates)[best]
@@ -191,12 +193,12 @@ class _Objective:
         return self.factor * float(changes[0]), self.factor * gradient
 
     def minimise(
-        self, start: Array, algorithm: str, ends: Mapping[str, float], **settings: object
+        self, start: Array, algorithm: str, tolerances: Mapping[str, float], **settings: object
     ) -> Any:
-        """Return SciPy's result of a minimisation over the unit cube."""
+        """Minimise over the unit cube; SciPy's `OptimizeResult`."""
         from scipy.optimize import minimize
 
-        options = {"maxiter": _MAX_ITERATIONS, **ends}
+        options = {"maxiter": _MAX_ITERATIONS, **tolerances}
         cube = [(0.0, 1.0)] * len(start)
         return minimize(
             self, start, jac=True, bounds=cube, method=algorithm, options=options, **settings
@@ -231,21 +233,22 @@ class Optimum:
         if self.slope <= _MAX_SLOPE:
             return True
         try:
-            return self.cut.steepest(self.point, self.bound.output) <= _MAX_SLOPE
+            return self.cut.largest_slope(self.point, self.bound.output) <= _MAX_SLOPE
         except SpentError:
             return False
 
-    def holds_in(self, cut: CutSearch) -> bool:
-        """Return whether the point is a local optimum of another cut as well.
+    def is_optimum_of(self, cut: CutSearch) -> bool:
+        """Whether the point is a local optimum of another cut as well.
 
         It is one of a narrower cut that contains it, and of a wider one unless a face of its own
         cut stopped the descent.
         """
         if self.cut.level <= cut.level:
             return bool(cut.contains(self.point[None])[0])
-        stopped = (self.point <= self.cut.lower + self.cut.near) & (self.cut.lower > cut.lower)
-        stopped |= (self.point >= self.cut.upper - self.cut.near) & (self.cut.upper < cut.upper)
-        return not stopped.any()
+        is_wider = self.cut.lower > cut.lower, self.cut.upper < cut.upper
+        at_face = (self.point <= self.cut.lower + self.cut.near) & is_wider[0]
+        at_face |= (self.point >= self.cut.upper - self.cut.near) & is_wider[1]
+        return not at_face.any()
 
 
 def _free_slope(unit: Array, gradient: Array) -> float:

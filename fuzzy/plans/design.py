@@ -51,7 +51,7 @@ class Design:
         return cls(domain, distinct, tuple(np.split(inverse.ravel(), ends)))
 
     def bounds(self, values: Values, method: str) -> Bounds:
-        """Return the attained bounds: extremes over the samples of each level and those above it.
+        """Attained bounds: extremes over the samples of each level and of all higher levels.
 
         This is the retransformation of Hanss (2005).
 
@@ -75,7 +75,7 @@ class Design:
         )
 
     def _extremes(self, values: Array) -> Rows:
-        """Return the row of the sample with the least value, for each level and output.
+        """Row of the sample with the least value, for each level and output.
 
         Args:
             values: Outputs at the samples, shape (n, outputs); NaN where a sample failed.
@@ -88,17 +88,19 @@ class Design:
         """
         columns = np.arange(values.shape[1])
         usable = np.where(np.isnan(values), np.inf, values)
-        best: list[Rows] = []
+        least_rows: list[Rows] = []  # from the highest level down
         for alpha, rows in zip(reversed(self.domain.alpha), reversed(self.levels), strict=True):
-            candidates = [*([rows[usable[rows].argmin(axis=0)]] if len(rows) else []), *best[-1:]]
+            candidates = least_rows[-1:]  # higher levels are contained in lower ones
+            if len(rows):
+                candidates.insert(0, rows[usable[rows].argmin(axis=0)])
             if not candidates:
                 what = f"no sample of the cut at α = {alpha:g} fulfils its interactions"
                 raise FailedError(what, "widen them, or take fewer")
             if np.isinf(usable[candidates[0], columns]).any():
                 raise FailedError(f"no sample of the cut at α = {alpha:g} has a value")
-            least = np.array(candidates)
-            best.append(least[usable[least, columns].argmin(axis=0), columns])
-        return np.array(best[::-1])
+            stacked = np.array(candidates)
+            least_rows.append(stacked[usable[stacked, columns].argmin(axis=0), columns])
+        return np.array(least_rows[::-1])
 
 
 def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
@@ -108,9 +110,9 @@ def bounds_of_samples(domain: Domain, samples: Samples, method: str) -> Bounds:
 
 
 def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bounds:
-    """Return the bounds, guaranteed for outputs whose extremes lie at corners by the knowledge.
+    """Copy of bounds, guaranteed for the outputs that the knowledge covers, after testing it.
 
-    Further samples inside the cuts test the knowledge first.
+    The tests are further samples inside the cuts.
 
     Args:
         bounds: Bounds attained at the corners that the knowledge names.
@@ -124,62 +126,56 @@ def guaranteed_bounds(bounds: Bounds, campaign: Campaign, proved: Mask) -> Bound
         return bounds
     campaign(_test_points(Domain(bounds.inputs, tuple(bounds.alpha)), campaign))
     samples, knowledge = campaign.samples, campaign.knowledge
-    signs = knowledge.stated(tuple(bounds.inputs), bounds.outputs)
-    refuted = _refuted(bounds, samples)
-    words, allowed = "; ".join(knowledge.words), "facts that hold over the whole supports"
+    signs = knowledge.stated_signs(tuple(bounds.inputs), bounds.outputs)
+    is_exceeded = _exceeded_outputs(bounds, samples)
+    words, allowed = repr("; ".join(knowledge.words)), "facts that hold over the whole supports"
     for column in np.flatnonzero(proved):
         pair = contradiction(samples.points, samples.values.array[:, column], signs[column])
-        holds = pair is None and not refuted[column]
-        cure = f"samples contradict it{_between(bounds, pair)}"
-        require(
-            holds,
-            f"knowledge of {bounds.outputs[column]}",
-            value=repr(words),
-            allowed=allowed,
-            cure=cure,
-        )
-    natures = tuple(Nature.GUARANTEED if holds else Nature.ATTAINED for holds in proved)
-    agree = f"which {len(samples.points):,} samples do not contradict"
+        agrees, key = pair is None and not is_exceeded[column], bounds.outputs[column]
+        cure = f"samples contradict it{_pair_words(bounds, pair)}"
+        require(agrees, f"knowledge of {key}", value=words, allowed=allowed, cure=cure)
+    natures = tuple(Nature.GUARANTEED if x else Nature.ATTAINED for x in proved)
+    evidence = f"which {len(samples.points):,} samples do not contradict"
     return replace(
         bounds,
         natures=natures,
         nature=Nature.weakest(natures),
-        basis=tuple(f"{fact}, {agree}" for fact in knowledge.words),
+        basis=tuple(f"{fact}, {evidence}" for fact in knowledge.words),
         inner=Ends(bounds.lower, bounds.upper),
     )
 
 
 def _test_points(domain: Domain, campaign: Campaign) -> Array:
-    """Return points inside the cuts at which stated knowledge is tested, shape (n, inputs).
+    """Points inside the cuts at which stated knowledge is tested, shape (n, inputs).
 
     The narrowest cut that has a width gets all tests, each wider one a quarter as many: points of a
     narrower cut lie in the wider ones, too. The budget limits their number.
     """
     lower, upper = domain.boxes
     widths, tests, points = upper - lower, campaign.knowledge.tests, list[Array]()
-    shares = low_discrepancy(len(domain.names))
+    unit_points = low_discrepancy(len(domain.names))
     ends = np.hstack([lower, upper])
-    is_new = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))
-    for level in np.flatnonzero(is_new & widths.any(axis=1))[::-1]:
+    differs = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))  # from the cut below
+    for level in np.flatnonzero(differs & widths.any(axis=1))[::-1]:
         count = -(-tests // 4) if points else tests
-        points += [lower[level] + widths[level] * next(shares) for _ in range(count)]
-    return np.array(points[: campaign.left]).reshape(-1, len(domain.names))
+        points += [lower[level] + widths[level] * next(unit_points) for _ in range(count)]
+    return np.array(points[: campaign.remaining]).reshape(-1, len(domain.names))
 
 
-def _refuted(bounds: Bounds, samples: Samples) -> Mask:
-    """Return the outputs of which a sample exceeds all corners of its cut, a mask (outputs,)."""
+def _exceeded_outputs(bounds: Bounds, samples: Samples) -> Mask:
+    """Mask of the outputs that exceed their bounds at a sample of the cut, shape (outputs,)."""
     sampled = bounds_of_samples(Domain(bounds.inputs, tuple(bounds.alpha)), samples, "")
-    small = negligible(samples.values.array)
-    low, high = sampled.lower < bounds.lower - small, sampled.upper > bounds.upper + small
-    return np.asarray((low | high).any(axis=0))
+    tolerance = negligible(samples.values.array)
+    below = sampled.lower < bounds.lower - tolerance
+    return np.asarray((below | (sampled.upper > bounds.upper + tolerance)).any(axis=0))
 
 
-def _between(bounds: Bounds, pair: tuple[Array, Array] | None) -> str:
-    """Return a text that names the two samples which contradict a sign; empty without a pair."""
+def _pair_words(bounds: Bounds, pair: tuple[Array, Array] | None) -> str:
+    """Text that names the two samples which contradict a sign; empty without a pair."""
     if pair is None:
         return ""
-    places = [
+    first, second = (
         ", ".join(f"{name} = {x:.6g}" for name, x in zip(bounds.inputs, point, strict=True))
         for point in pair
-    ]
-    return f": at {places[0]} it is larger than at {places[1]}"
+    )
+    return f": at {first} it is larger than at {second}"

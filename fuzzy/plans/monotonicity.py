@@ -14,7 +14,7 @@ import numpy as np
 from alphacut.fuzzy.arrays import Array, Rows
 from alphacut.fuzzy.campaign.campaign import Campaign
 from alphacut.fuzzy.knowledge.known import Signs
-from alphacut.fuzzy.refused import chosen
+from alphacut.fuzzy.refused import require_choice
 from alphacut.fuzzy.sets.boxes import Domain
 
 _PROBES = 4  # points inside a box, besides its extreme corners and the modal point
@@ -59,9 +59,9 @@ def verify(campaign: Campaign, domain: Domain, outputs: tuple[str, ...] = ()) ->
     """
     columns = campaign(domain.modal[None]).columns
     for name in outputs:
-        chosen("output", name, columns)
+        require_choice("output", name, columns)
     outputs = outputs or columns
-    signs = campaign.knowledge.stated(domain.names, outputs)
+    signs = campaign.knowledge.stated_signs(domain.names, outputs)
     lowers, uppers = domain.boxes
     for column in np.flatnonzero(signs.any(axis=0)):
         campaign(_sign_test_points(domain.modal, signs, lowers[0], uppers[0], int(column)))
@@ -89,12 +89,13 @@ def _sign_test_points(modal: Array, signs: Signs, lower: Array, upper: Array, co
         upper: Upper bounds of the box, shape (inputs,).
         column: Index of the input.
     """
-    points = np.repeat(np.concatenate([modal[None], _extreme(signs, lower, upper)]), 2, axis=0)
+    others = np.concatenate([modal[None], _extreme_corners(signs, lower, upper)])
+    points = np.repeat(others, 2, axis=0)
     points[::2, column], points[1::2, column] = lower[column], upper[column]
     return np.asarray(np.unique(points, axis=0))
 
 
-def _extreme(signs: Signs, lower: Array, upper: Array) -> Array:
+def _extreme_corners(signs: Signs, lower: Array, upper: Array) -> Array:
     """Return the corners of least and greatest output for each distinct row of signs.
 
     Returns:
@@ -125,13 +126,16 @@ class _Box:
         """
         free = np.flatnonzero((stated == 0).any(axis=0))
         first = np.sign(self._slopes(modal[None], free)[0]).astype(np.int8)
-        corners = _extreme(np.where(stated != 0, stated, first), self.lower, self.upper)
-        slopes = self._slopes(np.concatenate([modal[None], corners, self._halton_points()]), free)
-        least, most = slopes.min(axis=0), slopes.max(axis=0)
-        margin = _MARGIN * (most - least)
-        rises, falls = (least > 0) & (least >= margin), (most < 0) & (-most >= margin)
-        idle = (least == 0) & (most == 0)  # no effect at any probe: either end will do
-        return np.asarray((rises | idle).astype(np.int8) - falls.astype(np.int8))
+        signs = np.where(stated != 0, stated, first)
+        corners = _extreme_corners(signs, self.lower, self.upper)
+        probes = np.concatenate([modal[None], corners, self._halton_points()])
+        slopes = self._slopes(probes, free)
+        least, greatest = slopes.min(axis=0), slopes.max(axis=0)
+        margin = _MARGIN * (greatest - least)
+        rises = (least > 0) & (least >= margin)
+        falls = (greatest < 0) & (-greatest >= margin)
+        has_no_effect = (least == 0) & (greatest == 0)  # either end will do
+        return np.asarray((rises | has_no_effect).astype(np.int8) - falls.astype(np.int8))
 
     def _halton_points(self) -> Array:
         """Halton points of the box, (`_PROBES`, inputs); without the first, which is a corner."""

@@ -77,16 +77,17 @@ class SignWalk:
         inputs = len(self.cut.uncertain_inputs)
         steps = self.steps * inputs
         walk = np.empty((steps + 1, inputs))
-        for column in range(inputs):
+        for column in range(inputs):  # each step changes one input, in turn
             changes = np.arange(steps + 1) + inputs - 1 - column
             walk[:, column] = self.samples[changes // inputs, column]
         values = self.campaign(self.cut.points(walk)).array
-        small = negligible(self.campaign.samples.values.array)
-        rises = np.diff(values, axis=0) * np.sign(np.diff(walk, axis=0).sum(axis=1))[:, None]
-        by_input = rises.reshape(self.steps, inputs, -1)
-        falls = (by_input < -small).any(axis=0)
-        mixed = (falls & (by_input > small).any(axis=0)) | np.isnan(by_input).any(axis=0)
-        return np.where(mixed, 0, np.where(falls, -1, 1)).astype(np.int8).T
+        tolerance = negligible(self.campaign.samples.values.array)
+        directions = np.sign(np.diff(walk, axis=0).sum(axis=1))
+        differences = np.diff(values, axis=0) * directions[:, None]
+        by_input = differences.reshape(self.steps, inputs, -1)
+        falls, rises = (by_input < -tolerance).any(axis=0), (by_input > tolerance).any(axis=0)
+        is_unknown = (falls & rises) | np.isnan(by_input).any(axis=0)
+        return np.where(is_unknown, 0, np.where(falls, -1, 1)).astype(np.int8).T
 
     def _evaluate_corners(self, signs: Signs) -> None:
         """Evaluate the corners of each cut, and steps along each input from two of the widest cut.

@@ -66,7 +66,7 @@ def critical_distance(
     return float(ball ** (1 / inputs) / sqrt(pi))
 
 
-def uncovered_share(samples: int, optima: int) -> float:
+def uncovered_fraction(samples: int, optima: int) -> float:
     """Return the expected fraction of the cut in basins not yet seen (Boender, Rinnooy Kan 1987).
 
     It is infinite with fewer than two samples or no optimum.
@@ -77,7 +77,7 @@ def uncovered_share(samples: int, optima: int) -> float:
 
 
 def linkage_starts(unit: Array, values: Array, distance: float) -> Rows:
-    """Return the rows of the samples from which descents start: no better sample within `distance`.
+    """Rows of the samples without a better sample within a distance: descents start there.
 
     Args:
         unit: Samples, shape (n, d), in unit coordinates.
@@ -112,9 +112,9 @@ class BoundSearch:
         return min(self.optima, key=lambda optimum: optimum.value)
 
     @property
-    def share(self) -> float:
-        """Share of the cut that is not yet covered."""
-        return uncovered_share(self.samples, len(self.optima))
+    def uncovered(self) -> float:
+        """Expected fraction of the cut that is not yet covered by the basins of optima."""
+        return uncovered_fraction(self.samples, len(self.optima))
 
     @property
     def is_smooth(self) -> bool:
@@ -123,30 +123,28 @@ class BoundSearch:
 
     def n_humps(self, cut: CutSearch) -> int:
         """Return the number of optima that are no corner of the cut."""
-        at_ends = [
-            (optimum.point <= cut.lower + cut.near) | (optimum.point >= cut.upper - cut.near)
-            for optimum in self.optima
-        ]
+        lower, upper = cut.lower + cut.near, cut.upper - cut.near
+        at_ends = [(x.point <= lower) | (x.point >= upper) for x in self.optima]
         return sum(not ends.all() for ends in at_ends)
 
-    def is_estimate(self, uncovered: float) -> bool:
+    def is_estimate(self, allowed: float) -> bool:
         """Return whether the stopping rule is met and the output is smooth at the best optimum."""
-        return self.samples >= MIN_SAMPLES and self.share < uncovered and self.is_smooth
+        return self.samples >= MIN_SAMPLES and self.uncovered < allowed and self.is_smooth
 
-    def is_open(self, uncovered: float) -> bool:
+    def is_open(self, allowed: float) -> bool:
         """Return whether the search goes on; kinks and jumps at the best optimum end it, too."""
         if self.samples < MIN_SAMPLES or not self.optima:
             return True
-        return self.share >= uncovered and self.is_smooth
+        return self.uncovered >= allowed and self.is_smooth
 
-    def asked(self, uncovered: float) -> int:
-        """Return the number of samples that meet the stopping rule if no new optimum appears.
+    def next_samples(self, allowed: float) -> int:
+        """Samples N with which W (W + 1) / (N (N − 1)) falls to `allowed` without a new optimum.
 
-        It is at most twice the present number.
+        N is at most twice the present number.
         """
-        count = len(self.optima)
-        rule = ceil(0.5 + sqrt(0.25 + count * (count + 1) / uncovered)) + 1
-        return max(MIN_SAMPLES, min(max(rule, self.samples + _MIN_NEW), 2 * self.samples))
+        W = len(self.optima)
+        needed = ceil(0.5 + sqrt(0.25 + W * (W + 1) / allowed)) + 1
+        return max(MIN_SAMPLES, min(max(needed, self.samples + _MIN_NEW), 2 * self.samples))
 
 
 class SingleLinkage:
@@ -197,13 +195,14 @@ class SingleLinkage:
         Raises:
             SpentError: The budget ended the search.
         """
-        self._add(self.cuts[0], first)
+        self._add_samples(self.cuts[0], first)
         rounds = 0
-        while visits := [(cut, bounds) for cut in self.cuts if (bounds := self._open(cut))]:
+        while visits := [(cut, bounds) for cut in self.cuts if (bounds := self._open_bounds(cut))]:
             rounds += 1
             for number, (cut, bounds) in enumerate(visits, start=1):
-                asked = max(self.states[cut.level, x].asked(self.uncovered) for x in bounds)
-                self._fill(cut, asked, rounds)
+                states = [self.states[cut.level, bound] for bound in bounds]
+                count = max(state.next_samples(self.uncovered) for state in states)
+                self._sample_up_to(cut, count, rounds)
                 self._descend(cut, bounds)
                 self.campaign.report(1 - (1 - 0.8 * number / len(visits)) / rounds)
 
@@ -219,22 +218,19 @@ class SingleLinkage:
 
     def summary(self) -> str:
         """Return a sentence on the bound with the largest uncovered fraction of its cut."""
-        worst = max(self.states.values(), key=lambda state: state.share)
+        worst = max(self.states.values(), key=lambda state: state.uncovered)
         return (
             f"W = {len(worst.optima)} optima found from N = {worst.samples} samples: of each cut"
-            f" {worst.share:.3%} or less is not yet covered"
+            f" {worst.uncovered:.3%} or less is not yet covered"
         )
 
     def sample(self) -> None:
         """Evaluate `MIN_SAMPLES` uniform samples of each cut, without descents."""
         for cut in self.cuts:
-            self._fill(cut, MIN_SAMPLES, 0)
+            self._sample_up_to(cut, MIN_SAMPLES, 0)
 
-    def _open(self, cut: CutSearch) -> list[Bound]:
-        """Return the bounds of a cut whose search goes on.
-
-        Before, each bound descends from any sample that is better than its optima.
-        """
+    def _open_bounds(self, cut: CutSearch) -> list[Bound]:
+        """Bounds of a cut whose search goes on, after descents from samples better than optima."""
         for bound in self.bounds:
             self._descend_from_better(cut, bound)
         if cut.level in self._exhausted:
@@ -250,69 +246,70 @@ class SingleLinkage:
         inside = cut.contains(samples.points)
         values = bound.sign * samples.values.array[inside, samples.values.column(bound.output)]
         best = int(np.nanargmin(values))
-        if values[best] < state.best.value - self._near(bound):
+        if values[best] < state.best.value - self._tolerance(bound):
             self._descend_from(cut, bound, cut.unit(samples.points[inside][best][None])[0])
 
     def _descend_from(self, cut: CutSearch, bound: Bound, start: Array) -> None:
-        """Descend from a start and keep the optimum.
+        """Descend from a start and record the optimum.
 
         If values do not fall all along the straight line to it, the descent has left the basin of
         its start; it is repeated with a short first step.
         """
         optimum = cut.descend(start, bound)
-        self._keep(optimum)
+        self._record(optimum)
         step = cut.unit(optimum.point[None])[0] - start
         if np.abs(step).max() > FIRST_STEP:
-            between = cut.values(start + np.array([0.0, *_BETWEEN])[:, None] * step, bound)
-            if (np.diff([*between, optimum.value]) > self._near(bound)).any():
-                self._keep(cut.descend(start, bound, FIRST_STEP))
+            line = start + np.array([0.0, *_BETWEEN])[:, None] * step
+            values = [*cut.values(line, bound), optimum.value]
+            if (np.diff(values) > self._tolerance(bound)).any():
+                self._record(cut.descend(start, bound, FIRST_STEP))
 
-    def _keep(self, optimum: Optimum) -> None:
+    def _record(self, optimum: Optimum) -> None:
         """Add an optimum to the list of every cut of which it is a local optimum.
 
         An equal optimum in the list is replaced if its value is worse.
         """
         for cut in self.cuts:
-            if not optimum.holds_in(cut):
+            if not optimum.is_optimum_of(cut):
                 continue
             optima = self.states[cut.level, optimum.bound].optima
-            number = self._number(cut, optimum)
-            if number == len(optima):
+            index = self._index_of_equal(cut, optimum)
+            if index == len(optima):
                 optima.append(optimum)
-            elif optimum.value < optima[number].value:
-                optima[number] = optimum
+            elif optimum.value < optima[index].value:
+                optima[index] = optimum
 
-    def _number(self, cut: CutSearch, optimum: Optimum) -> int:
-        """Return the index of an equal optimum in the list of a cut; its length if there is none.
+    def _index_of_equal(self, cut: CutSearch, optimum: Optimum) -> int:
+        """Index of an equal optimum in the list of a cut; its length if there is none.
 
         Optima of nearly one value are equal if they are close, or if no value between them is
         larger: a valley is where many descents end, and symmetric hills are several.
         """
-        optima, near = self.states[cut.level, optimum.bound].optima, self._near(optimum.bound)
-        alike = [k for k, rival in enumerate(optima) if abs(rival.value - optimum.value) <= near]
+        optima = self.states[cut.level, optimum.bound].optima
+        tolerance = self._tolerance(optimum.bound)
+        alike = [k for k, x in enumerate(optima) if abs(x.value - optimum.value) <= tolerance]
         unit = cut.unit(np.stack([optimum.point, *(optima[k].point for k in alike)]))
         steps = unit[1:] - unit[0]
-        for number, step in zip(alike, steps, strict=True):
+        for index, step in zip(alike, steps, strict=True):
             if np.abs(step).max() <= _SAME_PLACE:
-                return number
-        for number, step in zip(alike, steps, strict=True):
+                return index
+        for index, step in zip(alike, steps, strict=True):
             between = cut.values(unit[0] + _BETWEEN[:, None] * step, optimum.bound)
-            if (between <= max(optimum.value, optima[number].value) + near).all():
-                return number
+            if (between <= max(optimum.value, optima[index].value) + tolerance).all():
+                return index
         return len(optima)
 
-    def _near(self, bound: Bound) -> float:
-        """Return the difference of values within which two optima count as equal."""
+    def _tolerance(self, bound: Bound) -> float:
+        """Difference of values within which two optima count as equal."""
         values = self._values[bound][np.isfinite(self._values[bound])]
-        span = VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max()
-        return float(span)
+        return float(VALUE_TOLERANCE * np.ptp(values) + ROUNDING * np.abs(values).max())
 
-    def _fill(self, cut: CutSearch, asked: int, rounds: int) -> None:
-        """Evaluate new uniform samples of a cut until it has as many as `asked`."""
-        missing = asked - len(self._rows(cut))
+    def _sample_up_to(self, cut: CutSearch, count: int, rounds: int) -> None:
+        """Evaluate new uniform samples of a cut until it has `count` of them."""
+        missing = count - len(self._rows(cut))
         if missing > 0:
             rng = np.random.default_rng([self.seed, 1 + cut.level, rounds])
-            self._add(cut, self._draw(cut, missing, rng))
+            self._add_samples(cut, self._draw(cut, missing, rng))
 
     def _descend(self, cut: CutSearch, bounds: list[Bound]) -> None:
         """Descend from those samples and corners of a cut that have no better one nearby.
@@ -323,7 +320,7 @@ class SingleLinkage:
         if len(rows) < 2:  # the interactions leave next to nothing
             return
         unit = np.concatenate([cut.unit(self._points[rows]), cut.corners])
-        names = [*map(int, rows), *range(-len(cut.corners), 0)]  # N does not count corners
+        keys = [*map(int, rows), *range(-len(cut.corners), 0)]  # N does not count corners
         for bound in bounds:
             state = self.states[cut.level, bound]
             values = np.append(self._values[bound][rows], cut.values(cut.corners, bound))
@@ -333,8 +330,8 @@ class SingleLinkage:
                 volume = self._volumes[cut.level]
                 distance = critical_distance(len(rows), len(cut.uncertain_inputs), volume, sigma)
                 for start in linkage_starts(unit, values, distance):
-                    if names[start] not in state.started:
-                        state.started.add(names[start])
+                    if keys[start] not in state.started:
+                        state.started.add(keys[start])
                         self._descend_from(cut, bound, unit[start])
             state.samples = len(rows)
 
@@ -358,7 +355,7 @@ class SingleLinkage:
             self._exhausted.add(cut.level)
         return allowed[:count]
 
-    def _add(self, cut: CutSearch, unit: Array) -> None:
+    def _add_samples(self, cut: CutSearch, unit: Array) -> None:
         """Evaluate uniform samples (n, uncertain inputs) of a cut and append them."""
         if len(unit):
             points = cut.points(unit)

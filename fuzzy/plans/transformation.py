@@ -46,23 +46,20 @@ def hanss_points(
         is a single value, otherwise its two ends), n + 1 at the next level down, and so on.
     """
     points: list[float] = []  # of all levels so far, in rising order
-    rows: list[list[float]] = []
+    by_level: list[list[float]] = []  # from the top down
     for level in reversed(alpha):
         lower, upper = number.cut(level)
-        between = (
-            [(left + right) / 2 for left, right in pairwise(rows[-1])] if rows and inner else []
-        )
-        rows.append(
-            [
-                _merged(x, points, number.support.width)
-                for x in ([lower, *between, upper] if lower < upper else [lower])
-            ]
-        )
-    return rows[::-1]
+        level_points = [lower]
+        if lower < upper:
+            if by_level and inner:
+                level_points += [(left + right) / 2 for left, right in pairwise(by_level[-1])]
+            level_points.append(upper)
+        by_level.append([_listed_point(x, points, number.support.width) for x in level_points])
+    return by_level[::-1]
 
 
-def _merged(x: float, points: list[float], width: float) -> float:
-    """Return the listed point that equals x but for round-off, else x, which is then listed."""
+def _listed_point(x: float, points: list[float], width: float) -> float:
+    """The point in the sorted list that equals x but for round-off; else x, which is inserted."""
     index = bisect_left(points, x - _ROUND_OFF * width)
     if index < len(points) and points[index] - x <= _ROUND_OFF * width:
         return points[index]
@@ -82,17 +79,19 @@ def grids(domain: Domain, refined: Collection[str]) -> list[list[list[float]]]:
     return [list(level) for level in zip(*columns, strict=True)]
 
 
-def _combined(campaign: Campaign, domain: Domain, refined: Collection[str], method: str) -> Design:
-    """Return the design with all combinations of the inputs' points on each level."""
+def _full_design(
+    campaign: Campaign, domain: Domain, refined: Collection[str], method: str
+) -> Design:
+    """Design with all combinations of the inputs' points on each level, within the budget."""
     levels = grids(domain, refined)
     require_budget(sum(prod(map(len, grid)) for grid in levels), campaign, method)
     return Design.from_levels(domain, [np.array(list(product(*grid))) for grid in levels])
 
 
-def _transformed(
+def _bounds_of_combinations(
     campaign: Campaign, domain: Domain, refined: Collection[str], method: str
 ) -> Bounds:
-    """Evaluate all combinations and return their bounds, guaranteed where corners suffice.
+    """Evaluate all combinations of points; their bounds, guaranteed where corners suffice.
 
     Args:
         campaign: The model with the knowledge about it.
@@ -101,7 +100,7 @@ def _transformed(
         method: Name of the method.
     """
     domain.require_free(method)
-    design = _combined(campaign, domain, refined, method)
+    design = _full_design(campaign, domain, refined, method)
     bounds = design.bounds(campaign(design.points), method)
     monotone = campaign.knowledge.monotone_in(domain.names, bounds.outputs)
     return guaranteed_bounds(bounds, campaign, corners_suffice(domain, monotone))
@@ -122,8 +121,8 @@ def require_budget(samples: float, campaign: Campaign, method: str) -> None:
     """Refuse a design that needs more evaluations than the budget, before any is made."""
     cure = f"the method {method} takes {samples:,.0f} evaluations here: take a larger budget,"
     cure += " fewer levels, state signs (Knowledge) for Signed, or take Automatic"
-    left, allowed = f"{campaign.left:,} evaluations", f"{samples:,.0f} or more"
-    require(samples <= campaign.left, "budget", value=left, allowed=allowed, cure=cure)
+    remaining, allowed = f"{campaign.remaining:,} evaluations", f"{samples:,.0f} or more"
+    require(samples <= campaign.remaining, "budget", value=remaining, allowed=allowed, cure=cure)
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ class General:
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Evaluate the samples and rearrange them into α-cuts."""
-        return _transformed(campaign, domain, domain.names, self.name)
+        return _bounds_of_combinations(campaign, domain, domain.names, self.name)
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ class Reduced:
 
     def run(self, campaign: Campaign, domain: Domain) -> Bounds:
         """Evaluate the samples and rearrange them into α-cuts."""
-        return _transformed(campaign, domain, (), self.name)
+        return _bounds_of_combinations(campaign, domain, (), self.name)
 
 
 @dataclass(frozen=True)
@@ -189,10 +188,10 @@ class Extended:
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
         stated = campaign.knowledge.monotone_in(domain.names, effects.outputs)
-        monotone = ((effects.signs[0] != 0) | stated).all(axis=0)
-        refined = {name for name, ends in zip(domain.names, monotone, strict=True) if not ends}
-        design = _combined(campaign, domain, refined, self.name)
-        return _verified(design, campaign, effects, self.name)
+        monotone = ((effects.signs[0] != 0) | stated).all(axis=0)  # by input, for all outputs
+        refined = {name for name, x in zip(domain.names, monotone, strict=True) if not x}
+        design = _full_design(campaign, domain, refined, self.name)
+        return _bounds_by_effects(design, campaign, effects, self.name)
 
 
 @dataclass(frozen=True)
@@ -222,31 +221,31 @@ class Signed:
         """Verify the signs, run the corners, rearrange them into α-cuts."""
         domain.require_free(self.name)
         effects = verify(campaign, domain, self.outputs)
-        require_budget(_size(effects, domain), campaign, self.name)
+        require_budget(_sample_count(effects, domain), campaign, self.name)
         levels = zip(effects.signs, grids(domain, domain.names), strict=True)
         points = [_level_points(np.unique(signs, axis=0), grid) for signs, grid in levels]
-        return _verified(Design.from_levels(domain, points), campaign, effects, self.name)
+        return _bounds_by_effects(Design.from_levels(domain, points), campaign, effects, self.name)
 
 
-def _verified(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
-    """Evaluate a design and return its bounds, guaranteed where all signs are stated."""
-    corners = design.bounds(campaign(design.points), method)
-    stated = campaign.knowledge.stated(design.domain.names, corners.outputs) != 0
-    proved = corners_suffice(design.domain, stated) & np.isin(corners.outputs, effects.outputs)
-    verdict = guaranteed_bounds(corners, campaign, proved)
+def _bounds_by_effects(design: Design, campaign: Campaign, effects: Effects, method: str) -> Bounds:
+    """Evaluate a design; bounds of all samples, guaranteed where all signs are stated."""
+    at_corners = design.bounds(campaign(design.points), method)
+    stated = campaign.knowledge.stated_signs(design.domain.names, at_corners.outputs) != 0
+    proved = corners_suffice(design.domain, stated) & np.isin(at_corners.outputs, effects.outputs)
+    guaranteed = guaranteed_bounds(at_corners, campaign, proved)
     bounds = bounds_of_samples(design.domain, campaign.samples, method)
     return replace(
         bounds,
-        nature=verdict.nature,
-        natures=verdict.natures,
-        basis=verdict.basis,
+        nature=guaranteed.nature,
+        natures=guaranteed.natures,
+        basis=guaranteed.basis,
         inner=Ends(bounds.lower, bounds.upper),
         notes=effects.notes(design.domain),
     )
 
 
-def _size(effects: Effects, domain: Domain) -> float:
-    """Return the number of samples of the signed plan, a float: there may be too many to list."""
+def _sample_count(effects: Effects, domain: Domain) -> float:
+    """Number of samples of the signed plan, a float: there may be too many to list."""
     total = 0.0
     for signs, grid in zip(effects.signs, grids(domain, domain.names), strict=True):
         counts = np.array([len(points) for points in grid], float)

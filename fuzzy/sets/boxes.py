@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import chosen, real, require
-from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.refused import checked_number, require, require_choice
+from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from alphacut.fuzzy.sets.interaction import Interaction
-from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, rising
+from alphacut.fuzzy.sets.numbers import Crisp, FuzzyNumber, checked_levels
 
 _ROUND_OFF = 1e-12  # of the support: points this close to a cut lie in it
 
@@ -23,7 +23,7 @@ def levels(steps: int) -> tuple[float, ...]:
         >>> levels(4)
         (0.0, 0.25, 0.5, 0.75, 1.0)
     """
-    real("steps between levels", steps, positive=True, whole=True)
+    checked_number("steps between levels", steps, positive=True, whole=True)
     return tuple(step / steps for step in range(steps + 1))
 
 
@@ -34,12 +34,13 @@ def fuzzy_inputs(inputs: Mapping[str, FuzzyNumber | float]) -> dict[str, FuzzyNu
         RefusedError: The inputs are not a mapping or empty, or a value is not a number, fuzzy or
             plain.
     """
-    named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
-    require(
-        bool(named), "inputs", value=inputs, allowed="a mapping, as {'E': Triangular(24, 25, 26)}"
-    )
+    is_named = isinstance(inputs, Mapping) and inputs and all(isinstance(x, str) for x in inputs)
+    allowed = "a mapping, as {'E': Triangular(24, 25, 26)}"
+    require(bool(is_named), "inputs", value=inputs, allowed=allowed)
     return {
-        name: value if isinstance(value, FuzzyNumber) else Crisp(real(f"input {name}", value))
+        name: value
+        if isinstance(value, FuzzyNumber)
+        else Crisp(checked_number(f"input {name}", value))
         for name, value in inputs.items()
     }
 
@@ -65,10 +66,10 @@ class Domain:
 
     def __post_init__(self) -> None:
         """Store levels and inputs as checked; refuse interactions of unknown inputs."""
-        alpha = rising(self.alpha)
+        alpha = checked_levels(self.alpha)
         inputs = fuzzy_inputs(self.inputs)
         for name, number in inputs.items():
-            if isinstance(number, Claimed):
+            if isinstance(number, ClaimedNumber):
                 number.cut(alpha[0])  # refused where the values do not decide it
                 inputs[name] = replace(number, decided=0.0)
         object.__setattr__(self, "alpha", alpha)
@@ -76,7 +77,7 @@ class Domain:
         object.__setattr__(self, "interactions", tuple(self.interactions))
         for interaction in self.interactions:
             for name in interaction.names:
-                chosen(f"input of {type(interaction).__name__}", name, self.names)
+                require_choice(f"input of {type(interaction).__name__}", name, self.names)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -118,11 +119,5 @@ class Domain:
     def require_free(self, method: str) -> None:
         """Refuse a domain with interactions, for a method that evaluates corners of boxes only."""
         kinds = ", ".join(type(interaction).__name__ for interaction in self.interactions)
-        cure = "take Automatic or Optimisation"
-        require(
-            not kinds,
-            "interactions",
-            value=kinds,
-            allowed=f"none with the method {method}",
-            cure=cure,
-        )
+        allowed, cure = f"none with the method {method}", "take Automatic or Optimisation"
+        require(not kinds, "interactions", value=kinds, allowed=allowed, cure=cure)

@@ -8,11 +8,11 @@ import numpy as np
 
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
-from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, Stepwise, level
+from alphacut.fuzzy.sets.numbers import Cut, Cuts, FuzzyNumber, Stepwise, checked_level
 
 
 @dataclass(frozen=True)
-class Claim:
+class CoverageClaim:
     """P(quantity in the cut at α) >= 1 − α at every α, over repeated samples.
 
     Args:
@@ -30,7 +30,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Joint:
+class JointRule:
     """Rule by which claims are joined.
 
     Args:
@@ -45,17 +45,18 @@ class Joint:
     means: str
     named: bool = False
 
-    def joined(self, beta: Array) -> Array:
-        """Return the level α of the joint cut made of the single cuts at levels `beta` (any shape).
+    def joint_level(self, beta: Array) -> Array:
+        """Level α of the joint cut made of the single cuts at level β (any shape).
 
         For m claims: α = 1 − (1 − β)^m with independent sources, else min(m β, 1) (Bonferroni).
         """
         m = len(self.names)
-        inside = np.minimum(beta, 1 - 1e-16)
-        joint: Array = (
-            -np.expm1(m * np.log1p(-inside)) if self.independent else np.minimum(m * beta, 1.0)
-        )
-        return np.asarray(beta, float) if m == 1 else joint
+        if m == 1:
+            return np.asarray(beta, float)
+        if not self.independent:
+            return np.asarray(np.minimum(m * beta, 1.0))
+        below_1 = np.minimum(beta, 1 - 1e-16)  # where the logarithm is finite
+        return np.asarray(-np.expm1(m * np.log1p(-below_1)))
 
     @property
     def words(self) -> str:
@@ -65,7 +66,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Claimed(FuzzyNumber):
+class ClaimedNumber(FuzzyNumber):
     """A fuzzy number with a claim.
 
     Args:
@@ -81,12 +82,12 @@ class Claimed(FuzzyNumber):
     """
 
     number: Stepwise
-    claim: Claim
+    claim: CoverageClaim
     decided: float = 0.0
-    joint: Joint | None = None
+    joint: JointRule | None = None
 
     def __post_init__(self) -> None:
-        level(self.decided)
+        checked_level(self.decided)
 
     @property
     def cuts(self) -> Cuts:
@@ -105,7 +106,7 @@ class Claimed(FuzzyNumber):
             RefusedError: `alpha` lies outside [0, 1] or below `decided`, where the measured values
                 leave the cut without a finite end.
         """
-        if level(alpha) < self.decided:
+        if checked_level(alpha) < self.decided:
             allowed = f"levels from {self.decided:.4g} on, which the values decide"
             cure = "give bounds=(lower, upper), what is physically possible, or measure more"
             raise RefusedError(f"alpha of the {self.claim.about}", alpha, allowed, cure)

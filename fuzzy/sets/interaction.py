@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.fuzzy.sets.numbers import FuzzyNumber
 
 
@@ -49,8 +49,8 @@ class Linear:
 
     def __post_init__(self) -> None:
         for name, weight in self.weights.items():
-            real(f"weight of {name}", weight)
-        real("bound of the weighted sum", self.bound)
+            checked_number(f"weight of {name}", weight)
+        checked_number("bound of the weighted sum", self.bound)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ class Ellipsoidal:
 
     def __post_init__(self) -> None:
         for pair, value in self.correlation.items():
-            real(f"correlation of {' and '.join(pair)}", value, least=-1, most=1)
+            checked_number(f"correlation of {' and '.join(pair)}", value, least=-1, most=1)
         definite = len(self.names) > 1 and np.linalg.eigvalsh(self._matrix).min() > 0
         allowed = "pairs of inputs with values that agree: their matrix is positive definite"
         require(definite, "correlation", value=dict(self.correlation), allowed=allowed)
@@ -130,8 +130,8 @@ def _signed_distance(number: FuzzyNumber, x: Array) -> Array:
     return distance
 
 
-def pulled(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Array:
-    """Return the first allowed point (inputs,) on the straight line from `point` to `anchor`.
+def first_allowed_point(point: Array, anchor: Array, slack: Callable[[Array], Array]) -> Array:
+    """First allowed point (inputs,) on the straight line from `point` to `anchor`.
 
     401 points of the line are tried, in steps that grow from 1e-15 of its length.
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import checked_number, require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +66,7 @@ class FuzzyNumber(ABC):
     def cut(self, alpha: float) -> Cut:
         """The set of values with membership at least `alpha` in [0, 1]; at 0 the closed support."""
         levels, lower, upper = self.cuts
-        alpha = level(alpha)
+        alpha = checked_level(alpha)
         return Cut(_interpolate(alpha, levels, lower), _interpolate(alpha, levels, upper))
 
     def membership(self, x: ArrayLike) -> Array:
@@ -98,22 +98,22 @@ def new_axes() -> Axes:
     return axes
 
 
-def level(alpha: float) -> float:
+def checked_level(alpha: float) -> float:
     """The level as a float.
 
     Raises:
         RefusedError: It lies outside [0, 1].
     """
-    return real("alpha", alpha, least=0, most=1)
+    return checked_number("alpha", alpha, least=0, most=1)
 
 
-def rising(alpha: Iterable[float]) -> tuple[float, ...]:
+def checked_levels(alpha: Iterable[float]) -> tuple[float, ...]:
     """Return levels as a tuple of floats, which must rise within [0, 1].
 
     Raises:
         RefusedError: There is no level, they do not rise, or one lies outside [0, 1].
     """
-    levels = tuple(map(level, alpha))
+    levels = tuple(map(checked_level, alpha))
     ordered = bool(levels) and (np.diff(levels) > 0).all()
     require(ordered, "alpha", value=list(levels), allowed="levels that rise within [0, 1]")
     return levels
@@ -136,12 +136,13 @@ def _highest_level(x: Array, levels: Array, lower: Array) -> Array:
 
     It is the membership of x on the left flank; 0 where x lies below all cuts.
     """
-    right = np.searchsorted(lower, x, side="right")
-    inner = np.clip(right, 1, len(lower) - 1)
-    rise = lower[inner] - lower[inner - 1]
-    fraction = np.divide(x - lower[inner - 1], rise, out=np.zeros_like(x), where=rise > 0)
-    between = levels[inner - 1] + fraction * (levels[inner] - levels[inner - 1])
-    return np.where(right == 0, 0.0, np.where(right == len(lower), 1.0, between))
+    count = np.searchsorted(lower, x, side="right")  # cuts with their lower end at or below x
+    right = np.clip(count, 1, len(lower) - 1)
+    left = right - 1
+    rise = lower[right] - lower[left]
+    fraction = np.divide(x - lower[left], rise, out=np.zeros_like(x), where=rise > 0)
+    interpolated = levels[left] + fraction * (levels[right] - levels[left])
+    return np.where(count == 0, 0.0, np.where(count == len(lower), 1.0, interpolated))
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ class _Corners(FuzzyNumber):
 
     def __post_init__(self) -> None:
         names = [corner.name for corner in fields(self)]
-        corners = [real(self.word, getattr(self, name)) for name in names]
+        corners = [checked_number(self.word, getattr(self, name)) for name in names]
         order = " <= ".join(names)
         require((np.diff(corners) >= 0).all(), self.word, value=corners, allowed=order)
 
@@ -258,22 +259,19 @@ class _Nested(FuzzyNumber):
 
     def __post_init__(self) -> None:
         """Store levels and cuts as tuples of floats; refuse cuts that are not finite and nested."""
-        levels = rising(self.alpha)
-        low, high = (tuple(map(float, row)) for row in (self.lower, self.upper))
-        complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
-        alike = len(levels) == len(low) == len(high)
+        levels = checked_levels(self.alpha)
+        lower, upper = (tuple(map(float, ends)) for ends in (self.lower, self.upper))
+        is_complete = levels[0] == 0 and (levels[-1] == 1 or not self.to_one)
+        is_complete = is_complete and len(levels) == len(lower) == len(upper)
         allowed = f"levels that rise from 0 {'to' if self.to_one else 'up to'} 1, one for each end"
-        require(complete and alike, "alpha", value=(levels, len(low), len(high)), allowed=allowed)
-        ends = np.array([*low, *high[::-1]])
-        ordered = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
-        require(
-            ordered,
-            "cuts",
-            value=ends.tolist(),
-            allowed="finite ends, lower ones rising, upper falling",
-        )
-        for name, row in zip(("alpha", "lower", "upper"), (levels, low, high), strict=True):
-            object.__setattr__(self, name, row)
+        require(is_complete, "alpha", value=(levels, len(lower), len(upper)), allowed=allowed)
+        ends = np.array([*lower, *upper[::-1]])
+        are_nested = np.isfinite(ends).all() and (np.diff(ends) >= 0).all()
+        allowed = "finite ends, lower ones rising, upper falling"
+        require(are_nested, "cuts", value=ends.tolist(), allowed=allowed)
+        object.__setattr__(self, "alpha", levels)
+        object.__setattr__(self, "lower", lower)
+        object.__setattr__(self, "upper", upper)
 
 
 @dataclass(frozen=True)
@@ -322,21 +320,16 @@ class Stepwise(_Nested):
 
         Each cut is listed at its level and at the last floating-point number below the next level.
         """
-        ends = [*(np.nextafter(level, 0.0) for level in self.alpha[1:]), 1.0]
-        rows = [
-            (at, k)
-            for k, (start, end) in enumerate(zip(self.alpha, ends, strict=True))
-            for at in dict.fromkeys((start, float(end)))
-        ]
-        return Cuts(
-            tuple(at for at, _ in rows),
-            tuple(self.lower[k] for _, k in rows),
-            tuple(self.upper[k] for _, k in rows),
-        )
+        ends = [*(float(np.nextafter(level, 0.0)) for level in self.alpha[1:]), 1.0]
+        cuts = []
+        for start, end, lower, upper in zip(self.alpha, ends, self.lower, self.upper, strict=True):
+            cuts += [(level, lower, upper) for level in dict.fromkeys((start, end))]
+        alpha, lowers, uppers = zip(*cuts, strict=True)
+        return Cuts(alpha, lowers, uppers)
 
     def cut(self, alpha: float) -> Cut:
         """The cut that holds at `alpha` in [0, 1]."""
-        at = bisect_right(self.alpha, level(alpha)) - 1
+        at = bisect_right(self.alpha, checked_level(alpha)) - 1
         return Cut(self.lower[at], self.upper[at])
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from alphacut.fuzzy.arrays import Array, Mask
-from alphacut.fuzzy.refused import RefusedError, real, require
+from alphacut.fuzzy.refused import RefusedError, checked_number, require
 from alphacut.stochastic.particles.particles import Particles
 
 SMOOTHING = 1.5  # standard deviation, in pixels
@@ -47,7 +47,7 @@ class SectionImage:
     pixel: float
 
     def __post_init__(self) -> None:
-        real("image.pixel [m]", self.pixel, least=1e-12, most=1)
+        checked_number("image.pixel [m]", self.pixel, least=1e-12, most=1)
 
     def read(self) -> Particles:
         """The circles of the image file, y up from the lower edge."""

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from alphacut.fuzzy.arrays import Array, Mask, Rows
-from alphacut.fuzzy.refused import FailedError, real, require
+from alphacut.fuzzy.refused import FailedError, checked_number, require
 from alphacut.stochastic.particles.neighbour_search import balls, close_pairs, size_classes
 from alphacut.stochastic.particles.particles import DISCS, Particles, Shape, nearest_image
 from alphacut.stochastic.particles.radius_laws import RadiusLaw
@@ -48,7 +48,7 @@ class Packing:
 
     def __post_init__(self) -> None:
         key = f"packing.{self.shape.cells}_fraction"
-        real(key, self.fraction, positive=True, most=self.shape.densest)
+        checked_number(key, self.fraction, positive=True, most=self.shape.densest)
 
     def make(self, generator: np.random.Generator) -> Particles:
         """Return a random packing, in a square or cube that the particles fill to `fraction`.

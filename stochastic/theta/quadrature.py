@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from alphacut.fuzzy.arrays import Array
-from alphacut.fuzzy.refused import real, require
+from alphacut.fuzzy.refused import checked_number, require
 from alphacut.stochastic.theta.law import ThetaLaw
 
 MASS_GAP = 1e-8
@@ -94,7 +94,7 @@ def gauss_rule(distribution: ThetaLaw, *, points: int) -> ThetaRule:
         >>> rule.mean(rule.nodes**2).round(4).item()
         0.9733
     """
-    real("points", points, whole=True, least=1)
+    checked_number("points", points, whole=True, least=1)
     fine = _fine_rule(distribution, 16 + 2 * points)
     relevant = fine.weights > _NEGLIGIBLE
     at, weights = fine.nodes[relevant], fine.weights[relevant]

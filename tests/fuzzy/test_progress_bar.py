@@ -9,7 +9,7 @@ def test_a_line_every_ten_seconds_foretells_the_end(monkeypatch):
     now, text = [0.0], io.StringIO()
     monkeypatch.setattr(progress_bar, "monotonic", lambda: now[0])
     monkeypatch.setattr(progress_bar.sys, "stderr", text)
-    with progress_bar.showing(None) as tick:
+    with progress_bar.progress_reporter(None) as tick:
         for second in range(26):
             now[0] = float(second)
             tick(second / 50)
@@ -21,12 +21,12 @@ def test_little_work_foretells_no_end(monkeypatch):
     now, text = [0.0], io.StringIO()
     monkeypatch.setattr(progress_bar, "monotonic", lambda: now[0])
     monkeypatch.setattr(progress_bar.sys, "stderr", text)
-    with progress_bar.showing(None) as tick:
+    with progress_bar.progress_reporter(None) as tick:
         now[0] = 11.0
         tick(0.001)
     assert text.getvalue() == "  0% after 11 s\n"
 
 
 def test_nothing_is_shown_where_nothing_is_wanted():
-    with progress_bar.showing(False) as tick:
+    with progress_bar.progress_reporter(False) as tick:
         assert tick is None

@@ -7,7 +7,7 @@ from alphacut.entry import main
 from alphacut.frame import Accelerogram, MatrixStructure, Proof, StoreyFrame, envelope
 from alphacut.fuzzy import Crisp, FailedError, RefusedError, Triangular, propagate
 from alphacut.fuzzy.interval_quasi_monte_carlo import IntervalQuasiMonteCarlo
-from alphacut.fuzzy.refused import real
+from alphacut.fuzzy.refused import checked_number
 from alphacut.io.problem import InputProblem
 from tests.alphacut.small import FRAME, written
 
@@ -38,7 +38,7 @@ def test_an_integer_of_thousands_of_digits_is_one_line(tmp_path, capfd, digits):
     assert main(["check", str(written(tmp_path)), "--set", f"envelope.gain={digits}"]) == 2
     assert "envelope.gain" in capfd.readouterr().err
     with pytest.raises(RefusedError, match="thousands of digits"):
-        real("x", int(digits, 16))
+        checked_number("x", int(digits, 16))
 
 
 @pytest.mark.parametrize("head", ["time [s],acceleration [m/s^2]", "x [mm],y [mm],r [mm]"])

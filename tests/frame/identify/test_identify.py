@@ -14,7 +14,7 @@ from alphacut.fuzzy import FuzzyNumber, Interval, Triangular, from_data
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import FailedError
 from alphacut.fuzzy.result import Ends
-from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.sets.claimed import ClaimedNumber
 
 FRAME = StoreyFrame([20e3, 15e3, 10e3], [3.0, 2.8, 2.8], 30e9, 3e-4, q0=(0.01, 0.02, 0.03))
 NAMES = ("c1", "c2", "c3")
@@ -212,7 +212,7 @@ def test_claimed_priors_are_joined_with_the_measured_claims(rng: np.random.Gener
     assert "m3" in rule.names
     assert len(rule.names) == 1 + 2 * 3
     number = found.numbers["m3"]
-    assert isinstance(number, Claimed)
+    assert isinstance(number, ClaimedNumber)
     assert number.cut(0.05).width <= found.evidence.cut(weighed, 0.05).width + 1e-9
     with pytest.raises(ValueError, match="which the values decide"):
         number.cut(0.01)

@@ -99,7 +99,7 @@ def test_the_band_of_a_mean_is_between_hoeffding_and_the_law_of_large_numbers():
         low, high = from_data(data, "mean", bounds=(0, 1)).cut(alpha)
         assert max(0, data.mean() - reach) <= low + 1e-12
         assert high <= min(1, data.mean() + reach) + 1e-12
-        band = own._band(50)[np.searchsorted(own.LEVELS, alpha - 1e-12)]
+        band = own._band_half_width(50)[np.searchsorted(own.LEVELS, alpha - 1e-12)]
         assert 0.75 * reach < band <= reach
         assert band > np.sqrt(np.log(1 / alpha) / 100)  # one tail in place of two
 

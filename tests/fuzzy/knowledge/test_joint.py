@@ -15,7 +15,7 @@ from alphacut.fuzzy import (
     propagate,
 )
 from alphacut.fuzzy.knowledge.joint import JointClaim, joined_inputs
-from alphacut.fuzzy.sets.claimed import Claimed
+from alphacut.fuzzy.sets.claimed import ClaimedNumber
 from benchmarks.fuzzy.coverage import jointly_held
 
 BOUNDS = (0, 100)
@@ -68,7 +68,7 @@ def test_opinions_are_said_to_be_opinions():
 def test_a_result_hands_its_claim_on_in_steps():
     result = propagate(total, {"x": FIRST, "y": 2}, Signed(), alpha=[0, 0.25, 0.5, 1])
     number = result.number()
-    assert isinstance(number, Claimed)
+    assert isinstance(number, ClaimedNumber)
     assert number.cut(0.4) == number.cut(0.25) == tuple(end[1] for end in result.bounds())
     assert number.claim.about == "next value"
     assert "x: 19 values drawn alike and independently" in number.claim.conditions[0]

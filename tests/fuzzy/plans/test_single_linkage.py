@@ -16,7 +16,7 @@ from alphacut.fuzzy.plans.single_linkage import (
     SingleLinkage,
     critical_distance,
     linkage_starts,
-    uncovered_share,
+    uncovered_fraction,
 )
 from alphacut.fuzzy.sets.boxes import Domain
 from tests.calibration.functions import (
@@ -73,7 +73,7 @@ def test_no_hump_is_missed(name):
 def test_the_note_says_samples_optima_and_share():
     words = next(note for note in bounds_of("Schwefel").notes if note.startswith("W = ")).split()
     optima, samples, share = int(words[2]), int(words[8].strip(":")), float(words[13].strip("%"))
-    assert share == pytest.approx(100 * uncovered_share(samples, optima), abs=0.0005)
+    assert share == pytest.approx(100 * uncovered_fraction(samples, optima), abs=0.0005)
     assert share < 0.2
     assert samples >= 100
 
@@ -147,7 +147,7 @@ def test_critical_distance_and_share_are_those_of_the_papers():
         assert critical_distance(n, d, 0.25) == pytest.approx(
             critical_distance(n, d) / 4 ** (1 / d)
         )
-    assert uncovered_share(100, 3) == pytest.approx(12 / 9900)
+    assert uncovered_fraction(100, 3) == pytest.approx(12 / 9900)
 
 
 def test_descents_start_where_no_better_sample_is_near():
