@@ -24,7 +24,7 @@ class Goal:
 
     Args:
         scale: Units of the tolerances of each output, shape (m,).
-        peak: Peak of each output at the modal inputs and the probes, shape (m,).
+        peak: Peak of each output at the nominal inputs and the probes, shape (m,).
         needed: Bounds of (−output, output) that are asked for, shape (L, T, m, 2).
         outer: Bounds that are known, the same shape; infinite where none is.
         incumbent: Largest attained value of (−output, output), shape (L, m, 2).

@@ -224,7 +224,7 @@ class UnitFlow:
 
     @cached_property
     def peak(self) -> Array:
-        """Peak of each output at the modal parameters and the probes, shape (m,)."""
+        """Peak of each output at the nominal parameters and the probes, shape (m,)."""
         peak = np.abs(self.flow.values(self.boxes.probes)).max((0, 1))
         return np.where(peak > 0, peak, float(peak.max()) or 1.0)
 

@@ -281,7 +281,11 @@ class Queue:
             votes[refusal.along] += 1.0
 
     def _take(self, level: int, bounds: PartBounds) -> None:
-        """Take over what a part attains on a level, its errors, smallest peaks and facts."""
+        """Merge the bounds of a part of the box into those of a level.
+
+        Larger attained values replace others with their inputs; of errors the larger, of reached
+        smallest peaks the smaller stay; facts are added or their largest kept.
+        """
         better = bounds.inner > self.inner[level]
         self.inner[level][better], self.at[level][better] = bounds.inner[better], bounds.at[better]
         self.between = np.maximum(self.between, bounds.between)
@@ -435,10 +439,12 @@ def _peaks(above: Mask) -> list[tuple[int, int]]:
 
 
 def halvings(shares: Array, parts: int) -> float:
-    """Return how often each input can be halved by bisection into so many parts.
+    """Return the mean number of bisections of an input, weighted by its share of a gap.
+
+    The log2(parts) bisections are distributed in proportion to the shares; 1 if all are zero.
 
     Args:
-        shares: Fraction of each input in a gap, shape (n,); the others need no bisections.
+        shares: Fraction of each input in the gap, shape (n,), their sum 1.
         parts: Number of parts.
     """
     return float(np.log2(parts) * (shares**2).sum()) if shares.any() else 1.0

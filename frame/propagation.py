@@ -277,7 +277,7 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     """Refuse supports with values that are not allowed for their parameters.
 
     Raises:
-        RefusedError: A support is not finite, reaches what its parameter must not be, or is of
+        RefusedError: A support is not finite, leaves the range of its parameter, or is of
             another size than the structure's own value, as kN from N; or the weight may buckle a
             storey, the mass matrix of a linear structure is not positive definite at the modal
             parameters or a corner, or the structure stays at rest.
@@ -285,12 +285,18 @@ def require_admissible(system: LinearSystem | LagrangianSystem, cuts: Boxes) -> 
     for name, low, high in zip(cuts.names, cuts.lower[0], cuts.upper[0], strict=True):
         parameter, key, shown = system.parameter(name), f"support of {name}", f"[{low:g}, {high:g}]"
         require(parameter.admits(low, high), key, value=shown, allowed=parameter.range or "finite")
-        near = abs(system.parameters.get(name, 0.0))
+        nominal = abs(system.parameters.get(name, 0.0))
         sizes = abs(low), abs(high)
-        alike = near == 0 or (min(sizes) < OTHER_UNITS * near and OTHER_UNITS * max(sizes) > near)
-        allowed = f"values of the size of {near:g}, the structure's own"
+        is_same_unit = nominal == 0 or (
+            min(sizes) < OTHER_UNITS * nominal and OTHER_UNITS * max(sizes) > nominal
+        )
+        allowed = f"values of the size of {nominal:g}, the structure's own"
         require(
-            alike or not any(sizes), key, value=shown, allowed=allowed, cure="give both in SI units"
+            is_same_unit or not any(sizes),
+            key,
+            value=shown,
+            allowed=allowed,
+            cure="give both in SI units",
         )
     if isinstance(system, LagrangianSystem):
         return

@@ -8,7 +8,7 @@ import numpy as np
 
 from alphacut.case.limits import FragilitySection
 from alphacut.case.structure import Structure
-from alphacut.frame.questions.fragility import CriticalMeasures, any_limit
+from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
 from alphacut.frame.questions.peaks import ANY
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
@@ -46,7 +46,7 @@ class FragilityQuestion(Question):
         }
         natures = {name: Nature.weakest(x.nature([name]) for x in peaks) for name in limits}
         if len(limits) > 1:
-            critical[ANY] = any_limit(list(critical.values()))
+            critical[ANY] = of_any_limit(list(critical.values()))
             natures[ANY] = Nature.weakest(natures.values())
         return {
             "alpha": response.alpha,

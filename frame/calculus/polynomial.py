@@ -190,14 +190,14 @@ class LowerGrid:
 
     @cached_property
     def index(self) -> Index:
-        """Exponents of the terms, shape (S, d)."""
-        rows, total_degree = np.zeros((1, 0), np.int64), np.zeros(1, np.int64)
+        """Exponents e of the terms, shape (S, d): all with Σ max(e_i − degree_i, 0) ≤ excess."""
+        rows, used_excess = np.zeros((1, 0), np.int64), np.zeros(1, np.int64)
         for degree in self.degrees:
-            count = degree + 1 + self.excess - total_degree
+            count = degree + 1 + self.excess - used_excess
             which = np.repeat(np.arange(len(rows)), count)
-            degrees = np.concatenate([np.arange(most) for most in count])
-            rows = np.column_stack([rows[which], degrees])
-            total_degree = total_degree[which] + np.maximum(degrees - degree, 0)
+            exponents = np.concatenate([np.arange(n) for n in count])
+            rows = np.column_stack([rows[which], exponents])
+            used_excess = used_excess[which] + np.maximum(exponents - degree, 0)
         return rows
 
     @property

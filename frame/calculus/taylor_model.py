@@ -202,7 +202,7 @@ class TaylorModel:
         exact = TaylorModel(
             tuple(parts), self.remainder + b.remainder, self.inputs, max(self.order, b.order)
         )
-        return exact.rounded(1)
+        return exact.with_rounding(1)
 
     __radd__ = __add__
 
@@ -218,13 +218,13 @@ class TaylorModel:
         return -self + other
 
     def __mul__(self, other: TaylorModel | ArrayLike) -> TaylorModel:
+        """Product entry by entry; a constant scales the parts and the remainder."""
         if isinstance(other, TaylorModel):
             return _product(self, other, np.multiply)
         factor = _numbers(other)
         parts = tuple(_padded(part, factor.ndim) * factor for part in self.parts)
-        return TaylorModel(parts, self.remainder * np.abs(factor), self.inputs, self.order).rounded(
-            1
-        )
+        remainder = self.remainder * np.abs(factor)
+        return TaylorModel(parts, remainder, self.inputs, self.order).with_rounding(1)
 
     __rmul__ = __mul__
 
@@ -274,7 +274,7 @@ class TaylorModel:
         factor = _numbers(arrays)
         return self._linear(lambda x, y: np.asarray(np.tensordot(x, y, 1)), factor, len(factor))
 
-    def rounded(self, count: int) -> TaylorModel:
+    def with_rounding(self, count: int) -> TaylorModel:
         """The same after `count` roundings of coefficients and rest, whose sums did not cancel."""
         return self.loosened(
             gamma(count) * np.sum(self.sizes(), 0) + gamma(count + 3) * self.remainder

@@ -231,7 +231,12 @@ class Frontier:
             start = stop
 
     def children(self, code: Array) -> Frontier:
-        """Halves and faces of boxes with the items left open by the codes of `kernel.examine`."""
+        """Halves and faces of boxes with the items left open by the codes of `kernel.examine`.
+
+        Args:
+            code: Of each item (a box and a problem): 0 closed, 1 + i halve along axis i, `FACES`
+                and more confine to faces. A box is halved along the axis with most votes.
+        """
         d = self.position.shape[1]
         split, faced = np.flatnonzero((code > 0) & (code < FACES)), np.flatnonzero(code >= FACES)
         count, box = 2 * d + 3**d, self.box[split]

@@ -118,7 +118,8 @@ def certify(
 def _between(model: ModalModel) -> Array:
     """Bound of the interpolation error of outputs in the step to each node, shape (T, m).
 
-    It is h²/8 times a bound of the second time derivative, and h/4 times a kink where a load jumps.
+    It is h²/8 times a bound of the second time derivative, h/4 times a kink where a load jumps, and
+    of outputs on which a load acts directly that of its history. R is a mode's response to a load.
     """
     reach, h = np.ones(len(model.boxes.names)), model.flow.step
     rate, growth = suprema(model.eigenvalue, reach)[0], largest_growth(model.eigenvalue, reach)
@@ -150,14 +151,17 @@ def _between(model: ModalModel) -> Array:
 
 
 def _growth(model: ModalModel, margin: Array) -> Array:
-    """Bound of the growth of the model's error within the step to each node, shape (T, m).
+    """Bound of what the model's error inside the step to each node adds to its less end, (T, m).
+
+    An error that decays no faster than exp(g t) is inside the step at most exp(−g h) times its
+    value at the end.
 
     Args:
         model: The modal model.
         margin: Bound of its error at the nodes, shape (T, m).
     """
-    growth = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
-    swell = float(np.exp(np.maximum(-growth, 0.0).max() * model.flow.step))
+    exponent = largest_growth(model.eigenvalue, np.ones(len(model.boxes.names)))
+    swell = float(np.exp(np.maximum(-exponent, 0.0).max() * model.flow.step))
     more = np.zeros_like(margin)
     more[1:] = swell * np.maximum(margin[1:], margin[:-1]) - np.minimum(margin[1:], margin[:-1])
     return more

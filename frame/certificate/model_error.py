@@ -138,7 +138,18 @@ def _evaluate(model: ModalModel, unit: Array) -> tuple[Matrices, Jet]:
 def _start(
     system: LinearSystem, matrices: Matrices, part: MotionPart, q: Array, v: Array
 ) -> dict[str, Array]:
-    """What a part's start (S, N) misses: of displacements and velocities, or of their forces."""
+    """Residuals of the initial conditions of a part of the motion, by name, shape (S, N) each.
+
+    Of the free motion they are q − q₀ and v − v₀, or K q − f and M v − p where forces f and
+    impulses p give its start. That of a load's part is its response to a unit impulse of the load.
+
+    Args:
+        system: The structure.
+        matrices: Its matrices at S parameter sets.
+        part: The part.
+        q: Its displacements at t = 0, shape (S, N).
+        v: Its velocities.
+    """
     n = matrices.mass.value.shape[-1]
     if part.load is None:
         q, v = q - matrices.q0.value[..., 0], v - matrices.v0.value[..., 0]

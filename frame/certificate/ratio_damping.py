@@ -55,7 +55,10 @@ class LoewnerBounds:
         self.factor, self.lowest, self.highest = factor, 1 - spread, 1 + spread
 
     def least(self, base: LoewnerBounds) -> float:
-        """Lower bound over the box of the eigenvalues of A against another matrix B."""
+        """Lower bound over the box of the eigenvalues μ of A x = μ B x, B the matrix of `base`.
+
+        μ is at least lowest of A over highest of B times the least eigenvalue for A₀ and B₀.
+        """
         middle = float(
             np.linalg.eigvalsh(
                 np.linalg.solve(
@@ -66,7 +69,7 @@ class LoewnerBounds:
         return self.lowest / base.highest * middle
 
     def most(self, base: LoewnerBounds) -> float:
-        """Upper bound over the box of the eigenvalues of A against another matrix B."""
+        """Upper bound over the box of the eigenvalues μ of A x = μ B x, B the matrix of `base`."""
         between = np.linalg.solve(base.factor, self.factor)
         return self.highest / base.lowest * float(np.linalg.norm(between, 2)) ** 2
 
@@ -147,12 +150,15 @@ class RatioDamping:
 
     @cached_property
     def root_masses(self) -> Array:
-        """√m of the floor whose acceleration an output is, least over the box; else ∞, (m,)."""
+        """Root of the least floor mass over the box, of outputs that are its acceleration, (m,).
+
+        It is ∞ of other outputs.
+        """
         system, boxes = self.model.flow.system, self.model.boxes
         roots = np.full(len(self.model.outputs), np.inf)
         for row, floor in polynomial_dependence.accelerations(system).items():
-            name, fuzzy = f"m{floor + 1}", dict(zip(boxes.names, boxes.lower[0], strict=True))
-            roots[row] = np.sqrt(fuzzy.get(name, system.parameters[name]))
+            name, lower_ends = f"m{floor + 1}", dict(zip(boxes.names, boxes.lower[0], strict=True))
+            roots[row] = np.sqrt(lower_ends.get(name, system.parameters[name]))
         return roots
 
     def missed(

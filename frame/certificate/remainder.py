@@ -103,7 +103,10 @@ def parts(model: ModalModel, growth: Array) -> list[MotionPart]:
 
 
 def _forced_part(model: ModalModel, growth: Array, number: int) -> MotionPart:
-    """The part of a modal model that load `number` adds, R bounded by convolution with |a|.
+    """Part of a modal model's motion that is due to load `number`, a(t).
+
+    It has at the nodes bounds of the derivatives by λ of R = ∫ exp(λ (t − s)) a(s) ds, of orders 0
+    to 3, of ∫ |R| and of ∫ |a|, from convolutions of |a| with upper sums of τ^k exp(g τ).
 
     Args:
         model: The modal model.

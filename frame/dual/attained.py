@@ -155,8 +155,8 @@ class AttainedWaves:
     Args:
         value: e.
         error: Bound of its rounding.
-        slope: Bound of |de/dλ| at the modes.
-        slope_anywhere: The same at any λ between two modes.
+        slope: Bound of |de/dλ| at the modes, λ the squared undamped angular frequency.
+        slope_anywhere: The same at any λ, from bounds of ρ at any σ that does not grow.
     """
 
     value: Array
@@ -180,8 +180,8 @@ def _waves(
 
     Args:
         source: "load" (the ground), "velocity", "start" or the name of a force.
-        sigma: Exponents σ of the modes, shape (N, n), in 1/s.
-        sigma_slope: Bound of |dσ/dλ|, shape (N, n).
+        sigma: Exponents σ of the n modes at N points, shape (N, n), in 1/s.
+        sigma_slope: Bound of |dσ/dλ|, λ = |σ|² undamped, shape (N, n).
         order: Derivative of the motion that is read, shape (N,).
         rho: ρ(σ; t), its derivative by σ, and the rounding of ρ, each (N, n).
         rho_bounds: Bounds of |ρ| and |ρ′| at any σ that does not grow, shape (2, N).

@@ -118,7 +118,10 @@ Series = tuple[list[Array], list[Array], list[Array]]
 def subspace_series(
     block: Rows, degree: int, centre: CentredMatrices, lower: Series | None = None
 ) -> Series:
-    """Perturbation series of a block: Λ x_j − λ_j M₀ x_j = Σ_i L_ij e_i + what lower degrees add.
+    """Perturbation series of an invariant subspace K X = M X L, X the identity on the block.
+
+    In degree m, (Λ − λ_j M₀) x_j + M₀ Σ_i L_ij e_i is known from lower degrees, Λ and M₀ the
+    diagonals of K and M in the middle: the block's own rows give L, the others x_j.
 
     Args:
         block: Numbers of its modes.
@@ -132,7 +135,7 @@ def subspace_series(
     mass, stiffness, d = centre.mass, centre.stiffness, centre.mass.inputs
     middle = centre.squared[block]
     gaps = np.stack([centre.shifted_diagonal(x) for x in middle])
-    gaps[:, block] = np.inf
+    gaps[:, block] = np.inf  # no correction inside the block
     if lower is None:
         unit = np.eye(len(centre.basis))[block][None]
         lower = [np.diag(middle)[None]], [unit], [unit]

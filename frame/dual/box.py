@@ -81,19 +81,19 @@ class Box:
         allowed: Array | None = None,
         outputs: Rows | slice = slice(None),
     ) -> LevelModels:
-        """Models of the motion of `outputs` at `nodes`, both all unless given.
+        """Models over the box of the motion of `outputs` at `nodes`, both all unless given.
 
         `allowed` is the truncation error of each output that is allowed, (m,).
 
         Raises:
-            UnprovedError: None of its modes can be enclosed.
+            UnprovedError: No mode of the structure can be enclosed.
         """
         try:
             structure = with_outputs(self.structure, outputs)
-            moved, time = sources(self.system, structure), self.time[nodes]
-            return LevelModels.from_structure(structure, self.loads, time, moved, allowed)
+            source_names, time = sources(self.system, structure), self.time[nodes]
+            return LevelModels.from_structure(structure, self.loads, time, source_names, allowed)
         except UnprovedError as refusal:
-            if refusal.along is not None:
+            if refusal.along is not None:  # of the active inputs; made one of all
                 refusal.along = int(self.active[refusal.along])
             raise
 

@@ -50,17 +50,18 @@ class PeakCell:
 
 
 def least_peak(level: LevelModels, output: int) -> tuple[float, Array]:
-    """Lower bound of an output's smallest peak over a box, 0 or more, and inputs near it.
+    """Lower bound of an output's smallest peak over a box, by best-first bisection.
 
     Returns:
-        The bound, and the coordinates that the bound of the lowest cell names, shape (d,).
+        The bound, 0 or more, and coordinates that the dual bound of the lowest cell names, a guess
+        at those of the smallest peak, shape (d,).
     """
     sides = [OutputBounds.initial(level, output, s, 0.0) for s in (0, 1)]
     data = sides[0].data
     motion = np.einsum("ks,kstp->ktp", data.share, data.table)  # of each mode at its points
     motion = motion.reshape(*motion.shape[:2], -1, int(data.points[0]))  # along q, along ω
     cells = [_bounded(sides, motion, data.ends.astype(np.intp), 0, 0.0)]
-    for number in range(1, 2 * BISECTIONS, 2):
+    for number in range(1, 2 * BISECTIONS, 2):  # numbers of cells: two a bisection
         lowest = cells[0]
         halves = _halves(lowest, motion)
         if not halves:

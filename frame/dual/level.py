@@ -187,21 +187,21 @@ class LevelModels:
         workers: int,
         tick: Progress | None = None,
     ) -> tuple[Array, Array]:
-        """Upper bounds of (−output, output), shape (T, m, 2), and inputs that lead there.
+        """Upper bounds of (−output, output), shape (T, m, 2), and inputs of near values.
 
         A first pass at all nodes shows the peaks; a second one halves ranges where gaps are wide; a
         third one halves them further where bounds lie above the peak.
 
         Args:
-            enough: Gap of each output at which its bounds are left, shape (m,).
-            below: Gap that suffices far below the peak, as a share of how far.
-            slabs: Most slabs of a bound away from the peaks.
+            enough: Gap between bound and attained value of each output that suffices, shape (m,).
+            below: Further gap allowed, as a share of the bound's distance below the peak.
+            slabs: Most slabs (parts of a range) of a bound in the second pass.
             steps: Most evaluations of the dual function for each.
             workers: Threads.
-            tick: Takes the share done.
+            tick: Called with the completed fraction.
 
         Returns:
-            The bounds, and unit coordinates, shape (T, m, 2, d).
+            The bounds, and unit coordinates of the best inputs found, shape (T, m, 2, d).
         """
         problems = [
             OutputBounds.initial(self, o, s, float(enough[o]))

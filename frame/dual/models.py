@@ -98,29 +98,32 @@ class MotionModels:
         excitation: Excitation,
         allowed: Array | None,
     ) -> MotionModels:
-        """Models with a block added, as oscillators or, where that bounds it better, by its sums.
+        """Models with a block of close modes added.
+
+        A block of one mode is an oscillator. A larger one is an oscillator for each mode and a
+        bound of their coupling or, where that is narrower, truncated modes known by their sums.
 
         Args:
             structure: The structure.
             of_block: What the block takes from the sources and gives to the outputs.
             found: All enclosed blocks.
             excitation: The loads, the nodes and the names of the sources.
-            allowed: Truncation error of each output that is allowed, shape (m,); None for the size
+            allowed: Error of each output by which both are compared, shape (m,); None for the bound
                 of the coupling.
         """
         more = oscillators(structure, of_block, found)
         if len(more) == 1:
             return replace(self, oscillators=self.oscillators + more)
         coupling = coupling_of(structure, of_block, found)
-        added, strays = coupling.bounds(structure.order, excitation)
+        added, deviation = coupling.bounds(structure.order, excitation)
         ends = coupling.omega_range, coupling.quotient_range
         truncated = rest_of_block(structure, found, of_block, ends, excitation)
         scale = np.maximum(added.max(0) if allowed is None else allowed, 1e-300)
         if (truncated.width / scale).max() < (added.max(0) / scale).max():
             return replace(self, truncated=[*self.truncated, truncated])
-        added, strays = self.added + added, self.line_deviation + strays
+        added, deviation = self.added + added, self.line_deviation + deviation
         return replace(
-            self, oscillators=self.oscillators + more, added=added, line_deviation=strays
+            self, oscillators=self.oscillators + more, added=added, line_deviation=deviation
         )
 
 

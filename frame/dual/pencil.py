@@ -169,6 +169,7 @@ class Comparison:
         total: Array = np.sum(pencil.sizes[1:], axis=0)[np.ix_(o, o)]
         distance, above = np.abs(gaps[o]), gaps[o] > 0
         blocks = ((above, 1.0), (~above, -1.0))
+        # of ± T on the rows of either sign, scaled to 1 in the middle, the least eigenvalue
         least = 1 - max(pencil.loss(o[some], distance[some], sign) for some, sign in blocks)
         diagonal, off = distance - np.diag(total), total - np.diag(np.diag(total))
         inverse = np.asarray(np.linalg.inv(np.diag(diagonal) - off), float)

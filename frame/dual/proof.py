@@ -48,8 +48,8 @@ PEAK_SLABS, PEAK_STEPS = 240, 40
 DRIFT = 1e-6
 """Lowest frequency over the highest at which rounding of the stiffness may hide a drift."""
 NEAR = 1e-3
-"""Share of the box about the modal inputs over which modes are enclosed if any part of the box can
-be proved."""
+"""Share of the box about the nominal inputs over which modes are enclosed if any part of the box
+can be proved."""
 
 CORNERS = 3
 """Corners of the box that a descent to the smallest peak visits."""
@@ -227,12 +227,13 @@ class _Bounding:
         outputs = range(len(self.incumbent))
         with ThreadPoolExecutor(self.goal.workers) as pool:
             bounds, units = zip(*pool.map(partial(least_peak, self.level), outputs), strict=True)
-        return Ends(np.array(bounds), self._small_peaks(np.stack(units)))
+        return Ends(np.array(bounds), self._least_peak_bounds(np.stack(units)))
 
-    def _small_peaks(self, unit: Array) -> Array:
-        """A small peak that some motion does not exceed, of each output (m,), over corners.
+    def _least_peak_bounds(self, unit: Array) -> Array:
+        """Upper bound of each output's least peak over the box, shape (m,).
 
-        A descent by the peaks at the nodes chooses the motion; its steps are then included.
+        Steepest descent over corners, one coordinate at a time, by the peaks at the nodes; at the
+        corner that it finds the peak is bounded between nodes, too.
 
         Args:
             unit: Coordinates near each output's smallest peak, shape (m, d).

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from alphacut.frame.dual.level import LevelModels, OutputBounds
-from alphacut.frame.dual.slabs import sensitivities
+from alphacut.frame.dual.slabs import response_and_gradient
 from alphacut.fuzzy.arrays import Array, Rows
 
 ENDS = (0.25, 0.5)
@@ -101,7 +101,7 @@ def remainder(problem: OutputBounds, node: int) -> tuple[float, Array]:
     """
     data, d = problem.data, problem.data.linear.shape[1]
     slope = np.zeros(len(data.linear))
-    sensitivities(problem.at[node], node, problem.side, data, slope)
+    response_and_gradient(problem.at[node], node, problem.side, data, slope)
     upper = np.zeros((len(slope), d, d))
     upper[(slice(None), *np.triu_indices(d))] = np.abs(data.quadratic)
     size = (np.abs(data.linear) + upper.sum(1) + upper.sum(2)) ** 2

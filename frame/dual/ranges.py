@@ -129,27 +129,34 @@ class _Piece:
         return np.asarray(np.abs(self.table.grid.sigma) ** 2)
 
     def _sizes(self, source: str, order: int) -> tuple[Array, Array]:
-        """Bounds of |e| at nodes and in the step to each node, shape (T,) each."""
+        """Bounds of the response |e| of any oscillator at nodes and in the step to each, (T,) each.
+
+        Args:
+            source: Name of a load or force, "velocity" or "start".
+            order: Derivative of the motion that is read.
+        """
         q, (slow, fast) = self.quotient[1], self.omega
         largest = (fast * np.sqrt(1 + q**2)) ** order
         if source in self.loads:
             pushed, size = self.pushed[source], self.loads[source].extremes[0]
             before = np.append(pushed[:1], pushed[:-1]) + self.step * size
             direct = np.abs(feedthrough(source, self.loads, order, self.time))
-            more = size * bool(direct.any())
-            most = np.maximum(before, pushed) * largest / slow + more
+            direct_anywhere = size * bool(direct.any())
+            most = np.maximum(before, pushed) * largest / slow + direct_anywhere
             return pushed * largest / slow + direct, most
         factor = largest * (1 + q) if source == "start" else largest / slow
         return factor * self.fade, factor * np.append(self.fade[:1], self.fade[:-1])
 
 
 def _of_cells(value: Array, error: Array, factor: Array) -> tuple[Array, Array]:
-    """Least and greatest factor × value over all cells of a table, shape (T,) each.
+    """Lower and upper bound of factor × value over a table, shape (T,) each.
+
+    They are taken over strips between neighbouring ω, each over all Q.
 
     Args:
         value: Values at the points, shape (T, Q, W).
         error: What bilinear interpolation misses, shape (T,).
-        factor: Positive factors, monotone along both axes, at the points, shape (Q, W).
+        factor: Positive factors, monotone along Q and rising along W, at the points, shape (Q, W).
     """
     low, high = value.min(1) - error[:, None], value.max(1) + error[:, None]  # (T, W)
     low, high = np.minimum(low[:, 1:], low[:, :-1]), np.maximum(high[:, 1:], high[:, :-1])

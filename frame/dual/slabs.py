@@ -67,7 +67,7 @@ def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> floa
     """Side × the output's model at inputs u, without its constants; `gradient` (L,) is written."""
     bilinear, weight = np.empty(data.quadratic.shape[1]), np.zeros(len(data.linear))
     products(u, bilinear)
-    total = sensitivities(u, node, side, data, weight)
+    total = response_and_gradient(u, node, side, data, weight)
     gradient[:] = 0.0
     bend = np.zeros(len(bilinear))
     for a in range(len(weight)):
@@ -88,10 +88,10 @@ def model(u: Array, node: int, side: float, data: Data, gradient: Array) -> floa
 
 
 @loops
-def sensitivities(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
-    """Sum of the modes' responses, side × output, in the model at inputs u.
+def response_and_gradient(u: Array, node: int, side: float, data: Data, weight: Array) -> float:
+    """Sum of the modes' responses, side × output, in the model at inputs u; side is −1 or 1.
 
-    `weight` (Z,) is written: the sum's derivatives by all scaled intervening variables.
+    `weight` (Z,) is written: its gradient by all scaled intervening variables.
     """
     bilinear, z = np.empty(data.quadratic.shape[1]), np.empty(len(data.linear))
     products(u, bilinear)
@@ -209,15 +209,17 @@ def climb(u: Array, node: int, side: float, data: Data, value: float, slope: Arr
 def bounds(
     nodes: Rows, side: float, effort: Effort, constant: Array, data: Data, out: Array, at: Array
 ) -> None:
-    """Write bounds at rising nodes, each begun with the multipliers and inputs of the one before.
+    """Write upper bounds of side × output at rising nodes.
+
+    Each node begins with the multipliers and inputs of the node before.
 
     Args:
         nodes: Nodes, shape (J,).
-        side: +1 or −1.
+        side: +1 for upper bounds of the output, −1 for lower ones.
         effort: Effort for each node.
-        constant: What the motion has besides the model, and what a bound has besides, (2, T).
+        constant: Added to the model's value for the motion's, and to both for the bound, (2, T).
         data: Models and tables of the output.
-        out: Written: bounds and the model's values, shape (2, J).
+        out: Written: bounds of side × output and the model's values of it, shape (2, J).
         at: Written: inputs of the model's values, shape (J, L).
     """
     modes, most, Z = len(data.share), effort.slabs, len(data.linear)
@@ -251,7 +253,7 @@ def refine(
         node: Node.
         side: +1 or −1.
         effort: When to stop.
-        constant: What the motion has besides the model, and what a bound has besides, shape (2,).
+        constant: Added to the model's value for the motion's, and to both for the bound, (2,).
         data: Models and tables of the output.
         slabs: Scratch; its first `effort.slabs` entries are written.
         mu: Multipliers to begin with; written: those of the undivided ranges, shape (Z,).
@@ -290,8 +292,8 @@ def target_value(model_value: float, least_gap: float, effort: Effort, constant:
     Args:
         model_value: Largest value of the model found at the node.
         least_gap: Least gap worth any effort.
-        effort: Gaps that suffice.
-        constant: What the motion has besides the model, and what a bound has besides, shape (2,).
+        effort: The wanted gap, and what a node below the peak may have more.
+        constant: Added to the model's value for the motion's, and to both for the bound, (2,).
     """
     below_peak = max(0.0, effort.incumbent - model_value - constant[0])
     gap = max(effort.wanted_gap, least_gap) + effort.slack_below_peak * below_peak

@@ -68,7 +68,7 @@ class Grid:
 def spanned(
     omega: tuple[float, float], quotient: tuple[float, float], points: tuple[int, int]
 ) -> Grid:
-    """Grid of `points` equally spaced values over the ranges of ω and of g/ω."""
+    """Grid of `points` equally spaced values over the ranges of ω and γ/ω, widened if empty."""
     q = quotient if quotient[1] > quotient[0] else (quotient[0], quotient[0] + 1e-12)
     w = omega if omega[1] > omega[0] * (1 + 1e-12) else (omega[0], omega[0] * (1 + 1e-9))
     return Grid(
@@ -154,10 +154,15 @@ class Oscillators:
         return np.asarray((h**2 * along + k**2 * across) / 8), np.stack([zero, first])
 
     def _line_deviation(self, size: Array, source: str, order: int) -> Array:
-        """Bounds of how far responses stray from straight lines in the step to each node, (T,).
+        """Bounds of how far responses e stray from straight lines in the step to each node, (T,).
 
-        It is h²/8 sup |ë|; ρ̇ = σ ρ + a, so that under a load ë has a and its slope besides; where
-        the record ends on another value than zero, e has a kink.
+        A chord errs by at most h²/8 sup |ë|. Under a load a(t), ρ̇ = σ ρ + a and ρ̈ = σ² ρ + σ a + ȧ;
+        where a jumps, ρ̇ does, which adds h/4 of the jump.
+
+        Args:
+            size: Bound of |σ^order ρ| at the nodes, shape (T,).
+            source: Name of a load or force, "velocity" or "start".
+            order: Derivative of the motion that is read.
         """
         g, h = self.grid, np.diff(self.time, prepend=self.time[0])
         low, fast = g.omega[0], float(np.abs(g.sigma).max())

@@ -160,7 +160,7 @@ class Flow(ABC):
 
     def _named(self, point: Array) -> str:
         pairs = zip(self.names, point, strict=True)
-        return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the modal parameters"
+        return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the nominal parameters"
 
     @abstractmethod
     def _march(self, points: Array, *, derivatives: bool) -> Jet:

@@ -343,10 +343,15 @@ class _Chains:
         return amplitudes
 
     def require_frequency(self, cut: ModeCut) -> None:
-        """Add two inequalities by the Rayleigh quotient of the mode shape at the middle of the box.
+        """Add two linear inequalities that hold where an eigenvalue λ lies within a measured cut.
 
-        Its distance from the eigenvalue is bounded by the residual (Kato and Temple). Nothing is
-        added if the bounds of the neighbouring eigenvalues overlap it.
+        They are low − e₁ ≤ xᵀK x / xᵀM x ≤ high + e₂ in stiffnesses and masses, x the mode shape at
+        the middle of the box. e₁ and e₂ bound the distance of quotient and eigenvalue by the
+        residual (Kato and Temple). Nothing is added if bounds of the neighbouring eigenvalues
+        overlap the quotient.
+
+        Args:
+            cut: The mode, with the ends of λ in 1/s².
         """
         chain, low, high, k = self.chain, self.low, self.high, cut.mode - 1
         below = self.most[k - 1] if k else -np.inf
@@ -368,10 +373,10 @@ class _Chains:
         residual = shears + np.append(shears[1:], 0.0) + value * half[1] * force
         residual += 1e-12 * value * force + 1e-13 * np.abs(chain.stiffness).max()
         size = residual**2 @ (1 / (chain.mass * low[1])) / (inertia @ low[1])
-        over = size / (quotient[0] - below) if k else 0.0
-        under = size / (above - quotient[1])
+        quotient_below = size / (quotient[0] - below) if k else 0.0
+        quotient_above = size / (above - quotient[1])
         unit = float(inertia.sum() * value)
-        for end, sign in ((cut.low - over, -1.0), (cut.high + under, 1.0)):
+        for end, sign in ((cut.low - quotient_below, -1.0), (cut.high + quotient_above, 1.0)):
             row: Linear = {}
             for z in range(len(self.mass)):
                 row = total(row, self.stiffness[z], sign * float(strain[z]) / unit)

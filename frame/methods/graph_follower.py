@@ -149,10 +149,13 @@ class GraphFollower:
     def _new(
         self, out: Followed, level: int, node: int, predicted: Array, target: Array
     ) -> list[Array]:
-        """Return the unit coordinates (d,) of the graphs to compute at a node.
+        """Return the inputs whose trajectories (graphs) are to be computed for bounds at a node.
+
+        They are those, in unit coordinates (d,), at which a bound is predicted to gain more than
+        the tolerance. The numbers that the storage will give them are written to `out.new`.
 
         Args:
-            out: Bounds and graphs so far; `new` is set.
+            out: Bounds and trajectories so far.
             level: Row of the level.
             node: Index of the node.
             predicted: Values that Taylor models predict, shape (T, m, 2).

@@ -187,7 +187,7 @@ class Search:
             box = (*flow.boxes.unit(level), least_gain)
             tick = subprogress(progress, done / levels, (done + 1) / levels)
             optima = first_optima(exact.model, *box, nodes=nodes)
-            _evaluate(exact, optima, box, tick)
+            _evaluate_and_refine(exact, optima, box, tick)
             rows = np.arange(len(optima.value))
             if solved:
                 optima.offer(exact, solved[-1].point, rows)
@@ -305,7 +305,7 @@ class _IndependentSearch:
         rivals += [best_of(pool, values, nodes, few, rng) for few in FEW]
         improved = np.zeros(len(optima.value), bool)
         for number, rival in enumerate(rivals):
-            _evaluate(
+            _evaluate_and_refine(
                 self.response, rival, self.box, subprogress(tick, number / 6, (number + 1) / 6)
             )
             better = optima.offer(self.response, rival.point, self.grid[nodes].ravel())
@@ -328,7 +328,7 @@ class _IndependentSearch:
             fresh[better] = True
 
 
-def _evaluate(
+def _evaluate_and_refine(
     response: Response, optima: Optima, box: tuple[Array, Array, float], tick: Progress
 ) -> None:
     """Evaluate a response at the points of optima and refine them, in place, on it.
@@ -352,17 +352,19 @@ def _compared(
     box: tuple[Array, Array, float],
     tick: Progress,
 ) -> tuple[Optima, Array]:
-    """Return the better of two sets of N optima, and the differences of their values (N,).
+    """Return the better optimum of each of N pairs, and the distance of their values (N,).
+
+    The second ones are evaluated and refined by the response of which the first are.
 
     Args:
-        response: Response whose values count; the first optima are its own.
-        first: Optima of one search.
-        second: Optima of the other one.
+        response: Response whose values count.
+        first: Its optima by one search.
+        second: Optima of the other search.
         box: Lower and upper ends, and the gain below which Newton's method stops.
         tick: Called with the completed fraction.
     """
     improved = copy.deepcopy(second)
-    _evaluate(response, improved, box, tick)
+    _evaluate_and_refine(response, improved, box, tick)
     better = improved.value > first.value
     best = replace(
         first,
@@ -394,15 +396,18 @@ def _polynomials(response: Response) -> ModalModel:
 
 
 def _exchanged(response: Response, optima: Optima, grid: Rows, fresh: Mask, tick: Progress) -> Rows:
-    """Try the points of bounds under the mask at nodes up to 16 away; return improved rows.
+    """Try the optimal points of some bounds for the same bounds at nodes up to 16 steps away.
 
     An envelope consists of segments of single motions, so that neighbours have points in common.
+
+    Returns:
+        Rising indices of the bounds that improved.
 
     Args:
         response: Exact motions or polynomials.
         optima: Optima of all N bounds, improved in place.
-        grid: Rows of the optima by node, shape (T, 2 m).
-        fresh: Bounds whose points are tried elsewhere, shape (N,).
+        grid: Indices of each node's bounds among the N, shape (T, 2 m).
+        fresh: Mask of the bounds whose points are tried elsewhere, shape (N,).
         tick: Called with the completed fraction.
     """
     better = []

@@ -139,17 +139,19 @@ class CriticalMeasures:
         return Ends(np.where(finite, np.maximum(spread - reach, 0.0), 0.0), spread + reach)
 
 
-def any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
+def of_any_limit(limits: Sequence[CriticalMeasures]) -> CriticalMeasures:
     """Return the critical measures of the event that any of several limits is exceeded.
 
-    That of a structure is the least of its own. Different structures may reach the limits, so that
-    `high_reached` is no more than `low_reached`.
+    That of a structure is the least over its limits. The greatest one of single limits may belong
+    to different structures, so that no greater one than `low_reached` is known to be reached.
     """
     low, reached, high = (
         np.min([getattr(x, name) for x in limits], axis=0)
         for name in ("low", "low_reached", "high")
     )
-    return CriticalMeasures(low, reached, reached, np.maximum(high, reached))
+    return CriticalMeasures(
+        low=low, low_reached=reached, high_reached=reached, high=np.maximum(high, reached)
+    )
 
 
 def _counts(critical: Array, measure: Array) -> Array:

@@ -109,12 +109,15 @@ class Peaks:
 
 
 def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
-    """Return the fuzzy peaks of an envelope's outputs.
+    """Return the fuzzy peaks of an envelope's outputs: intervals of the peak over time by level.
 
     Args:
         envelope: The envelope.
         names: Outputs, for the peaks of their magnitudes, or "max q3", "min q3"; all outputs if
             empty.
+
+    Returns:
+        Bounds of the greatest and least peak in each cut, their error, and peaks that are reached.
     """
     names = tuple(names) or tuple(map(str, envelope.outputs))
     columns = [list(map(str, envelope.outputs)).index(output_of(name)) for name in names]
@@ -122,7 +125,7 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
         (envelope.natures or (envelope.nature,) * len(envelope.outputs))[k] for k in columns
     )
     proved = np.array([nature is Nature.GUARANTEED for nature in natures])
-    error = np.where(proved, 0.0, envelope.error[..., columns])  # of proved bounds it is in them
+    error = np.where(proved, 0.0, envelope.error[..., columns])  # which proved bounds contain
     between = None if envelope.between is None else envelope.between[:, columns]
     most, least = _sided(Ends(envelope.lower, envelope.upper), names, columns)  # (A, T, m)
     attained, _ = _sided(envelope.attained, names, columns)
@@ -142,15 +145,15 @@ def peaks(envelope: Envelope, names: Sequence[str] = ()) -> Peaks:
     if envelope.least_peaks is not None:
         least_reached = envelope.least_peaks.upper
     return Peaks(
-        np.asarray(envelope.alpha),
-        names,
-        lower,
-        upper,
-        np.where(proved, 0.0, np.maximum(above, below)),
-        np.maximum(reached, floor),
-        least_proved,
-        np.where(signed, np.inf, least_reached[:, columns]),
-        natures,
+        alpha=np.asarray(envelope.alpha),
+        outputs=names,
+        lower=lower,
+        upper=upper,
+        error=np.where(proved, 0.0, np.maximum(above, below)),
+        reached=np.maximum(reached, floor),
+        least_proved=least_proved,
+        least_reached=np.where(signed, np.inf, least_reached[:, columns]),
+        natures=natures,
     )
 
 
@@ -204,7 +207,11 @@ def _column(peaks: Peaks, output: str) -> Peaks:
 
 
 def _tightest_column(first: Peaks, second: Peaks, output: str) -> Peaks:
-    """Return the better of two sets of peaks of one output."""
+    """Return the peaks of one output by both of two sets.
+
+    Guaranteed bounds are intersected and attained ones united; else those of the smaller error or
+    of the stronger nature are returned. What either reaches is kept.
+    """
     columns = [_column(x, output) for x in (first, second) if output in x.outputs]
     if len(columns) == 1:
         return columns[0]
@@ -242,10 +249,11 @@ def within_steps(size: Array, between: Array | None) -> Array:
 
 
 def require_limits(limits: Mapping[str, float], outputs: Sequence[str]) -> None:
-    """Refuse an empty set of limits, limits that are not positive, and unknown outputs.
+    """Refuse an empty set of limits, unknown outputs, and limits of magnitudes not above 0.
 
     Raises:
-        RefusedError: There is no limit, one is not positive, or it names no output.
+        RefusedError: There is no limit, one names no output, or one of a magnitude is not positive;
+            those of "max q3" and "min q3" may have any sign.
     """
     require(bool(limits), "limits", value=None, allowed="one limit or more, as {'q3': 0.1}")
     for name, limit in limits.items():

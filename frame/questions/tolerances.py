@@ -1,6 +1,6 @@
 """Tolerances: the largest scale of all supports at which no limit is exceeded.
 
-Supports are scaled about their modal values. The scale is halved between one whose envelope
+Supports are scaled about their nominal values. The scale is halved between one whose envelope
 excludes that a limit is exceeded and one whose envelope does not. Where these bounds leave a doubt,
 it is halved once more, between a scale at which no motion tried exceeds a limit and one at which a
 motion does. Each step is one call of `envelope` on the support alone, and as sure as its nature.
@@ -28,7 +28,7 @@ from alphacut.fuzzy.result import Nature
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Scales of the supports about the modal values; 1 for those of the inputs.
+    """Scales of the supports about the nominal values; 1 for those of the inputs.
 
     Args:
         admissible: Largest scale tried at which exceeding a limit is excluded; None where it is at
@@ -50,7 +50,7 @@ class Tolerances:
 
 
 def scaled(inputs: Mapping[str, FuzzyNumber], scale: float) -> dict[str, FuzzyNumber]:
-    """Return intervals: supports scaled about their modal values; crisp ones at scale 0."""
+    """Return intervals: supports scaled about their nominal values; crisp ones at scale 0."""
     middles = {name: (number.modal, number.support) for name, number in inputs.items()}
     return {
         name: Interval(modal - scale * (modal - low), modal + scale * (high - modal))

@@ -70,7 +70,9 @@ class Walk(NamedTuple):
 
 
 def walk(history: History, time: Array) -> Walk:
-    """Samples of a load, without its sine, up to the last of the nodes, with the nodes' places.
+    """Straight pieces of a load up to the last node, and for each node its piece and place in it.
+
+    A sine by which the load is multiplied is left out.
 
     Args:
         history: The load.
@@ -254,7 +256,7 @@ def _walk_to_all(sigma: Array, walk: Walk, orders: Orders, out: Array, error: Ar
     """Walks each σ (S,) to all nodes and writes `out` (derivatives, T, S) and `error` (T, S)."""
     for s in prange(len(sigma)):
         nodes = walk.interval, walk.phase, walk.time_rounding
-        parts = _parts(sigma[s], walk.phases)
+        parts = _phase_factors(sigma[s], walk.phases)
         _walk_along(sigma[s], walk, orders, nodes, parts, (0, 0j), out[:, :, s], error[:, s])
 
 
@@ -267,7 +269,7 @@ def _walk_to_given(
         here, phase = slice(node[s], node[s] + 1), walk.phase[node[s]]
         nodes = walk.interval[here], np.zeros(1, np.int64), walk.time_rounding[here]
         for k in range(sigma.shape[1]):
-            parts = _parts(sigma[s, k], walk.phases[phase : phase + 1])
+            parts = _phase_factors(sigma[s, k], walk.phases[phase : phase + 1])
             end = out[:, s : s + 1, k], error[s : s + 1, k]
             _walk_along(sigma[s, k], walk, orders, nodes, parts, (0, 0j), *end)
 
@@ -279,7 +281,7 @@ def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
     The state at the sample before a beginning is chosen so that it is at rest there.
     """
     for s in prange(len(sigma)):
-        parts, error = _parts(sigma[s], walk.phases), np.empty(length)
+        parts, error = _phase_factors(sigma[s], walk.phases), np.empty(length)
         for first in range(0, len(walk.interval) - 1, length):
             inside = slice(first + 1, min(first + length + 1, len(walk.interval)))
             begin, x, P = walk.interval[first], parts[0][walk.phase[first]], parts[2]
@@ -292,24 +294,24 @@ def _walk_in_windows(sigma: Array, walk: Walk, length: int, out: Array) -> None:
 
 
 @njit(cache=True)
-def _parts(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
-    """What a walk takes of the time to a node within an interval, for all phases (P,).
+def _phase_factors(sigma: complex, phases: Array) -> tuple[Array, Array, Array, Array]:
+    """Factors that carry ρ from the beginning of an interval to each time x in it, `phases` (P,).
 
     Returns:
-        The phases; exp(σ x), (P,); J_n, (P, 4); rounding, as shares of ρ and of a, and |exp(σ x)|,
-        (P, 3).
+        The times; exp(σ x), (P,); J_n = ∫₀ˣ τⁿ exp(σ τ) dτ, n = 0 … 3, (P, 4); rounding relative
+        to |ρ|, rounding relative to |a|, and |exp(σ x)|, (P, 3).
     """
-    turns: Array = np.empty(len(phases), np.complex128)
-    parts: Array = np.empty((len(phases), 4), np.complex128)
+    factors: Array = np.empty(len(phases), np.complex128)
+    integrals: Array = np.empty((len(phases), 4), np.complex128)
     rounding: Array = np.empty((len(phases), 3))
     rate = abs(sigma.real) + abs(sigma.imag)
     for j in range(len(phases)):
         x = phases[j]
-        turns[j] = np.exp(sigma * x)
-        step_integrals(sigma, x, parts[j])
+        factors[j] = np.exp(sigma * x)
+        step_integrals(sigma, x, integrals[j])
         rounding[j, 0] = UNIT_ROUNDOFF * (ERROR_OF_TURN + rate * x)
-        rounding[j, 1], rounding[j, 2] = error_of_integrals(sigma, x), abs(turns[j])
-    return phases, turns, parts, rounding
+        rounding[j, 1], rounding[j, 2] = error_of_integrals(sigma, x), abs(factors[j])
+    return phases, factors, integrals, rounding
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ def modal_energy_shares(system: MatrixStructure, terms: Sequence[int] | Rows) ->
     """Σ φᵀK_i φ / φᵀK φ over some terms of the stiffness, by rising frequency, shape (modes,).
 
     The loss factor of a mode is to first order the mean of those of its parts by these shares
-    (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at modal values.
+    (Johnson and Kienholz, AIAA Journal 20, 1284, 1982), with modes at nominal values.
 
     Args:
         system: The structure.

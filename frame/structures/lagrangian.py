@@ -29,7 +29,7 @@ class LagrangianSystem:
 
     Args:
         coordinates: Number of coordinates n.
-        parameters: All parameters with their modal values, in SI units.
+        parameters: All parameters with their nominal values, in SI units.
         lagrangian: L(q, v, p), with q and v sequences of n and p a mapping from names.
         initial: The initial state (q0, v0) from p, n numbers each.
         observed: Outputs by name, each a function of (q, v, p); `Output` names give a unit.
@@ -143,7 +143,17 @@ class Equations:
 def _expressions(
     name: str, values: Callable[[], Any], parameters: Named, count: int = 1
 ) -> list[Expr]:
-    """Expressions of SymPy with two derivatives, `count` of them, that a function gives."""
+    """The `count` SymPy expressions that a user's function returns.
+
+    Args:
+        name: Name of the function for messages.
+        values: The function, its arguments bound.
+        parameters: Parameters that it may take.
+        count: Number of expressions.
+
+    Raises:
+        RefusedError: The function fails, or returns another number or kind of values.
+    """
     import sympy
 
     allowed = f"functions of {', '.join(parameters)} and the coordinates by {SMOOTH}"

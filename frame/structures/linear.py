@@ -30,7 +30,7 @@ class LinearSystem(Protocol):
 
     @property
     def parameters(self) -> Mapping[str, float]:
-        """All parameters with their modal values, in SI units."""
+        """All parameters with their nominal values, in SI units."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -76,7 +76,7 @@ def evaluate(
     bent: bool = True,
     by_ratios: bool = True,
 ) -> tuple[Matrices, Jet]:
-    """Matrices and observation rows at parameter sets; others keep modal values.
+    """Matrices and observation rows at parameter sets; others keep nominal values.
 
     Args:
         system: The structure.
@@ -145,7 +145,7 @@ def round_off(largest: float, slowest: float, time: Array) -> Array:
 
 
 def frequencies(system: LinearSystem) -> Array:
-    """Undamped angular frequencies at the modal parameters, rising, shape (n,), in rad/s."""
+    """Undamped angular frequencies at the nominal parameters, rising, shape (n,), in rad/s."""
     from scipy.linalg import eigh
 
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)
@@ -154,7 +154,7 @@ def frequencies(system: LinearSystem) -> Array:
 
 
 def modal_damping_ratios(system: LinearSystem) -> tuple[Array, Array]:
-    """Undamped frequencies in rad/s and φᵀDφ/(2ω) of each mode at the modal parameters, (n,)."""
+    """Undamped ω in rad/s and damping ratios φᵀDφ/(2ω) at the nominal parameters, (n,) each."""
     from scipy.linalg import eigh
 
     matrices, _ = evaluate(system, (), np.zeros((1, 0)), derivatives=False)

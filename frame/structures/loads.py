@@ -172,8 +172,8 @@ class Force:
     Args:
         at: Floor of a storey frame, from 1; or of a structure from matrices a row over its
             unknowns, shape (n,).
-        amplitude: In N, of a storey frame the modal value of its parameter "F" and the floor; of a
-            structure from matrices a number, the name of a parameter or a function of them.
+        amplitude: In N, of a storey frame the nominal value of its parameter "F" and the floor; of
+            a structure from matrices a number, the name of a parameter or a function of them.
         history: f; None for an impulse at t = 0, whose amplitude is in N s ("J" and the floor).
 
     Example:

@@ -30,7 +30,7 @@ class MatrixStructure:
     q_b = −K_bb⁻¹ K_ba q_a, and are condensed (Guyan 1965); outputs may read them.
 
     Args:
-        parameters: All parameters with their modal values, in SI units.
+        parameters: All parameters with their nominal values, in SI units.
         mass: Pairs (factor, symmetric array (n, n)), in kg; an array may be sparse, as those that
             `scipy.io.mmread` reads.
         stiffness: The same, in N/m.

@@ -59,40 +59,43 @@ def joined(parts: Sequence[Modes]) -> Modes:
 
 
 def modes(matrices: Matrices, rows: Jet, pushes: Jet, chosen: Array | None = None) -> Modes:
-    """Eigen-analyses at S parameter sets.
+    """Eigenvalues and amplitudes of the modes at S parameter sets.
 
     Args:
         matrices: The structure.
         rows: Observation rows, V = (S, m, 2n).
         pushes: Accelerations by a unit of each load, V = (S, n, L).
-        chosen: Indices of the modes, among those that oscillate, by rising |λ|; all modes
-            when None.
+        chosen: Indices of k modes by rising |λ|; all modes when None.
+
+    Returns:
+        Eigenvalues λ, one of each conjugate pair, V = (S, k), and amplitudes of exp(λ t) in each
+        output by the start and by a unit impulse of each load, V = (S, k, m).
 
     Raises:
         ModalError: A chosen mode does not oscillate (overdamped or free to drift).
     """
     values, X, Y = eigenvectors(state_matrix(matrices))
-    some = np.arange(values.value.shape[-1] // 2) if chosen is None else chosen
-    values = values[..., some]
+    kept = np.arange(values.value.shape[-1] // 2) if chosen is None else chosen
+    values = values[..., kept]
     if not oscillating(values.value).all():
         raise ModalError(
             "a mode does not oscillate: modal intervening variables need damping below critical in"
             " every mode; use graph-follower"
         )
-    seen = rows @ X[..., some]  # V = (S, m, n)
+    observed_shapes = rows @ X[..., kept]  # V = (S, m, k)
 
-    def through(excitation: Jet) -> Jet:
-        share = (Y @ excitation)[..., some, 0][..., None, :]
-        return (seen * share).map(lambda x: x.swapaxes(-1, -2))
+    def amplitudes(excitation: Jet) -> Jet:
+        participation = (Y @ excitation)[..., kept, 0][..., None, :]
+        return (observed_shapes * participation).map(lambda x: x.swapaxes(-1, -2))
 
     states = concatenate([pushes * 0.0, pushes], -2)
     columns = range(pushes.value.shape[-1])
-    loads = tuple(through(states[..., i : i + 1]) for i in columns)
-    return Modes(values, through(matrices.start), loads)
+    loads = tuple(amplitudes(states[..., i : i + 1]) for i in columns)
+    return Modes(values, amplitudes(matrices.start), loads)
 
 
 def require_single(matrices: Matrices, chosen: Array) -> None:
-    """Refuse modes of equal frequency at all S parameter sets.
+    """Refuse a chosen mode that has the eigenvalue of another one at each of S parameter sets.
 
     Args:
         matrices: The structure.
@@ -101,17 +104,17 @@ def require_single(matrices: Matrices, chosen: Array) -> None:
     Raises:
         ModalError: There is such a pair.
     """
-    rate = eigenvectors(state_matrix(matrices))[0].value
-    size = rate.shape[-1] // 2
-    gaps = np.abs(rate[:, :size, None] - rate[:, None, :size]) / np.maximum(
-        np.abs(rate[:, :size, None]), 1e-300
+    eigenvalue = eigenvectors(state_matrix(matrices))[0].value
+    size = eigenvalue.shape[-1] // 2
+    gaps = np.abs(eigenvalue[:, :size, None] - eigenvalue[:, None, :size]) / np.maximum(
+        np.abs(eigenvalue[:, :size, None]), 1e-300
     )
     for first, second in np.argwhere((gaps < DOUBLE).all(0)):
         if first < second and np.isin([first, second], chosen).any():
             raise ModalError(
                 f"modal: modes {first + 1} and {second + 1} have the same frequency,"
-                f" {np.abs(rate[0, first]):.4g} rad/s, and so no smooth shapes; take the method"
-                " auto or improved-graph-follower"
+                f" {np.abs(eigenvalue[0, first]):.4g} rad/s, and so no smooth shapes; take the"
+                " method auto or improved-graph-follower"
             )
 
 
@@ -155,7 +158,7 @@ def eigenvectors(A: Jet) -> tuple[Jet, Jet, Jet]:
 def modal_damping(mass: Jet, stiffness: Jet, ratios: Sequence[Jet]) -> Jet:
     """D = M Φ diag(2 ζ_k ω_k) Φ⁻¹ at S parameter sets, V = (S, n, n), in N s/m.
 
-    It follows the parameters through the modes, and is not frozen at their modal values.
+    It follows the parameters through the modes, and is not frozen at their nominal values.
 
     Args:
         mass: M, symmetric and positive definite, V = (S, n, n), in kg.
@@ -192,12 +195,12 @@ def require_modal_order(mass: Array, stiffness: Array, ratios: Array) -> None:
     """Refuse modes of unequal damping ratio that change places between parameter sets.
 
     Args:
-        mass: M at S parameter sets, the modal ones first, shape (S, n, n).
+        mass: M at S parameter sets, the nominal ones first, shape (S, n, n).
         stiffness: K there.
         ratios: ζ of the modes by rising frequency, shape (n,).
 
     Raises:
-        RefusedError: Shapes of one set are those of the modal set in another order.
+        RefusedError: Shapes of one set are those of the nominal set in another order.
     """
     below = np.linalg.inv(np.linalg.cholesky(mass))
     U = np.linalg.eigh(below @ stiffness @ below.swapaxes(-1, -2))[1]

@@ -190,7 +190,7 @@ class StoreyFrame:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """All parameters with their modal values, in SI units; of lists, one for each floor."""
+        """All parameters with their nominal values, in SI units; of lists, one for each floor."""
         named: dict[str, float] = {} if self.modulus is None else {"E": self.modulus}
         named |= _named("I{}", self.moments)
         for name in ("stiffness", "masses", "lengths", "columns", "dampers", "q0", "v0"):
@@ -280,7 +280,10 @@ class StoreyFrame:
 
     @property
     def _rows(self) -> Array:
-        """What outputs take of displacements, velocities and accelerations, shape (m, 3n)."""
+        """Coefficients of outputs on displacements, velocities and accelerations, shape (m, 3n).
+
+        A storey shear has those of its drift; the stiffness is its factor besides.
+        """
         rows = np.zeros((len(self.outputs), 3 * self.floors))
         for row, (kind, z) in zip(rows, map(self.quantity, self.outputs), strict=True):
             row[z + self.floors * {"v": 1, "a": 2}.get(kind, 0)] = 1.0
@@ -309,17 +312,18 @@ class StoreyFrame:
         with heights.
 
         Args:
-            ends: Lower and upper end of parameters, in SI units; others keep their modal values.
+            ends: Lower and upper end of parameters, in SI units; others keep their nominal values.
 
         Raises:
-            RefusedError: One does.
+            RefusedError: A storey buckles.
         """
         if not self.gravity:
             return
-        falling = "m" if self.stiffness else "ml"
+        # first letters of the parameters that are worst at their upper ends
+        worst_when_high = "m" if self.stiffness else "ml"
         worst = {name: ends.get(name, (x, x)) for name, x in self.parameters.items()}
         p = {
-            name: Jet.constant(np.array([high if name[0] in falling else low]), 0)
+            name: Jet.constant(np.array([high if name[0] in worst_when_high else low]), 0)
             for name, (low, high) in worst.items()
         }
         for z, (k, soft) in enumerate(

@@ -185,10 +185,12 @@ class Trial:
             yield envelope.lower_at[level, envelope.lower[level, :, o].argmin(), o]
 
     def require_agreement(self, points: Array, motions: Sequence[LinearMotion]) -> None:
-        """Refuse an envelope that the exact motion at one of some inputs (S, n) contradicts.
+        """Compare the envelope with exact motions at inputs (S, n).
 
         Raises:
-            ContradictionError: One does.
+            ContradictionError: A motion leaves the bounds of a level that holds its inputs, does
+                not attain a bound that names them, or strays from straight lines between nodes by
+                more than `between`.
         """
         for k, motion in enumerate(motions):
             point = points[k]
@@ -198,7 +200,7 @@ class Trial:
             for level in np.flatnonzero(inside.all(1)):
                 check.require_inside(int(level))
                 check.require_attained(int(level))
-            check.require_straight()
+            check.require_line_deviation()
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +268,7 @@ class _Check:
             words = f"other than the attained {side} bound of α = {self._alpha(level)},"
             self._require(excess, inner, words, QUARTERS)
 
-    def require_straight(self) -> None:
+    def require_line_deviation(self) -> None:
         """Refuse a motion that strays farther from straight lines between nodes than is proved."""
         ends, share = self.values[::QUARTERS], np.arange(QUARTERS)[:, None] / QUARTERS
         inside = ends[:-1, None] + np.diff(ends, axis=0)[:, None] * share

@@ -33,7 +33,7 @@ FLOOR = 0.1
 
 
 def step_error(flow: UnitFlow) -> Array:
-    """Estimate of the largest time-stepping error so far, from modal values and corners, (T, m).
+    """Estimate of the largest time-stepping error so far, from nominal values and corners, (T, m).
 
     Of a linear structure the distance from the exact propagator, else the distance from half the
     step, extrapolated by the scheme's order.
@@ -62,7 +62,7 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
         steps: From `step_error`, shape (T, m).
     """
     if not flow.flow.exact:
-        steps = np.maximum(steps, _at_bounds(bounds, flow.flow))
+        steps = np.maximum(steps, _error_at_optima(bounds, flow.flow))
     alike = [unit == flow.units[flow.reference] for unit in flow.units]
     error, basis = bounds.error + steps, bounds.basis
     if steps.any():
@@ -72,12 +72,12 @@ def with_step_error(bounds: Envelope, flow: UnitFlow, steps: Array) -> Envelope:
     return replace(bounds, error=error, basis=basis, facts=facts)
 
 
-def _at_bounds(bounds: Envelope, flow: Flow) -> Array:
-    """Errors of a scheme from some points at which bounds are reached, (T, m).
+def _error_at_optima(bounds: Envelope, flow: Flow) -> Array:
+    """Estimate of the largest time-stepping error so far, from inputs that reach bounds, (T, m).
 
-    A structure may resonate between the corners, and the scheme at other parameters than the truth;
-    or a motion may pass near an unstable equilibrium there. Of a system that is not linear the
-    points of the peaks are compared with a method of another kind besides.
+    Corners alone do not suffice: between them a structure may resonate, which the scheme does at
+    other parameters than the exact motion, or a motion may pass near an unstable equilibrium. Of a
+    system that is not linear the peaks are compared with a method of another kind, too.
 
     Raises:
         StepError: The step is too coarse there.
@@ -158,14 +158,14 @@ def node_deviation(flow: Flow, points: Array) -> Array:
         points: Parameters of those that are looked at, shape (S, d), in SI units.
     """
     pieces = np.array_split(points, -(-len(points) // AT_ONCE))
-    off = np.max([_off(flow, some) for some in pieces], axis=0)
+    off = np.max([_chord_deviation(flow, some) for some in pieces], axis=0)
     # where the trajectories looked at are straight, others are not
     near = [np.roll(off, k, 0) for k in (-1, 0, 1)]
     near.append(np.broadcast_to(FLOOR * off.max(0), off.shape))
     return np.concatenate([np.zeros((1, off.shape[1])), MARGIN * np.max(near, 0)])
 
 
-def _off(flow: Flow, points: Array) -> Array:
+def _chord_deviation(flow: Flow, points: Array) -> Array:
     """Largest distance of trajectories from straight lines in each step, shape (T − 1, m)."""
     finer, parts = flow.finer()
     fine = finer.values(points)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Variables = Mapping[str, tuple[tuple[str, ...], Array]]
 """Arrays with the names of their axes."""
-MOST = 1_000_000
+MAX_NUMBERS = 1_000_000
 """Most numbers of all matrices, 8 MB; structures beyond are left out, the first one never."""
 MATRIX = ("motion", "row", "column")
 AXES = {
@@ -32,17 +32,20 @@ FORCES = {"forces": ("motion", "row", "load"), "feeds": ("motion", "output", "lo
 
 
 def variables(points: Array, motions: Sequence[LinearMotion]) -> Variables:
-    """Arrays of the structures at points (S, n), ready for a dataset."""
-    count = max(1, min(len(motions), MOST // (3 * motions[0].mass.size)))
-    some = motions[:count]
-    axes = AXES | (FORCES if some[0].courses else {})
-    arrays = {name: np.stack([getattr(x, name) for x in some]) for name in axes}
+    """Variables of a dataset with the inputs (S, n) and matrices of structures, of the first ones.
+
+    As many are stored as keep three matrices each within `MAX_NUMBERS`.
+    """
+    count = max(1, min(len(motions), MAX_NUMBERS // (3 * motions[0].mass.size)))
+    stored = motions[:count]
+    axes = AXES | (FORCES if stored[0].courses else {})
+    arrays = {name: np.stack([getattr(x, name) for x in stored]) for name in axes}
     return {
         "motion_inputs": (("motion", "parameter"), points[:count]),
         **{f"motion_{name}": (axes[name], array) for name, array in arrays.items()},
-        "record": (("sample",), some[0].record),
-        "record_step": ((), np.array(some[0].record_step)),
-        **_stored_courses(some[0].courses),
+        "record": (("sample",), stored[0].record),
+        "record_step": ((), np.array(stored[0].record_step)),
+        **_stored_courses(stored[0].courses),
     }
 
 

@@ -13,9 +13,9 @@ from alphacut.frame.calculus.rounding import UNIT_ROUNDOFF, gamma
 from alphacut.frame.calculus.taylor_model import TaylorModel, solve
 from alphacut.frame.dual.blocks import (
     CentredMatrices,
-    _rounded,
+    _residual_rounding,
+    _rotated,
     _rounding,
-    _turned,
     subspace_series,
 )
 from alphacut.frame.dual.box import Box
@@ -160,12 +160,12 @@ def test_series_leave_a_residual_of_rounding_in_the_degrees_they_keep(block):
     for _ in range(10):
         centre = pencil(rng)
         turn = rotation(centre, block)
-        rate, shape, moved = _turned(subspace_series(block, 4, centre), turn)
+        rate, shape, moved = _rotated(subspace_series(block, 4, centre), turn)
         models = [
             TaylorModel(tuple(x), np.zeros(x[0].shape[1:]), 1, 4) for x in (rate, shape, moved)
         ]
         of_moved = _rounding(models[1], centre.mass, 0)
-        bound = _rounded(*models, centre.stiffness, turn, of_moved)
+        bound = _residual_rounding(*models, centre.stiffness, turn, of_moved)
         L, x = ([fractions(part[0]) for part in parts] for parts in (rate, shape))
         M, K = ([fractions(p[0]) for p in model.parts] for model in (centre.mass, centre.stiffness))
         total = np.zeros(bound.shape)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta
 
-from alphacut.frame.questions.fragility import CriticalMeasures, any_limit
+from alphacut.frame.questions.fragility import CriticalMeasures, of_any_limit
 from alphacut.frame.questions.peaks import Peaks
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
@@ -73,7 +73,7 @@ def test_any_of_the_limits_is_the_least():
     _, each = suite()
     one = CriticalMeasures.from_peaks(each, np.ones(12), "q", LIMIT)
     two = CriticalMeasures.from_peaks(each, np.linspace(0.5, 2, 12), "q", LIMIT)
-    either = any_limit([one, two])
+    either = of_any_limit([one, two])
     assert either.low == pytest.approx(np.minimum(one.low, two.low))
     assert (either.high >= either.low_reached).all()
 
