@@ -156,7 +156,7 @@ class MatricesSection(Section):
     def _material_ratios(
         self, damping: MaterialDamping, model: MatrixStructure, loss: FuzzyNumber
     ) -> dict[str, FuzzyNumber]:
-        """Damping ratios by the loss factor of E: "zeta" of all modes if all stiffness has E.
+        """Damping ratios by the loss factor of E: "zeta" of all modes if E is in every K term.
 
         Else "zeta1", "zeta2" … of each mode, by its share of strain energy in the terms with E.
         """

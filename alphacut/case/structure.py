@@ -344,8 +344,9 @@ class Frame(Section):
         }
         if self.second_moment is not None:
             numbers["I"] = self.second_moment[0]  # of all storeys, where it is one
-        for key, symbol in SYMBOLS.items():
-            per_storey = enumerate(self.per_floor(getattr(self, NAMES.get(key, key))), start=1)
+        for argument, symbol in SYMBOLS.items():  # symbol "m{}" of the frame's masses, for example
+            key = NAMES.get(argument, argument)  # of this section
+            per_storey = enumerate(self.per_floor(getattr(self, key)), start=1)
             numbers |= {symbol.format(storey): value for storey, value in per_storey}
         return numbers
 

@@ -19,7 +19,7 @@ from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
 from alphacut.io.netcdf import read_dataset
-from alphacut.report.results import ISOTROPIC, cut, fibre_label, width_text
+from alphacut.report.results import ISOTROPIC, cut_text, fibre_label, width_text
 from alphacut.report.tables import run_text, tables, text_table
 from alphacut.rve.engineering_constants import FREE, PLANE_STRAIN
 from alphacut.rve.phase_energies import CONSTANTS
@@ -86,7 +86,7 @@ def bounds_text(document: Document) -> str:
 def cuts_text(title: str, cuts: Document, alpha: Sequence[float], nature: Nature) -> str:
     """Table of the lowest and highest cut of each constant; empty where there are none."""
     rows = [
-        (fibre_label(x), cut(bounds, 0, nature), cut(bounds, -1, nature))
+        (fibre_label(x), cut_text(bounds, 0, nature), cut_text(bounds, -1, nature))
         for x, bounds in cuts.items()
     ]
     return text_table((title, f"α = {alpha[0]:g}", f"α = {alpha[-1]:g}"), rows) if rows else ""
@@ -106,7 +106,7 @@ def loss_text(losses: Document | None) -> str:
         return ""
     rows = []
     for name in CONSTANTS:
-        cuts = (cut(losses[name], level, Nature.ATTAINED) for level in (0, -1))
+        cuts = (cut_text(losses[name], level, Nature.ATTAINED) for level in (0, -1))
         error = f"{losses['error'][name]:.1e}" if losses["error"] else "not declared"
         rows.append((f"loss factor of {name}", *cuts, error))
     return text_table(("tan δ = 2 ζ", "α = 0", "α = 1", "± error"), rows)

@@ -44,7 +44,7 @@ def verify(options: argparse.Namespace, out: TextIO) -> int:
     with locked("FOLDER", path):
         for name in names:
             data = dataset_of(folder.content(f"{name}.nc"))
-            if "motion_inputs" not in data:
+            if "motion_inputs" not in data:  # which proved envelopes alone store
                 document[name] = {"nature": str(data.attrs["nature"]), "motions_tested": 0}
                 continue
             document[name] = verify_envelope(data, name, folder)

@@ -53,7 +53,7 @@ def write_cell(fields: CellFields, path: Path) -> int:
 
 def _write_gmsh(fields: CellFields, path: Path) -> int:
     """Writes a mesh with its fields by Gmsh, nodes of the interface once; returns their number."""
-    count = int(fields.node.max()) + 1
+    count = int(fields.node.max()) + 1  # nodes; a point of each phase has the same one
     points: Array = np.empty((count, 3))
     points[fields.node] = fields.points
     values = {name: data[fields.cells] for name, data in _point_fields(fields).items()}
@@ -77,7 +77,7 @@ def _abaqus_mesh(fields: CellFields) -> object:
     """Mesh of meshio for Abaqus: interface nodes once, a set of elements for each phase."""
     import meshio
 
-    count = int(fields.node.max()) + 1
+    count = int(fields.node.max()) + 1  # nodes; a point of each phase has the same one
     points: Array = np.empty((count, 3))
     points[fields.node] = fields.points
     cells = fields.node[fields.cells][:, MESHIO_ORDER]

@@ -13,7 +13,7 @@ from alphacut.frame.questions.peaks import ANY, verdict_words
 from alphacut.fuzzy.arrays import Array
 from alphacut.io.files import Document
 from alphacut.io.quantity import engineering
-from alphacut.questions.decision import degree
+from alphacut.questions.decision import degree_text
 from alphacut.questions.question import limit_words
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def draw_decision(document: Document) -> Figure:
-    """Bars from the least to the greatest peak over its limit, of each limit and level."""
+    """Draws bars from the least to the greatest peak over its limit, of each limit and level."""
     limits = {name: limit for name, limit in document["limits"].items() if name != ANY}
     figure, axes = style.figure(7.2, 1.2 + 0.7 * len(limits))
     alpha = np.asarray(document["alpha"], float)
@@ -35,7 +35,7 @@ def draw_decision(document: Document) -> Figure:
         for level, left, right, shade in zip(alpha, least, greatest, colours(alpha), strict=True):
             bar: Look = {"left": left, "height": 0.66 - 0.4 * level, "color": shade, "lw": 0}
             axes.barh(row, right - left, **bar)
-        possible, necessary = degree(limit["possibility"]), degree(limit["necessity"])
+        possible, necessary = degree_text(limit["possibility"]), degree_text(limit["necessity"])
         verdict = verdict_words(limit["verdict"], limit["from_level"])
         text = f"{verdict} ({limit['nature']}): possible to {possible}"
         text += f", necessary to {necessary}"
@@ -60,7 +60,7 @@ def _mark_limit(axes: Axes, limit: float, limits: Array, unit: str) -> None:
 
 
 def draw_probability(document: Document) -> Figure:
-    """Bounds of the probability of exceeding a limit over that limit, by level; the last event."""
+    """Draws the bounds of the exceedance probability of the last event over its limit, by level."""
     name, event = list(document["events"].items())[-1]
     alpha = np.asarray(document["alpha"], float)
     limits = np.asarray(event["curve"]["limit"], float)
@@ -80,7 +80,7 @@ def draw_probability(document: Document) -> Figure:
 
 
 def draw_tolerances(document: Document) -> Figure:
-    """Bars of the inputs' supports over their modal values: in the case, and with no exceedance."""
+    """Draws the supports of the inputs, over modal values: in the case, and with no exceedance."""
     supports = document["supports"]
     figure, axes = style.figure(7.2, 1.0 + 0.4 * len(supports))
     rows = np.arange(len(supports))[::-1]
@@ -98,7 +98,7 @@ def draw_tolerances(document: Document) -> Figure:
 
 
 def draw_fragility(document: Document) -> Figure:
-    """Bounds of the share of records that exceed the last limit, over their measure, by level."""
+    """Draws the bounds of the share of records that exceed the last limit over their measure."""
     limit = list(document["limits"].values())[-1]
     alpha = np.asarray(document["alpha"], float)
     measure = np.asarray(limit["measure"], float)

@@ -35,7 +35,7 @@ def drawings(task: EnvelopeTask, results: Results) -> Iterator[tuple[str, Callab
 
 
 def envelope(dataset: xarray.Dataset, output: Output, task: EnvelopeTask) -> Figure:
-    """Bands between the lower and upper envelope of an output, by level, and their errors."""
+    """Draws the bands between lower and upper envelope of an output, by level, and their errors."""
     figure, axes = style.figure()
     shown = dataset.sel(output=str(output))
     alpha, time = dataset["alpha"].values, dataset["time"].values
@@ -97,7 +97,7 @@ def mapping(results: Results, *, count: int = 40, duration: float = 5.0) -> Figu
 
 
 def identified_inputs(document: Document) -> Figure:
-    """Bars of each input's prior interval and of its identified cuts, over the prior's middle.
+    """Draws each input's prior interval and its identified cuts, over the prior's middle.
 
     Args:
         document: As of `stages.identify.identify_inputs`.
@@ -124,7 +124,7 @@ def identified_inputs(document: Document) -> Figure:
 
 
 def spectra(suite: Document) -> Figure:
-    """Response spectra (pseudo-acceleration) of the records of a suite, their mean, and T1."""
+    """Draws the response spectra of the records of a suite, their mean, and T1."""
     figure, axes = style.figure(7.2, 3.6)
     periods = np.asarray(suite["spectra"]["period_s"], float)
     names = [name for name in suite["spectra"] if name != "period_s"]

@@ -84,7 +84,7 @@ def draw_prisms(axes: Any, grid: PrismGrid, levels: Array) -> None:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     plane, edges = grid.plane.points, boundary_edges(grid)
-    cone = layer_faces(levels, edges, grid.plane.arc)
+    cone = layer_faces(levels, edges, grid.plane.arc)  # over edges between nodes on the particle
     axes.add_collection3d(Poly3DCollection(cone, facecolor=PARTICLE, edgecolor=PURPLE, lw=0.3))
     corners = grid.plane.triangles[~grid.plane.inside, :3]
     thin = {"facecolor": (*to_rgb(MATRIX), 0.15), "edgecolor": (*to_rgb(INK), 0.35), "lw": 0.2}
@@ -154,8 +154,9 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
     arrows: list[str] = []
     if content.radius is not None and results.modulus is not None:
         numbers = getattr(content.radius, "numbers", {})
-        texts = {x: ", ".join(f"{end:.4g}" for end in ends_of(n)) for x, n in numbers.items()}
-        lines = [f"{name} = [{text}]" for name, text in texts.items()]
+        lines = []
+        for name, number in numbers.items():
+            lines.append(f"{name} = [{', '.join(f'{x:.4g}' for x in ends_and_modal(number))}]")
         boxes.append(("radius of the particle", lines))
         arrows.append("r(θ)")
     if (data := results.modulus) is not None:
@@ -178,6 +179,6 @@ def boxes_and_arrows(results: Results) -> tuple[list[tuple[str, list[str]]], lis
     return boxes, arrows[:-1]
 
 
-def ends_of(number: FuzzyNumber) -> list[float]:
+def ends_and_modal(number: FuzzyNumber) -> list[float]:
     """Support and modal value of a fuzzy number, each once, rising."""
     return sorted({number.support.lower, number.modal, number.support.upper})

@@ -213,20 +213,20 @@ def _exponent(largest: float) -> int:
     return min(9, max(-9, 3 * math.floor(math.log10(largest) / 3)))
 
 
-def ends(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
+def end_texts(low: float, high: float, nature: Nature, digits: int = 4) -> tuple[str, str]:
     """Texts of both ends of a range, rounded outwards or inwards as its nature demands."""
     is_crisp = high - low <= 1e-9 * abs(high)
     lower = low if is_crisp else rounded(low, "lower", nature, digits)
     upper = low if is_crisp else rounded(high, "upper", nature, digits)
     if lower > upper:  # rounded inwards past each other
-        return ends(low, high, nature, digits + 1)
+        return end_texts(low, high, nature, digits + 1)
     low_text, high_text = (f"{end:#.{digits}g}".rstrip(".") for end in (lower, upper))
     return low_text.replace("-", MINUS), high_text.replace("-", MINUS)
 
 
-def between(low: float, high: float, nature: Nature, digits: int = 4) -> str:
+def range_text(low: float, high: float, nature: Nature, digits: int = 4) -> str:
     """A range rounded as its nature allows; one number where both ends are the same."""
-    return " … ".join(dict.fromkeys(ends(low, high, nature, digits)))
+    return " … ".join(dict.fromkeys(end_texts(low, high, nature, digits)))
 
 
 def axis_prefix(largest: float, si: str) -> tuple[float, str]:

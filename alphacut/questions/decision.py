@@ -38,12 +38,12 @@ def _limit_document(name: str, answer: Passing, limit: float, peaks: Peaks) -> D
     }
 
 
-def degree(ends: Row) -> str:
+def degree_text(ends: Row) -> str:
     """Bounds of a degree, or one number."""
     return " … ".join(dict.fromkeys(f"{float(end):.4g}" for end in ends))
 
 
-def _least_margin(limit: Document) -> str:
+def _margin_text(limit: Document) -> str:
     """Least that is left of a limit at the lowest level."""
     margin = limit["margin"]["lower"][0]
     if margin is None or not np.isfinite(margin):
@@ -51,7 +51,7 @@ def _least_margin(limit: Document) -> str:
     return engineering(margin, limit["unit"]) if limit["unit"] else f"{margin:.1%}"
 
 
-def _peak(limit: Document) -> Row:
+def _peak_texts(limit: Document) -> Row:
     """Texts of the greatest peak at the lowest level: proved bound, reached, relative gap."""
     if not limit.get("peak"):
         return ("", "", "")
@@ -98,10 +98,10 @@ class DecisionQuestion(Question):
                 limit_words(limit["output"], limit["limit"], limit["unit"]),
                 verdict_words(limit["verdict"], limit["from_level"]),
                 limit["nature"],
-                degree(limit["possibility"]),
-                degree(limit["necessity"]),
-                _least_margin(limit),
-                *_peak(limit),
+                degree_text(limit["possibility"]),
+                degree_text(limit["necessity"]),
+                _margin_text(limit),
+                *_peak_texts(limit),
             )
             for limit in document["limits"].values()
         ]

@@ -14,7 +14,7 @@ from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.refused import RefusedError
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.quantity import between, engineering
+from alphacut.io.quantity import engineering, range_text
 from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row, limit_words
 
 POINTS = 60
@@ -88,10 +88,10 @@ class FragilityQuestion(Question):
         return [
             (
                 limit_words(limit["output"], limit["limit"], limit["output_unit"]),
-                _range(limit["median"], 0, document["unit"]),
+                _ends_text(limit["median"], 0, document["unit"]),
                 limit["nature"],
-                _range(limit.get("dispersion"), 0, ""),
-                _range(limit["median"], -1, document["unit"]),
+                _ends_text(limit.get("dispersion"), 0, ""),
+                _ends_text(limit["median"], -1, document["unit"]),
             )
             for limit in document["limits"].values()
         ]
@@ -134,11 +134,11 @@ def measure_grid(critical: CriticalMeasures) -> Array:
     return np.asarray(np.linspace(0.8 * float(critical.low.min()), 1.1 * greatest, POINTS), float)
 
 
-def _range(ends: Document | None, level: int, unit: str) -> str:
+def _ends_text(ends: Document | None, level: int, unit: str) -> str:
     """Text of the range between both ends on a level; the upper one may be infinite ("no end")."""
     if ends is None:
         return "–"
     low, high = ends["lower"][level], ends["upper"][level]
     if high is None or not np.isfinite(high):
         return f"{engineering(low, unit)} … no end"
-    return f"{between(low, high, Nature.GUARANTEED, 3)} {unit}".strip()
+    return f"{range_text(low, high, Nature.GUARANTEED, 3)} {unit}".strip()

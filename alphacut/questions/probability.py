@@ -13,7 +13,7 @@ from alphacut.fuzzy import FuzzyNumber
 from alphacut.fuzzy.arrays import Array
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document
-from alphacut.io.quantity import between
+from alphacut.io.quantity import range_text
 from alphacut.questions.question import FuzzyResponse, NumberRow, Question, Row, event_words
 
 
@@ -45,15 +45,15 @@ def _event_document(answer: Probability, limit: float, unit: str) -> Document:
     }
 
 
-def cut(event: Document, level: int) -> str:
+def bounds_text(event: Document, level: int) -> str:
     """Bounds of a probability on a level."""
-    return between(event["lower"][level], event["upper"][level], Nature.ATTAINED, 3)
+    return range_text(event["lower"][level], event["upper"][level], Nature.ATTAINED, 3)
 
 
-def interval(event: Document, level: int) -> str:
+def interval_text(event: Document, level: int) -> str:
     """Interval of a probability on a level that holds whatever the draws are, rounded outwards."""
     ends = event["interval"]
-    return between(ends["lower"][level], ends["upper"][level], Nature.GUARANTEED, 3)
+    return range_text(ends["lower"][level], ends["upper"][level], Nature.GUARANTEED, 3)
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,10 @@ class ProbabilityQuestion(Question):
         return [
             (
                 event_words(name, event["limit"], event["unit"]),
-                cut(event, 0),
+                bounds_text(event, 0),
                 event["nature"],
-                cut(event, -1),
-                interval(event, 0),
+                bounds_text(event, -1),
+                interval_text(event, 0),
                 f"{max(event['error']):.2g}",
             )
             for name, event in document["events"].items()

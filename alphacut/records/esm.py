@@ -41,7 +41,7 @@ def read_esm(file: TextFile) -> Recording:
 
 
 def _head(file: TextFile) -> dict[str, tuple[str, int]]:
-    """Value of each key of the head, and its line from 0; the head ends at the first number."""
+    """Value and line number, from 0, of each key of the head, which ends at the first number."""
     head: dict[str, tuple[str, int]] = {}
     for row, line in enumerate(file.lines):
         match = LINE.fullmatch(line.strip())

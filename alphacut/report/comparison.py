@@ -41,10 +41,10 @@ def _peak_rows(first: Document, second: Document) -> Iterator[Row]:
         yield _row(f"width of the peak of {name}", unit, *widths)
     statistics = [run.get("records", {}).get("statistics", {}) for run in (first, second)]
     for output in statistics[0].keys() & statistics[1].keys():
-        for word in statistics[0][output]["proved"]:
-            peaks = [values[output]["proved"][word][0] for values in statistics]
+        for statistic in statistics[0][output]["proved"]:  # mean, median …
+            peaks = [values[output]["proved"][statistic][0] for values in statistics]
             unit = unit_of(first["records"], output)
-            yield _row(f"{word} of the records' peaks of {output}", unit, *peaks)
+            yield _row(f"{statistic} of the records' peaks of {output}", unit, *peaks)
 
 
 def _common_peaks(

@@ -8,7 +8,7 @@ from alphacut.frame.questions.peaks import output_of
 from alphacut.frame.structures.quantities import Output
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document
-from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, between
+from alphacut.io.quantity import STANDARD_GRAVITY, axis_prefix, range_text
 from alphacut.questions.all import QUESTIONS
 from alphacut.questions.question import Row
 
@@ -30,12 +30,12 @@ EXCEEDED = {
 GRAVITY = float(STANDARD_GRAVITY)
 
 
-def cut(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
+def cut_text(ends: Document, level: int, nature: Nature, error: float = 0.0) -> str:
     """Text of one cut of a quantity with five digits; guaranteed ends contain the error."""
     low, high = float(ends["lower"][level]), float(ends["upper"][level])
     if nature is Nature.GUARANTEED:
         low, high = max(low - error, min(low, 0.0)), high + error  # the error makes no sign
-    return between(low, high, nature, 5)
+    return range_text(low, high, nature, 5)
 
 
 def error_text(error: float, nature: Nature) -> str:
@@ -52,22 +52,22 @@ def material(summary: Document) -> Table:
         young = part["cuts"]["E_GPa"] if "cuts" in part else part["E_GPa"]
         nature, name = Nature(part["nature"]), f"E, GPa ({part['average']})"
         error = sum(part.get("error", {}).values()) * max(young["upper"])
-        cuts = cut(young, -1, nature), cut(young, 0, nature, error)
+        cuts = cut_text(young, -1, nature), cut_text(young, 0, nature, error)
         has_error = part.get("particles") != "mesh"
         error_cell = error_text(error, nature) if has_error else "not declared"
         rows.append((name, *cuts, str(nature), error_cell))
         further = {"ν": part.get("nu_cuts"), "E_T, GPa": part.get("fibres", {}).get("E_T_GPa")}
         for label, values in further.items():
             if values:
-                cuts = cut(values, -1, nature), cut(values, 0, nature)
+                cuts = cut_text(values, -1, nature), cut_text(values, 0, nature)
                 rows.append((label, *cuts, str(nature), ""))
         if loss := part.get("loss"):
             nature, error = Nature(loss["nature"]), loss["error"].get("E")
-            cuts = cut(loss["E"], -1, nature), cut(loss["E"], 0, nature)
+            cuts = cut_text(loss["E"], -1, nature), cut_text(loss["E"], 0, nature)
             error_cell = "" if error is None else error_text(error, nature)
             rows.append(("loss factor of E", *cuts, str(nature), error_cell))
     for name, (low, modal, high) in summary.get("damping", {}).items():
-        cuts = between(modal, modal, Nature.ATTAINED), between(low, high, Nature.ATTAINED)
+        cuts = range_text(modal, modal, Nature.ATTAINED), range_text(low, high, Nature.ATTAINED)
         rows.append((f"damping ratio {name}", *cuts, str(Nature.ATTAINED), ""))
     return without_empty_columns(MATERIAL, rows)
 
@@ -133,7 +133,7 @@ def peak_cells(peak: Document, factor: float, levels: Sequence[int], *, has_core
     nature, cuts = Nature(peak["nature"]), list[str]()
     for k in levels:
         low, high = factor * float(peak["lower"][k]), factor * float(peak["upper"][k])
-        cuts.append(between(low, high, nature, 3 if k > 0 else 4))
+        cuts.append(range_text(low, high, nature, 3 if k > 0 else 4))
     if has_core:
         cuts[0] = nominal(peak, factor, nature)
     error = error_text(factor * max(peak["error"]), nature)
@@ -170,7 +170,7 @@ def nominal(peak: Document, factor: float, nature: Nature) -> str:
     """Text of a peak at α = 1: a number, or a range if that is wider than a hundredth of it."""
     low, high = (factor * float(peak[end][-1]) for end in ("lower", "upper"))
     middle, is_narrow = (low + high) / 2, high - low <= 0.01 * abs(high)
-    return between(middle, middle, nature) if is_narrow else between(low, high, nature, 3)
+    return range_text(middle, middle, nature) if is_narrow else range_text(low, high, nature, 3)
 
 
 def display_units(
@@ -189,7 +189,10 @@ def display_units(
 
 
 def least_limits(summary: Document) -> dict[str, tuple[float, str]]:
-    """Limit of each peak in SI, and the verdict on it: of a decision the least, else no verdict."""
+    """Limit in SI of each peak, and the verdict on it; the least of several, of [decision] first.
+
+    Limits of other questions have no verdict.
+    """
     limits: dict[str, tuple[float, str]] = {}
     for name, limit in summary.get("tolerances", {}).get("limits", {}).items():
         limits[name] = limit, ""

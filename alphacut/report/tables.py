@@ -12,7 +12,7 @@ from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.files import Document, write_text
 from alphacut.io.manifest import ResultsFolder
 from alphacut.io.netcdf import dataset_of
-from alphacut.io.quantity import MINUS, ends, engineering
+from alphacut.io.quantity import MINUS, end_texts, engineering
 from alphacut.questions.all import QUESTIONS
 from alphacut.questions.question import Row
 from alphacut.report.results import (
@@ -65,7 +65,7 @@ def write_tables(summary: Document, results: ResultsFolder, folder: Path) -> lis
     for question in QUESTIONS:
         if question.key in summary:
             head, rows = question.number_rows(summary[question.key])
-            tables_by_name[question.key] = head, [tuple(map(_cell, row)) for row in rows]
+            tables_by_name[question.key] = head, [tuple(map(_csv_cell, row)) for row in rows]
     for name, study in summary.get("envelopes", {}).items():
         data = dataset_of(results.content(f"envelope_{name}.nc"))
         for output in study["min"]:
@@ -97,9 +97,9 @@ def tables(summary: Document) -> dict[str, Table]:
     return stage_tables | answers
 
 
-def ends_of(values: Document, level: int, nature: Nature) -> Row:
+def cut_texts(values: Document, level: int, nature: Nature) -> Row:
     """Both ends of a cut, rounded as their nature allows."""
-    return ends(float(values["lower"][level]), float(values["upper"][level]), nature, DIGITS)
+    return end_texts(float(values["lower"][level]), float(values["upper"][level]), nature, DIGITS)
 
 
 def radius_map(part: Document) -> Table:
@@ -108,17 +108,17 @@ def radius_map(part: Document) -> Table:
     for name in ("a1", "a2", "a3", "a4"):
         corners = part[name] if isinstance(part[name], list) else [part[name]]  # three, or one
         least, modal, greatest = corners[0], corners[len(corners) // 2], corners[-1]
-        rows.append((name, *map(_number, (least, modal, greatest))))
+        rows.append((name, *map(_number_text, (least, modal, greatest))))
     return ("parameter of the radius map", "least", "modal", "greatest"), rows
 
 
-def _cell(value: str | float | None) -> str:
+def _csv_cell(value: str | float | None) -> str:
     if isinstance(value, str):
         return value
     return "" if value is None else repr(float(value))  # exact: a bound stays one
 
 
-def _number(value: float) -> str:
+def _number_text(value: float) -> str:
     return f"{value:.{DIGITS}g}"
 
 
@@ -129,8 +129,8 @@ def modulus(part: Document) -> Table:
     rows: list[Row] = [
         (
             f"{alpha:g}",
-            *ends_of(cuts["E_GPa"], level, nature),
-            *(ends_of(poisson, level, nature) if poisson else ("", "")),
+            *cut_texts(cuts["E_GPa"], level, nature),
+            *(cut_texts(poisson, level, nature) if poisson else ("", "")),
             f"{error * cuts['E_GPa']['upper'][level]:.2g}" if error else "",
             str(nature),
         )
@@ -144,16 +144,17 @@ def update(part: Document) -> Table:
     """Table of the inputs before and after measured modes were used, then of predicted modes."""
     rows: list[Row] = []
     for name, identified in part["inputs"].items():
-        after, unit = (identified["lower"][0], identified["upper"][0]), part["units"][name]
-        share = f"{part['narrowed'][name]:.0%} of the width"
-        rows.append((name, _wide(part["prior"][name], unit), _wide(after, unit), share))
+        posterior, unit = (identified["lower"][0], identified["upper"][0]), part["units"][name]
+        texts = (_outer_text(ends, unit) for ends in (part["prior"][name], posterior))
+        rows.append((name, *texts, f"{part['narrowed'][name]:.0%} of the width"))
     for mode in part["held_out"]:
-        where, measured = "inside" if mode["inside"] else "outside", f"{mode['measured']:.4g} Hz"
-        rows.append((f"mode {mode['mode']}", measured, _wide(mode["predicted"], "Hz"), where))
+        verdict, measured = "inside" if mode["inside"] else "outside", f"{mode['measured']:.4g} Hz"
+        predicted = _outer_text(mode["predicted"], "Hz")
+        rows.append((f"mode {mode['mode']}", measured, predicted, verdict))
     return ("input or mode", "before, measured", "learned, predicted", ""), rows
 
 
-def _wide(ends: Sequence[float], unit: str) -> str:
+def _outer_text(ends: Sequence[float], unit: str) -> str:
     sides = zip(ends, ("lower", "upper"), strict=True)
     return " … ".join(engineering(rounded(x, y, Nature.GUARANTEED), unit) for x, y in sides)
 
@@ -165,11 +166,11 @@ def peaks(studies: Document) -> Table:
         for output, peak in study["peak"].items():
             nature = Nature(peak["nature"])
             for level, alpha in enumerate(study["alpha"]):
-                values = ends(peak["lower"][level], peak["upper"][level], nature, DIGITS)
+                values = end_texts(peak["lower"][level], peak["upper"][level], nature, DIGITS)
                 reached = rounded(peak["reached"][level], "upper", Nature.ATTAINED, DIGITS)
                 error = f"{peak['error'][level]:.2g}"
                 first = (name, output, unit_of(study, output), f"{alpha:g}")
-                last = _number(reached), f"{peak_gap(peak, level):.2g}"
+                last = _number_text(reached), f"{peak_gap(peak, level):.2g}"
                 rows.append((*first, *values, error, str(nature), *last))
     head = ("study", "output", "unit", "α", "least peak", "greatest peak", "error", "nature")
     return (*head, "peak reached", "gap, share"), rows
@@ -179,14 +180,14 @@ def records(part: Document) -> Table:
     """Table of each record's measures and peaks on the lowest level, then of statistics, in SI."""
     rows: list[Row] = []
     for name, record in part["records"].items():
-        measures = tuple(_number(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
+        measures = tuple(_number_text(record["measures"][x]) for x in ("PGA", "Sa(T1)"))
         for output, peak in record["peak"].items():
-            ends: Row = (_number(peak["upper"][0]), _number(peak["reached"][0]))
+            ends: Row = (_number_text(peak["upper"][0]), _number_text(peak["reached"][0]))
             rows.append((name, *measures, output, unit_of(part, output), *ends, peak["nature"]))
     for output, statistics in part["statistics"].items():
-        for word in statistics["proved"]:
-            ends = tuple(_number(statistics[x][word][0]) for x in ("proved", "reached"))
-            rows.append((f"{word} of all", "", "", output, unit_of(part, output), *ends, ""))
+        for statistic in statistics["proved"]:  # mean, median …
+            ends = tuple(_number_text(statistics[x][statistic][0]) for x in ("proved", "reached"))
+            rows.append((f"{statistic} of all", "", "", output, unit_of(part, output), *ends, ""))
     head = ("record", "PGA [m/s^2]", "Sa(T1) [m/s^2]", "output", "unit")
     return (*head, "greatest peak", "peak reached", "nature"), rows
 
@@ -199,7 +200,7 @@ def spectra(part: Document) -> Table:
     for k, period in enumerate(part["period_s"]):
         values = [column[k] for column in columns]
         numbers = (period, *values, sum(values) / len(values))
-        rows.append(tuple(map(_number, numbers)))
+        rows.append(tuple(map(_number_text, numbers)))
     return ("period [s]", *(f"{name} [m/s^2]" for name in (*names, "mean"))), rows
 
 
@@ -231,13 +232,13 @@ def over_time(data: xarray.Dataset, output: str, unit: str) -> Table:
     nature = Nature(data.attrs["nature"])
     titles = {"lower": f"{nature} lower", "upper": f"{nature} upper"}
     titles["error"] = "gap to attained" if nature is Nature.GUARANTEED else "error"
-    columns = {"time [s]": [_number(time) for time in series["time"].values]}
+    columns = {"time [s]": [_number_text(time) for time in series["time"].values]}
     for level in series["alpha"].values:
         at_level = series.sel(alpha=level)
         for kind, title in titles.items():
             if kind in at_level:
                 values = (rounded(float(x), kind, nature, DIGITS) for x in at_level[kind].values)
-                columns[f"{title} at alpha {level:g} [{unit}]"] = [*map(_number, values)]
+                columns[f"{title} at alpha {level:g} [{unit}]"] = [*map(_number_text, values)]
     return tuple(columns), [*zip(*columns.values(), strict=True)]
 
 

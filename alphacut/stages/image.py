@@ -66,7 +66,7 @@ def compute_cuts(
     """
     start, tick = perf_counter(), work.tick or (lambda fraction: None)
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
-    modal = study.images(None, None)
+    modal = study.images(None, None)  # at modal thresholds and moduli
     division, solver = usual_division(modal), ConjugateGradient(ACCURACY)
     model = ImageModel(aspect, division=division, solver=solver, average=average)
     crisp = model.solve(modal)
@@ -94,12 +94,11 @@ def compute_cuts(
     if cell.losses:
         phase, count = study.phase_ranges(None)[0], len(cell.pairs)
         energies = phase_energies(crisp, modal, phase, count=count, aspect=aspect)
-        bounds, errors = image_loss_bounds(
-            energies, LossCuts.from_phases(cell.losses, alpha), average
-        )
+        phase_cuts = LossCuts.from_phases(cell.losses, alpha)
+        bounds, errors = image_loss_bounds(energies, phase_cuts, average)
         losses = {name: bounds[..., k] for k, name in enumerate(CONSTANTS)}
-        of_constants = dict(zip(CONSTANTS, map(float, errors), strict=True))
-        facts["loss"] = loss_document(losses, of_constants, Nature.ESTIMATED)
+        errors_by_name = dict(zip(CONSTANTS, map(float, errors), strict=True))
+        facts["loss"] = loss_document(losses, errors_by_name, Nature.ESTIMATED)
     return StageResult(facts, _dataset(alpha, cuts, study.phase_ranges(None)[0], losses))
 
 
@@ -248,7 +247,8 @@ def image_study(cell: ImageCell) -> ImageStudy:
 def _study_by_thresholds(grey: Array, cell: ImageCell) -> ImageStudy:
     """The study of an image whose phases are told by thresholds of its greys.
 
-    Of crisp thresholds, pixels that noise or light leave undecided may be of two phases.
+    Pixels of which noise or uneven light leaves the phase open have a range of phases, unless a
+    threshold is fuzzy, which then says all that is not known.
     """
     numbers = cell.threshold or ()
     require_phases(grey, tuple(number.cut(0.0) for number in numbers))

@@ -54,7 +54,7 @@ def require_mesh(mesh: Mesh, law: ThetaSection, cell: MeshedCell) -> None:
     try:
         from alphacut.rve.mesh.file import read_grid
         from alphacut.rve.mesh.periodicity import MeshError
-        from alphacut.rve.prism.own_mesh import require_own_mesh
+        from alphacut.rve.prism.own_mesh import mesh_phases
     except ImportError as error:
         raise RefusedError("mesh.file", mesh.file, "no mesh", missing(error)) from None
     assert mesh.file is not None
@@ -63,4 +63,4 @@ def require_mesh(mesh: Mesh, law: ThetaSection, cell: MeshedCell) -> None:
     except MeshError as error:
         raise RefusedError("mesh.file", Path(mesh.file).name, error.what, error.cure) from None
     sample = modal_sample(law, cell)
-    require_own_mesh(grid, sample.law, sample.phases)
+    mesh_phases(grid, sample.law, sample.phases)  # refuses what does not fit

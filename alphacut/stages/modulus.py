@@ -280,9 +280,9 @@ class CellCampaign:
         return Knowledge(signs=of_inputs, source="as mechanics proves of exact cells", tests=2)
 
     def loss_errors(self, result: Bounds) -> dict[str, float]:
-        """Errors of the loss factors by `CONSTANTS`: the largest of samples, or, of prisms, modal.
+        """Errors of the loss factors of E, G and K by name: the largest of all samples.
 
-        A mesh from a file has none.
+        Prisms declare those of the modal cell, and a mesh from a file declares none.
         """
         assert self.losses is not None
         assert result.samples is not None

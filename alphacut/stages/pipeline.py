@@ -155,8 +155,7 @@ class Pipeline:
             return
         self.compute_envelopes(structure)
         peaks = self._limited_peaks(replace(task, limited=content.limited_outputs), structure)
-        times = (task.section.alpha, task.duration, task.section.step)
-        self._answer(FuzzyResponse(structure, task.fuzzy, *times, peaks))
+        self._answer(self._response(structure, task, peaks))
 
     def _answer(self, response: FuzzyResponse) -> None:
         """Answers all questions of the case about a response, into the results."""
@@ -180,10 +179,16 @@ class Pipeline:
         outcomes = self.store.take_all(stages, self.executor)
         peaks = suite.peaks_by_record(outcomes, records, task.section.alpha)
         results.suite = json.loads(as_json(suite.document(peaks, records, mode)))
-        times = (task.section.alpha, task.duration, task.section.step)
-        by_record = suite.suite_response(peaks, records, mode)
         worst = suite.with_means(suite.worst_peaks(peaks), peaks)
-        self._answer(FuzzyResponse(structure, task.fuzzy, *times, worst, by_record))
+        response = self._response(structure, task, worst)
+        self._answer(replace(response, suite=suite.suite_response(peaks, records, mode)))
+
+    def _response(
+        self, structure: Structure, task: EnvelopeTask, peaks: Peaks | None
+    ) -> FuzzyResponse:
+        """The fuzzy response of [envelope], about which questions are asked."""
+        times = {"duration": task.duration, "step": task.section.step}
+        return FuzzyResponse(structure, task.fuzzy, task.section.alpha, **times, peaks=peaks)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks for questions, from the study with [envelope]'s motion or else computed alone."""

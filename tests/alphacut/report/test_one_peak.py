@@ -9,7 +9,7 @@ import pytest
 from alphacut.frame.questions.peaks import Peaks, tightest
 from alphacut.fuzzy.result import Nature, rounded
 from alphacut.io.manifest import ResultsFolder
-from alphacut.io.quantity import axis_prefix, between
+from alphacut.io.quantity import axis_prefix, range_text
 from alphacut.report.page import render_page
 from alphacut.report.tables import write_tables
 
@@ -46,7 +46,7 @@ def test_one_peak_has_one_value_in_every_place(told):
             gap = 1 - peak["reached"][level] / peak["upper"][level]
             assert float(row["gap, share"]) == pytest.approx(gap, rel=0.06)
         factor, _ = axis_prefix(peak["upper"][0], "m")
-        shown = between(factor * peak["lower"][0], factor * peak["upper"][0], nature)
+        shown = range_text(factor * peak["lower"][0], factor * peak["upper"][0], nature)
         assert shown in page
     at_one = summary["tolerances"]["peaks"]["q2"]
     assert at_one["upper"] == study["peak"]["q2"]["upper"]
