@@ -187,8 +187,8 @@ class Pipeline:
         self, structure: Structure, task: EnvelopeTask, peaks: Peaks | None
     ) -> FuzzyResponse:
         """The fuzzy response of [envelope], about which questions are asked."""
-        times = {"duration": task.duration, "step": task.section.step}
-        return FuzzyResponse(structure, task.fuzzy, task.section.alpha, **times, peaks=peaks)
+        alpha, step = task.section.alpha, task.section.step
+        return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
         """Peaks for questions, from the study with [envelope]'s motion or else computed alone."""
