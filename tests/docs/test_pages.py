@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+DEAR = ("own_law_and_outline", "product_space_cell")  # demos
 EQUATIONS = (ROOT / "docs/theory/equations.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| (\d+) \|.*\| `([\w/]+\.py)` \| (?:`([\w.]+)`)? ?\|$", re.MULTILINE)
 
@@ -61,7 +62,14 @@ def test_links_to_files_lead_somewhere(page):
         )
 
 
-@pytest.mark.parametrize("demo", sorted((ROOT / "demos").glob("*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "demo",
+    [
+        pytest.param(path, marks=[pytest.mark.slow] * (path.stem in DEAR))
+        for path in sorted((ROOT / "demos").glob("*.py"))
+    ],
+    ids=lambda path: path.stem,
+)
 def test_a_demo_runs_and_draws(demo, tmp_path):
     text = demo.read_text(encoding="utf-8")
     drawing = "PICTURES" in text

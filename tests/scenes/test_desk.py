@@ -102,6 +102,7 @@ def test_columns_of_csv_are_numbers_or_texts_and_name_units_of_the_case(
     assert units == {("roof", "m"), ("moment", "N*m")}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
 def test_three_ranks_give_the_bits_of_one_process(summaries, tmp_path):
     ranks = ["mpirun", "--allow-run-as-root", "--oversubscribe", "-n", "3"]

@@ -67,7 +67,10 @@ def run(name, folder):
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name == "composite")) for name in COARSE],
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in ("composite", "paper")))
+        for name in COARSE
+    ],
 )
 def test_the_closing_output_fits_on_a_screen(runs, name):
     lines, _ = runs(name)

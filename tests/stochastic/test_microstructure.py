@@ -155,7 +155,9 @@ def picture(seed: int, *, noise: float, fraction: float = 0.3):
     return grey, packing.centres[edge > 2], packing.radii[edge > 2]
 
 
-@pytest.mark.parametrize(("seed", "dark"), [(0, False), (1, True)])
+@pytest.mark.parametrize(
+    ("seed", "dark"), [pytest.param(0, False, marks=pytest.mark.slow), (1, True)]
+)
 def test_image_in_circles_out(seed, dark):
     grey, centres, radii = picture(seed, noise=1 / 5, fraction=[0.15, 0.3][seed % 2])
     discs = SectionImage(Path("none"), 1.0).circles(1 - grey if dark else grey)
