@@ -80,36 +80,36 @@ class Content(Section):
         return tuple(dict.fromkeys(peak.removeprefix("mean ") for peak in peaks))
 
     @property
-    def picture(self) -> ImageCell | None:
+    def image_cell(self) -> ImageCell | None:
         """The cell if it is an image."""
         return self.cell if isinstance(self.cell, ImageCell) else None
 
     @property
-    def round(self) -> RoundCell | None:
-        """The cell if its particle is round."""
+    def particle_cell(self) -> RoundCell | None:
+        """The cell if it has one particle."""
         return self.cell if isinstance(self.cell, RoundCell) else None
 
     @property
     def has_spheres(self) -> bool:
         """True if the particles of the cell are spheres."""
-        return self.round is not None and self.round.particles == "spheres"
+        return self.particle_cell is not None and self.particle_cell.particles == "spheres"
 
     @property
-    def has_own_modulus(self) -> bool:
+    def has_stated_modulus(self) -> bool:
         """True if the structure needs no modulus of a stage."""
-        return self.frame is None or self.frame.is_whole
+        return self.frame is None or self.frame.has_stated_modulus
 
     @property
     def stated_fraction(self) -> float | None:
         """Fraction of the cell that the particles take as the case says, at its modal value."""
         if self.microstructure is not None and self.microstructure.packing is not None:
             return self.microstructure.packing.fraction
-        if self.round is None or self.round.fraction is None:
+        if self.particle_cell is None or self.particle_cell.fraction is None:
             return None
-        return float(self.round.fraction.modal)
+        return float(self.particle_cell.fraction.modal)
 
     @property
-    def meshed(self) -> MeshedCell | None:
+    def mesh_cell(self) -> MeshedCell | None:
         """The cell if its mesh comes from a file."""
         return self.cell if isinstance(self.cell, MeshedCell) else None
 
@@ -119,29 +119,34 @@ class Content(Section):
         return self.radius if isinstance(self.radius, RadiusMapSection) else None
 
     @property
-    def meshed_cell(self) -> tuple[ThetaSection, MeshedCell]:
+    def law_and_phases(self) -> tuple[ThetaSection, MeshedCell]:
         """The law of θ and the phases of a mesh from a file.
 
         Raises:
             RefusedError: There is none.
         """
-        if self.meshed is None:
+        if self.mesh_cell is None:
             raise RefusedError("cell.phases", None, "a section for each physical group")
-        return self.radius or ThetaSection(), self.meshed
+        return self.radius or ThetaSection(), self.mesh_cell
 
     @property
-    def round_cell(self) -> tuple[AnyRadius, RoundCell]:
+    def radius_and_phases(self) -> tuple[AnyRadius, RoundCell]:
         """The radius map and the phases of a round particle.
 
         Raises:
             RefusedError: There is none.
         """
-        if self.round is None:
+        if self.particle_cell is None:
             raise RefusedError("cell", None, "a section [cell] with a particle")
-        radius = self.radius_map or self.round.fraction_map
+        radius = self.radius_map or self.particle_cell.fraction_map
         if radius is None:
             raise RefusedError("radius", None, "a section [radius], or cell.fraction")
-        return radius, self.round
+        return radius, self.particle_cell
+
+    @property
+    def random_cell(self) -> tuple[AnyRadius | ThetaSection, RoundCell | MeshedCell]:
+        """The radius map, or the law of θ of a mesh, and the phases of a cell that is no image."""
+        return self.radius_and_phases if self.mesh_cell is None else self.law_and_phases
 
     @property
     def structure(self) -> Structure | None:
@@ -178,14 +183,14 @@ class Content(Section):
         """
         if self.mesh.file is None:
             allowed = "a mesh of Gmsh beside [cell.phases]"
-            require(self.meshed is None, "mesh.file", value=None, allowed=allowed)
+            require(self.mesh_cell is None, "mesh.file", value=None, allowed=allowed)
             is_complete = self.radius is None or self.radius_map is not None
             about = RadiusMapSection.model_fields["a1"].description
             allowed = f"{about}; theta alone beside mesh.file"
             require(is_complete, "radius.a1", value=None, allowed=allowed)
             return self
         allowed = "[cell.phases], a phase for each physical group of mesh.file"
-        require(self.meshed is not None, "cell.phases", value=None, allowed=allowed)
+        require(self.mesh_cell is not None, "cell.phases", value=None, allowed=allowed)
         for key in ("size", "layers"):
             require_alone(f"mesh.{key}", self.mesh.has_key(key), "mesh.file")
         has_map = self.radius_map is not None or "microstructure" in self.stages
@@ -199,11 +204,11 @@ class Content(Section):
     @model_validator(mode="after")
     def _check_interphase(self) -> Self:
         """Refuses an interphase that reaches the sides of the cell; lengths over half a side."""
-        thickness = None if self.round is None else self.round.interphase_thickness
+        thickness = None if self.particle_cell is None else self.particle_cell.interphase_thickness
         has_map = self.radius_map is not None or self.stated_fraction is not None
         if thickness is None or not has_map or "microstructure" in self.stages:
             return self
-        radius, thickest = self.round_cell[0].largest_radius, thickness.support.upper
+        radius, thickest = self.radius_and_phases[0].largest_radius, thickness.support.upper
         fits = radius + thickest < CLOSEST  # the largest outer radius that can be meshed
         allowed = f"values below {CLOSEST - radius:.4g}, beside radii up to {radius:.4g}"
         require(fits, "cell.interphase_thickness", value=f"{thickest:g}", allowed=allowed)
@@ -212,9 +217,9 @@ class Content(Section):
     @model_validator(mode="after")
     def _check_stages(self) -> Self:
         """Refuses stages without their sections, two sources of the radius, and unfit methods."""
-        has_fraction = self.round is not None and self.round.fraction is not None
+        has_fraction = self.particle_cell is not None and self.particle_cell.fraction is not None
         has_radius = "microstructure" in self.stages or has_fraction
-        has_geometry = self.picture is not None or self.meshed is not None
+        has_geometry = self.image_cell is not None or self.mesh_cell is not None
         sections = {
             "microstructure": ("microstructure",),
             "modulus": ("cell",) if has_radius or has_geometry else ("radius", "cell"),
@@ -231,7 +236,7 @@ class Content(Section):
         }
         first, *further = [name for name, is_there in is_source.items() if is_there] or [""]
         require_alone(first, bool(further), ", ".join(further))
-        method, cell = self.modulus.method, self.round or self.meshed
+        method, cell = self.modulus.method, self.particle_cell or self.mesh_cell
         methods = (method,) if cell is None else cell.methods
         allowed = f"{', '.join(methods)} for this cell"
         require(method in methods, "modulus.method", value=method, allowed=allowed)
@@ -254,7 +259,7 @@ class Content(Section):
         section = self.structure_section
         ground = getattr(section, "accelerogram", None)
         is_loaded = self.records is not None or ground is not None or bool(self.force)
-        is_moved = is_loaded or getattr(section, "starts", True)
+        is_moved = is_loaded or getattr(section, "moves_at_start", True)
         allowed = "a start, an accelerogram, a section [records] or [[force]]"
         cure = "nothing moves the frame"
         require(is_moved, "frame.displacements", value=None, allowed=allowed, cure=cure)
@@ -291,7 +296,7 @@ class Content(Section):
             structure.inputs(stated, f"{key}.fuzzy")  # refuses unknown and crisp ones
             structure.require_outputs(f"{key}.figures", study.figures)
             envelope.require_steps(f"{key}.duration", study.duration)
-        has_modulus = self.has_own_modulus or "modulus" in self.stages
+        has_modulus = self.has_stated_modulus or "modulus" in self.stages
         require(has_modulus, "frame.modulus", value=None, allowed="a modulus, or stage modulus")
         is_framed = self.identify is None or self.frame is not None
         require(is_framed, "identify", value="without a frame", allowed="beside [frame]")

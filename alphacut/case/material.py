@@ -171,14 +171,14 @@ class RoundCell(Section):
         return modulus if isinstance(modulus, VoigtPhase) else None
 
     @property
-    def square(self) -> bool:
+    def is_round_isotropic(self) -> bool:
         """True for round particles of an isotropic material."""
         return self.outline is None and self.stiffness is None
 
     @property
     def has_series(self) -> bool:
         """True where the series has a formula: round particles of one isotropic material."""
-        return self.square and self.interphase_thickness is None
+        return self.is_round_isotropic and self.interphase_thickness is None
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -206,7 +206,7 @@ class RoundCell(Section):
         return (self.matrix_loss, self.matrix_loss_bulk), particle
 
     @property
-    def fibres(self) -> bool:
+    def is_fibre(self) -> bool:
         """True for round fibres of an isotropic material in a matrix alone."""
         return self.has_series and self.particles == "cylinders"
 

@@ -195,7 +195,7 @@ class MatricesSection(Section):
         return np.array(pattern)
 
     @property
-    def starts(self) -> bool:
+    def moves_at_start(self) -> bool:
         """True if the structure moves without a record: it starts at rest."""
         return False
 

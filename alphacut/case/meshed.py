@@ -82,7 +82,7 @@ class MeshedCell(Section):
         return "mesh"
 
     @property
-    def fibres(self) -> bool:
+    def is_fibre(self) -> bool:
         """False: constants along fibres need one round particle."""
         return False
 

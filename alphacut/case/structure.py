@@ -263,17 +263,17 @@ class Frame(Section):
     )
 
     @property
-    def damped(self) -> bool:
+    def has_dampers(self) -> bool:
         """True if any damper is there."""
         return any(number.support.upper > 0 for number in self.dampers)
 
     @property
-    def starts(self) -> bool:
+    def moves_at_start(self) -> bool:
         """True if a floor is displaced or moves at the start."""
         return any(any(x.support) for x in (*self.displacements, *self.velocities))
 
     @property
-    def is_whole(self) -> bool:
+    def has_stated_modulus(self) -> bool:
         """True if it needs no modulus of a stage."""
         return self.modulus is not None or self.stiffness is not None
 

@@ -49,7 +49,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, out: TextIO) -> int:
     """Solves the cell at the modal values, checks and writes its result; returns exit status 0."""
     content = read_case(options).content
-    radius, phases = content.round_cell if content.meshed is None else content.meshed_cell
+    radius, phases = content.random_cell
     elements = {"petsc": options.petsc, "parallel": ranks() > 1, "estimate": True}
     model = cell.model_of(phases, content.mesh, content.modulus, **elements)
     result = cell.solve(radius, phases, model)
@@ -96,10 +96,10 @@ def export(content: Content, path: Path) -> Document:
 
     mesh = content.mesh
     if mesh.file is not None:
-        sample = modal_sample(*content.meshed_cell)
+        sample = modal_sample(*content.law_and_phases)
         fields = mesh_fields(PrismModel(mesh=mesh.file), sample.law, sample.phases)
     else:
-        modal = cell.modal_cell(*content.round_cell)
+        modal = cell.modal_cell(*content.radius_and_phases)
         model = PrismModel(mesh.size, mesh.layers, outline=modal.outline)
         fields = cell_fields(model, modal.radius, modal.matrix, modal.inclusion, modal.interphase)
     return {"file": str(path), "nodes": write_cell(fields, path)}

@@ -80,14 +80,14 @@ def nominal_structure(content: Content) -> StoreyFrame | MatrixStructure | None:
     if content.frame is None:
         return content.structure_of().linear
     number = None
-    if not content.frame.is_whole:
-        if content.round is None or not content.round.has_series:
+    if not content.frame.has_stated_modulus:
+        if content.particle_cell is None or not content.particle_cell.has_series:
             return None
-        if content.radius_map is None and content.round.fraction is None:
+        if content.radius_map is None and content.particle_cell.fraction is None:
             return None
         section = content.modulus.model_copy(update={"method": "auto", "tolerance": 1e-4})
-        model = model_of(content.round, content.mesh, section)
-        number = Crisp(solve(*content.round_cell, model).modulus)
+        model = model_of(content.particle_cell, content.mesh, section)
+        number = Crisp(solve(*content.radius_and_phases, model).modulus)
     return content.structure_of(number).frame
 
 

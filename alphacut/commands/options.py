@@ -122,8 +122,8 @@ def read_case(options: argparse.Namespace) -> Case:
     """
     case = load(options.case, options.set)
     content = case.content
-    prisms = content.round is not None and content.modulus.method == "prism"
-    require_petsc(options.petsc, prisms or content.meshed is not None)
+    prisms = content.particle_cell is not None and content.modulus.method == "prism"
+    require_petsc(options.petsc, prisms or content.mesh_cell is not None)
     return case
 
 
@@ -151,8 +151,8 @@ def open_results(
         return
     require_writable("--out", path, folder=True)
     with locked("--out", Path(path)) if rank() == 0 else nullcontext():
-        results = ResultsFolder.opened(Path(path))
-        if results.is_lost:
+        results = ResultsFolder.read(Path(path))
+        if results.is_damaged:
             say(f"warning: {results.path / MANIFEST} is damaged; everything is computed anew")
         if fresh and rank() == 0:
             results.clear()

@@ -43,8 +43,8 @@ def run(options: argparse.Namespace, out: TextIO) -> int:
     write_answer(options, document, out, run_text(document))
     if options.json != "-" and not options.quiet:
         say(f"results are in {folder}, after {document['seconds']:.0f} s")
-        if store.taken:
-            say(f"{len(store.taken)} of the stages were up to date")
+        if store.up_to_date:
+            say(f"{len(store.up_to_date)} of the stages were up to date")
         say(f"next: {door('report', folder)}")
     return 0
 
@@ -94,12 +94,12 @@ def report(options: argparse.Namespace, out: TextIO) -> int:
     """Writes the page of a run and the tables requested, or compares two; returns exit status 0."""
     if len(options.folder) > 1:
         return compare(options, out)
-    folder = ResultsFolder.opened(Path(options.folder[0]))
+    folder = ResultsFolder.read(Path(options.folder[0]))
     page = render_page(folder)
     path = Path(options.out) if options.out else folder.path / PAGE
     if path.name == PAGE and path.parent.resolve() == folder.path.resolve():
         with locked("FOLDER", folder.path):
-            put_text(ResultsFolder.opened(folder.path), PAGE, page)
+            put_text(ResultsFolder.read(folder.path), PAGE, page)
     else:
         write_text(path, page)
     summary, files = read_summary(folder), list[Path]()
@@ -116,7 +116,7 @@ def compare(options: argparse.Namespace, out: TextIO) -> int:
     """Shows two runs side by side, and writes the files requested; returns exit status 0."""
     folders = options.folder
     require(len(folders) == 2, "FOLDER", value=f"{len(folders)} folders", allowed="one or two")
-    first, second = (read_summary(ResultsFolder.opened(Path(name))) for name in folders)
+    first, second = (read_summary(ResultsFolder.read(Path(name))) for name in folders)
     table = comparison(first, second)
     allowed = "two runs with a quantity in common"
     require(bool(table[1]), "FOLDER", value=" and ".join(folders), allowed=allowed)

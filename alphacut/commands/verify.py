@@ -37,9 +37,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def verify(options: argparse.Namespace, out: TextIO) -> int:
     """Tests all proved envelopes in a folder by exact motions; returns exit status 0."""
     path = Path(options.folder)
-    folder = ResultsFolder.opened(path)
+    folder = ResultsFolder.read(path)
     document: Document = {}
-    names = [name for name in folder.parts if name.startswith("envelope_")]
+    names = [name for name in folder.stage_files if name.startswith("envelope_")]
     require(bool(names), "FOLDER", value=str(path), allowed="results of a run with an envelope")
     with locked("FOLDER", path):
         for name in names:

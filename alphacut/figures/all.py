@@ -19,7 +19,7 @@ from alphacut.fuzzy.campaign.workers import submit
 from alphacut.io.provenance import NESTED, version_of
 from alphacut.stages.cell import GPA, modal_cell
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, StageResult, StageStore, Work
+from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,14 +47,14 @@ def _material_figures(results: Results) -> Iterator[Drawing]:
     """Figures of the radius map, the modulus, the stresses and the image, by name."""
     content, radius_map = results.content, results.content.radius_map
     if results.is_paper and content.modulus.method == "prism":
-        cell, mesh = modal_cell(*content.round_cell), content.mesh
+        cell, mesh = modal_cell(*content.radius_and_phases), content.mesh
         yield "fig01-domains", partial(overview.domains, cell, mesh.size, mesh.layers)
     if radius_map is not None and results.microstructure is None:  # which draws its own p-box
         yield "fig13-p-box", partial(material.p_box, radius_map)
     if radius_map is not None:
         yield "fig14-cone", partial(material.cone, radius_map)
     if (data := results.modulus) is not None and results.is_paper:
-        inclusion = content.round_cell[1].inclusion_modulus
+        inclusion = content.radius_and_phases[1].inclusion_modulus
         if isinstance(inclusion, FuzzyNumber):
             cuts = data.document["E_GPa"]
             bounds = (GPA * np.array(cuts[side]) for side in ("lower", "upper"))
@@ -112,17 +112,17 @@ def draw_figures(results: Results, store: StageStore, executor: Executor | None)
     return [*before, *figures.figures]
 
 
-def draw_all(results: Results, executor: Executor | None, work: Work) -> StageResult:
+def draw_all(results: Results, executor: Executor | None, context: StageContext) -> StageResult:
     """Draws all figures by `PARTS` tasks; the document of the result has the names of the files."""
-    assert work.folder is not None
-    folder = work.folder
+    assert context.folder is not None
+    folder = context.folder
     mesh_futures = _submit_mesh(results, folder, executor)
     parts = [submit(executor, draw_part, results, folder, part) for part in range(PARTS)]
     names = []
     for count, part in enumerate(parts, start=1):
         names += part.result()
-        if work.tick:
-            work.tick(count / PARTS)
+        if context.tick:
+            context.tick(count / PARTS)
     drawn_meshes = [name for name, future in mesh_futures.items() if future.result()]
     return StageResult({"figures": [*sorted(names), *drawn_meshes]})
 
@@ -146,9 +146,9 @@ def _submit_mesh(
     results: Results, folder: Path, executor: Executor | None
 ) -> dict[str, Future[bool]]:
     """Future of drawing the mesh (Fig. 15) by its file: true if drawn; empty without prisms."""
-    prisms = results.content.round is not None and results.content.modulus.method == "prism"
+    prisms = results.content.particle_cell is not None and results.content.modulus.method == "prism"
     if results.modulus is None or not prisms:
         return {}
     name = f"figures/{file_stem('fig15-prism-mesh', results)}.png"
-    cell = modal_cell(*results.content.round_cell)
+    cell = modal_cell(*results.content.radius_and_phases)
     return {name: submit(executor, draw_mesh, cell, results.content.mesh, folder / name)}

@@ -52,7 +52,7 @@ def frame(section: Frame) -> Figure:
 
 def chain(section: Frame) -> Figure:
     """Fig. 27: the frame as a chain of masses and springs, with its dampers if it has any."""
-    floors, placement = section.floors, section.damper_placement if section.damped else None
+    floors, placement = section.floors, section.damper_placement if section.has_dampers else None
     foot = -0.9 if placement == "ground" else -0.5
     right, width = PITCH * floors + 0.2, min(12.0, 2.2 + 1.5 * floors)  # of the axes, in inches
     figure, axes = style.figure(width, 2.15 * width / (PITCH * floors + 0.5) + 0.1)

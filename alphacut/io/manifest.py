@@ -54,17 +54,17 @@ class ResultsFolder:
 
     Args:
         path: The folder; it may be a link itself.
-        parts: Files of each stage, by the stage's name.
-        is_lost: Whether there was a manifest that could not be read, so that a run replaces its
+        stage_files: Files of each stage, by the stage's name.
+        is_damaged: Whether there was a manifest that could not be read, so that a run replaces its
             files although none lists them.
     """
 
     path: Path
-    parts: dict[str, StageFiles] = field(default_factory=dict)
-    is_lost: bool = False
+    stage_files: dict[str, StageFiles] = field(default_factory=dict)
+    is_damaged: bool = False
 
     @classmethod
-    def opened(cls, path: Path) -> Self:
+    def read(cls, path: Path) -> Self:
         """The folder with what its manifest lists; nothing where that is missing or damaged.
 
         Raises:
@@ -78,20 +78,20 @@ class ResultsFolder:
         except OSError as error:
             raise RefusedError(str(file), str(error), "a regular file of this program") from None
         except (ValueError, RecursionError):
-            return cls(path, is_lost=True)
+            return cls(path, is_damaged=True)
         try:
             require_known(document, file)
             parts = {name: StageFiles(*part) for name, part in document["stages"].items()}
             intact = document["checksum"] == _checksum(parts) and all(map(is_plain, _names(parts)))
         except (LookupError, TypeError, AttributeError):
-            return cls(path, is_lost=True)
-        return cls(path, parts) if intact else cls(path, is_lost=True)
+            return cls(path, is_damaged=True)
+        return cls(path, parts) if intact else cls(path, is_damaged=True)
 
     def problem(self, stage: str) -> str:
         """What is wrong with the files of a stage, such as "modulus.nc was changed"; else ""."""
-        if stage not in self.parts:
-            return "the manifest is damaged" if self.is_lost else "no files"
-        for name, digest in self.parts[stage].files.items():
+        if stage not in self.stage_files:
+            return "the manifest is damaged" if self.is_damaged else "no files"
+        for name, digest in self.stage_files[stage].files.items():
             try:
                 self._read_checked(name, digest)
             except RefusedError as error:
@@ -104,11 +104,11 @@ class ResultsFolder:
         Raises:
             RefusedError: The file is not listed, missing, changed, or a link.
         """
-        files = {x: digest for part in self.parts.values() for x, digest in part.files.items()}
-        if name not in files:
-            what = f"without {name} in its manifest"
-            raise RefusedError(str(self.path), what, COMPLETE, RUN_AGAIN)
-        return self._read_checked(name, files[name])
+        for stage in self.stage_files.values():
+            if name in stage.files:
+                return self._read_checked(name, stage.files[name])
+        what = f"without {name} in its manifest"
+        raise RefusedError(str(self.path), what, COMPLETE, RUN_AGAIN)
 
     def _read_checked(self, name: str, digest: str) -> bytes:
         """The content of a file, whose SHA-256 must be `digest`; any if that is empty."""
@@ -147,7 +147,7 @@ class ResultsFolder:
             return
         except NotADirectoryError as error:
             raise RefusedError(str(file), str(error), allowed, cure) from None
-        is_listed = self.is_lost or any(name in part.files for part in self.parts.values())
+        is_listed = self.is_damaged or any(name in part.files for part in self.stage_files.values())
         is_regular = stat.S_ISREG(mode)
         kind = "a file that no manifest lists" if is_regular else "no regular file"
         is_free = is_listed and (is_regular or stat.S_ISLNK(mode))
@@ -165,7 +165,7 @@ class ResultsFolder:
         contents = {file.relative_to(source).as_posix(): file.read_bytes() for file in files}
         for name in contents:
             self.require_free(name)
-        before = self.parts[stage].files if stage in self.parts else {}
+        before = self.stage_files[stage].files if stage in self.stage_files else {}
         digests = {name: digest_of(content) for name, content in contents.items()}
         self.list_files(stage, fingerprint, digests)
         for name, content in contents.items():
@@ -176,14 +176,14 @@ class ResultsFolder:
 
     def list_files(self, stage: str, fingerprint: str, digests: Mapping[str, str]) -> None:
         """Writes the manifest with the files of a stage by their digests."""
-        self.parts[stage] = StageFiles(fingerprint, dict(digests))
+        self.stage_files[stage] = StageFiles(fingerprint, dict(digests))
         self._write()
 
     def clear(self) -> None:
         """Removes every file that is listed, and the list; links are removed, not followed."""
-        for name in _names(self.parts):
+        for name in _names(self.stage_files):
             self._remove(name)
-        self.parts, self.is_lost = {}, False
+        self.stage_files, self.is_damaged = {}, False
         self._write()
 
     def _remove(self, name: str, digest: str = "") -> None:
@@ -199,11 +199,11 @@ class ResultsFolder:
 
     def _write(self) -> None:
         """Writes manifest.json, with a checksum of its own list."""
-        stages = {name: [part.fingerprint, part.files] for name, part in self.parts.items()}
+        stages = {name: [part.fingerprint, part.files] for name, part in self.stage_files.items()}
         document: Document = {
             "format_version": FORMAT,
             "about": "SHA-256 of every file of results by stage; --fresh removes these files",
-            "checksum": _checksum(self.parts),
+            "checksum": _checksum(self.stage_files),
             "stages": stages,
         }
         with whole_file(self.path / MANIFEST, follow_links=False) as partial:

@@ -34,8 +34,8 @@ def read_dataset(path: Path, key: str) -> xarray.Dataset:
     Raises:
         RefusedError: There is no such file or manifest, or the file was changed.
     """
-    folder, is_dataset = ResultsFolder.opened(path.parent), path.suffix == ".nc"
-    is_listed = is_dataset and any(path.name in part.files for part in folder.parts.values())
+    folder, is_dataset = ResultsFolder.read(path.parent), path.suffix == ".nc"
+    is_listed = is_dataset and any(path.name in part.files for part in folder.stage_files.values())
     allowed = "a NetCDF file in the results of this program"
     cure = "its folder holds it with manifest.json, which tells whether it is as it was written"
     require(is_listed, key, value=str(path), allowed=allowed, cure=cure)
@@ -67,7 +67,7 @@ def read_summary(folder: ResultsFolder) -> Document:
 
 def require_same_run(summary: Document, folder: ResultsFolder) -> None:
     """Refuses a folder with files of another run than that of its summary."""
-    listed = {name: part.fingerprint for name, part in folder.parts.items()}
+    listed = {name: part.fingerprint for name, part in folder.stage_files.items()}
     changed = [name for name, key in summary["fingerprints"].items() if listed.get(name) != key]
     value = f"with {', '.join(changed)} of another run"
     require(not changed, str(folder.path), value=value, allowed="one run's files")

@@ -19,7 +19,7 @@ ALLOWED = "time [s],force [kN], or time [s],force of a course without a unit"
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class ForceSamples:
     """Samples of a course.
 
     Args:
@@ -33,7 +33,7 @@ class Series:
     has_unit: bool
 
 
-def read_force_history(path: Path) -> Series:
+def read_force_history(path: Path) -> ForceSamples:
     """Samples of a force in a CSV file with even steps from t = 0.
 
     Raises:
@@ -55,4 +55,4 @@ def read_force_history(path: Path) -> Series:
     samples = np.asarray(force_factor * table[:, 1])
     if not samples.any():
         raise file.refusal(0, "zeros throughout", "a force that moves something")
-    return Series(step, samples, force_unit is not None)
+    return ForceSamples(step, samples, force_unit is not None)

@@ -20,7 +20,7 @@ from alphacut.fuzzy.refused import FailedError, require
 from alphacut.fuzzy.result import Nature
 from alphacut.io.files import Document, say
 from alphacut.questions.question import PEAK_ERROR
-from alphacut.stages.store import Stage, StageResult, Work
+from alphacut.stages.store import Stage, StageContext, StageResult
 
 DEFAULT_TOLERANCE = Tolerance(1e-3, "")
 """Tolerance where none is named: a fraction of each peak."""
@@ -76,13 +76,13 @@ class EnvelopeTask:
             return {}
         return {"tolerance": tolerance * (self.section.gain if method in FOLLOWERS else 1.0)}
 
-    def compute(self, structure: Structure, work: Work) -> StageResult:
+    def compute(self, structure: Structure, context: StageContext) -> StageResult:
         """Computes the envelope as a dataset, and the fuzzy peak of each output as a document.
 
         Raises:
             RefusedError: The structure or the method does not take these values.
         """
-        arguments = self.arguments(structure) | _store_and_progress(work)
+        arguments = self.arguments(structure) | _store_and_progress(context)
         result = frame.envelope(**arguments, relative=not self.tolerance(structure).unit)
         signed = [name for name in self.limited if name != output_of(name)]
         peak_bounds = peaks(result, [*map(str, result.outputs), *signed])
@@ -90,13 +90,15 @@ class EnvelopeTask:
         has_many_inputs = len(structure.inputs(self.fuzzy)) > MOST_PARAMETERS
         gap = np.inf if has_many_inputs else PEAK_ERROR
         if loose := loose_peaks(peak_bounds, self.limited, gap):
-            tighter = replace(self, limited=loose).close_peaks(structure, work)
+            tighter = replace(self, limited=loose).close_peaks(structure, context)
             peak_bounds = tightest(peak_bounds, tighter)
         return StageResult({"peak": peaks_document(peak_bounds)}, result.to_dataset())
 
-    def compute_peaks(self, structure: Structure, work: Work, nodes: int = 1) -> StageResult:
+    def compute_peaks(
+        self, structure: Structure, context: StageContext, nodes: int = 1
+    ) -> StageResult:
         """Computes the peaks of the limited outputs alone, with some nodes in each step."""
-        return StageResult({"peak": peaks_document(self.close_peaks(structure, work, nodes))})
+        return StageResult({"peak": peaks_document(self.close_peaks(structure, context, nodes))})
 
     def arguments(self, structure: Structure) -> dict[str, Any]:
         """Arguments of `frame.envelope` and `frame.require_envelope`, by name, from the case."""
@@ -108,18 +110,18 @@ class EnvelopeTask:
             **self.options(structure),
         }
 
-    def close_peaks(self, structure: Structure, work: Work, nodes: int = 1) -> Peaks:
+    def close_peaks(self, structure: Structure, context: StageContext, nodes: int = 1) -> Peaks:
         """Peaks of the limited outputs by the method that bounds peaks most closely.
 
         Args:
             structure: The structure.
-            work: Folder of a proof's parts, and progress.
+            context: Folder of a proof's parts, and progress.
             nodes: Nodes in each step of [envelope].
         """
         model = structure.model_with_outputs("limits", outputs_of(self.limited))
         magnitudes = all(name == output_of(name) for name in self.limited)
         method = frame.Auto(PEAK_ERROR, peaks=True, magnitudes=magnitudes)
-        arguments = self._motion(structure) | _store_and_progress(work)
+        arguments = self._motion(structure) | _store_and_progress(context)
         arguments["step"] = self.section.step / nodes
         result = frame.envelope(model, method=method, relative=True, **arguments)
         return peaks(result, self.limited)
@@ -134,9 +136,9 @@ class EnvelopeTask:
         }
 
 
-def _store_and_progress(work: Work) -> dict[str, Any]:
+def _store_and_progress(context: StageContext) -> dict[str, Any]:
     """Arguments of `frame.envelope` on progress and on the folder of a proof's parts."""
-    return {"store": work.parts, "interruptible": False, "progress": work.tick or False}
+    return {"store": context.parts, "interruptible": False, "progress": context.tick or False}
 
 
 def outputs_of(peaks: Sequence[str]) -> tuple[str, ...]:

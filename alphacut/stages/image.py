@@ -32,7 +32,7 @@ from alphacut.rve.loss_factors import bulk_and_shear_losses
 from alphacut.rve.phase_energies import CONSTANTS, PhaseEnergies, first_order
 from alphacut.stages.cell import AVERAGES, GPA, as_cut, isotropic_bounds
 from alphacut.stages.losses import LossCuts, loss_document
-from alphacut.stages.store import Stage, StageResult, Work
+from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic.segmentation import segmented
 
 if TYPE_CHECKING:
@@ -57,14 +57,14 @@ def stage(cell: ImageCell, alpha: tuple[float, ...], average: str) -> Stage:
 
 
 def compute_cuts(
-    cell: ImageCell, alpha: tuple[float, ...], average: str, work: Work
+    cell: ImageCell, alpha: tuple[float, ...], average: str, context: StageContext
 ) -> StageResult:
     """Computes α-cuts of E and of the stiffness of an image, and how its sources widen E.
 
     Raises:
         RefusedError: The image cannot give what the case asks for.
     """
-    start, tick = perf_counter(), work.tick or (lambda fraction: None)
+    start, tick = perf_counter(), context.tick or (lambda fraction: None)
     study, aspect = image_study(cell), cell.pixel[-1] / cell.pixel[0]
     modal = study.images(None, None)  # at modal thresholds and moduli
     division, solver = usual_division(modal), ConjugateGradient(ACCURACY)

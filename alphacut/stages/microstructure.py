@@ -13,7 +13,7 @@ from alphacut.fuzzy.campaign.workers import pool
 from alphacut.io.columns import columns_text
 from alphacut.io.files import Document, write_text
 from alphacut.io.provenance import file_digest
-from alphacut.stages.store import Stage, StageResult, Work
+from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic.microstructure import Microstructure, study
 from alphacut.stochastic.microstructure_summary import fragment, summary, to_dataset
 
@@ -27,7 +27,7 @@ def stage(section: MicrostructureSection, spheres: bool, figures: bool = True) -
 
 
 def compute_map(
-    section: MicrostructureSection, spheres: bool, figures: bool, work: Work
+    section: MicrostructureSection, spheres: bool, figures: bool, context: StageContext
 ) -> StageResult:
     """Computes the fuzzy radius map of particles; the same for any number of workers.
 
@@ -35,11 +35,11 @@ def compute_map(
         RefusedError: Measured data have no meaning.
         FailedError: The packing is too dense.
     """
-    with pool(work.workers) as executor:
-        result = study(section.study(spheres=spheres), executor=executor, progress=work.tick)
+    with pool(context.workers) as executor:
+        result = study(section.study(spheres=spheres), executor=executor, progress=context.tick)
     numbers = summary(result)
-    if work.folder is not None:
-        write_files(result, numbers, work.folder, figures=figures)
+    if context.folder is not None:
+        write_files(result, numbers, context.folder, figures=figures)
     return StageResult(numbers, to_dataset(result))
 
 

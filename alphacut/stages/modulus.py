@@ -49,7 +49,7 @@ from alphacut.stages.cell import (
 )
 from alphacut.stages.losses import LossCuts, loss_bounds, loss_document
 from alphacut.stages.plane import PLANE, plane_outputs
-from alphacut.stages.store import Stage, StageResult, Work
+from alphacut.stages.store import Stage, StageContext, StageResult
 from alphacut.stochastic.theta.quadrature import between_nodes
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class CellTask:
     def _outputs(self, result: HomogenisedStiffness) -> dict[str, float | Array]:
         """Outputs of a cell by name, in SI; the stress curve has shape (CURVE_POINTS,)."""
         curve = result.curve
-        fibres = fibre_constants(result).values if self.cell.fibres else {}
+        fibres = fibre_constants(result).values if self.cell.is_fibre else {}
         losses = {} if self.losses is None else loss_outputs(result, self.losses)
         return {
             "E": result.modulus,
@@ -202,16 +202,16 @@ class CellCampaign:
         crisp = {name: x.modal for name, x in numbers.items() if name not in self.inputs}
         return CellTask(self.model(), self.radius, self.cell, crisp, self.losses)
 
-    def run(self, work: Work) -> StageResult:
+    def run(self, context: StageContext) -> StageResult:
         """Computes all samples and the α-cuts; stored samples of an interrupted run are taken."""
         result = self.propagation(
             self.inputs,
             PLANS[self.modulus.plan],
-            workers=work.workers,
-            progress=work.tick or False,
+            workers=context.workers,
+            progress=context.tick or False,
             knowledge=self.knowledge,
-            store=work.samples,
-            identity=self.identity if work.samples else None,
+            store=context.samples,
+            identity=self.identity if context.samples else None,
         )
         self.require_consistent(result)
         return stage_result(result, self)

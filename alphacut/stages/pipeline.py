@@ -31,7 +31,7 @@ from alphacut.stages.envelope import EnvelopeTask, peaks_from_document
 from alphacut.stages.modulus import CellCampaign
 from alphacut.stages.readiness import campaign_of, cut_record_warnings
 from alphacut.stages.results import Results
-from alphacut.stages.store import Stage, StageResult, StageStore, Work
+from alphacut.stages.store import Stage, StageContext, StageResult, StageStore
 
 if TYPE_CHECKING:
     import xarray
@@ -93,8 +93,8 @@ class Pipeline:
     def compute_modulus(self) -> None:
         """Computes stage modulus, of an image or of samples of a cell, and checks its errors."""
         results, section = self.results, self.content.modulus
-        if self.content.picture is not None:
-            stage = image.stage(self.content.picture, section.alpha, section.average)
+        if self.content.image_cell is not None:
+            stage = image.stage(self.content.image_cell, section.alpha, section.average)
             results.image = self.store.take(stage)
             return
         results.modulus = data = self.store.take(modulus.stage(self.campaign))
@@ -115,7 +115,7 @@ class Pipeline:
         loss = None if data is None else modulus.fuzzy_loss(data)
         if section is None or content.envelope is None:
             raise RefusedError("envelope", None, "a structure and a section [envelope]")
-        has_modulus = young is not None or content.has_own_modulus
+        has_modulus = young is not None or content.has_stated_modulus
         allowed = "a modulus, or --modulus FILE.nc"
         require(has_modulus, "frame.modulus", value=None, allowed=allowed)
         by_material = isinstance(getattr(section, "damping_ratio", None), MaterialDamping)
@@ -205,6 +205,6 @@ class Pipeline:
         return peaks_from_document(result.document["peak"], alpha)
 
 
-def answer_of(question: Question, response: FuzzyResponse, work: Work) -> StageResult:
+def answer_of(question: Question, response: FuzzyResponse, context: StageContext) -> StageResult:
     """The answer to a question about a response."""
-    return StageResult(question.answer(replace(response, progress=work.tick)))
+    return StageResult(question.answer(replace(response, progress=context.tick)))

@@ -36,22 +36,21 @@ def require_runnable(content: Content) -> None:
 
 def _require_material(content: Content) -> None:
     """Requires a mesh, an image or a model of the cell that stage modulus can use."""
-    if "envelope" in content.stages and not content.has_own_modulus:
+    if "envelope" in content.stages and not content.has_stated_modulus:
         require_levels(content.modulus.alpha, "modulus.alpha")
-    if content.meshed is not None:
-        require_mesh(content.mesh, *content.meshed_cell)
-    if content.picture is not None:
-        image.image_study(content.picture)
+    if content.mesh_cell is not None:
+        require_mesh(content.mesh, *content.law_and_phases)
+    if content.image_cell is not None:
+        image.image_study(content.image_cell)
     elif "microstructure" not in content.stages:
         _ = campaign_of(content).propagation  # builds the model and the plan
-    elif content.round is not None:
-        model_of(content.round, content.mesh, content.modulus)
+    elif content.particle_cell is not None:
+        model_of(content.particle_cell, content.mesh, content.modulus)
 
 
 def campaign_of(content: Content, petsc: Mapping[str, str] | None = None) -> CellCampaign:
     """Samples of a cell that is no image, by a solver with options of PETSc."""
-    radius, cell = content.round_cell if content.meshed is None else content.meshed_cell
-    sections = radius, cell, content.mesh, content.modulus
+    sections = *content.random_cell, content.mesh, content.modulus
     return CellCampaign(*sections, petsc or {}, content.stated_fraction)
 
 
@@ -79,7 +78,7 @@ def _stand_in_modulus(content: Content) -> FuzzyNumber | None:
     if "modulus" not in content.stages:
         return None
     value = STAND_IN.modal
-    is_fuzzy = content.picture is not None or "microstructure" in content.stages
+    is_fuzzy = content.image_cell is not None or "microstructure" in content.stages
     if not is_fuzzy:
         inputs = campaign_of(content).inputs.values()
         is_fuzzy = any(number.support.width > 0 for number in inputs)

@@ -25,7 +25,7 @@ from alphacut.io.files import Document
 from alphacut.io.provenance import NESTED
 from alphacut.stages.envelope import EnvelopeTask
 from alphacut.stages.modulus import OUTPUTS, CellCampaign
-from alphacut.stages.store import Stage, StageResult, Work
+from alphacut.stages.store import Stage, StageContext, StageResult
 
 ACCURACY = 2e-3
 """Relative error of each peak that shares of two digits need where widths are a fifth of peaks."""
@@ -48,7 +48,7 @@ def compute_shares(
     campaign: CellCampaign | None,
     structure: Structure | None,
     task: EnvelopeTask | None,
-    work: Work,
+    context: StageContext,
 ) -> StageResult:
     """Computes each input's share in the widths of E, ν and peaks on the lowest level.
 

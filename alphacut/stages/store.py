@@ -36,7 +36,7 @@ PARTS = "parts"
 
 
 @dataclass(frozen=True)
-class Work:
+class StageContext:
     """Surroundings of a computation.
 
     Args:
@@ -97,7 +97,7 @@ class Stage:
     name: str
     inputs: object
     packages: tuple[str, ...]
-    compute: Callable[[Work], StageResult]
+    compute: Callable[[StageContext], StageResult]
     has_samples: bool = False
 
     @property
@@ -106,9 +106,9 @@ class Stage:
         return fingerprint(self.inputs, self.packages)
 
     @on_one_blas_thread
-    def run(self, work: Work) -> StageResult:
+    def run(self, context: StageContext) -> StageResult:
         """The result, computed."""
-        return self.compute(work)
+        return self.compute(context)
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ class StageStore:
         fresh: Whether everything is computed anew.
         quiet: Whether nothing is shown.
         workers: Processes of a stage.
-        taken: Names of the stages whose files were up to date.
+        up_to_date: Names of the stages whose files were up to date.
     """
 
     folder: ResultsFolder | None
@@ -129,10 +129,10 @@ class StageStore:
     fresh: bool = False
     quiet: bool = False
     workers: int = 1
-    taken: list[str] = field(default_factory=list)
+    up_to_date: list[str] = field(default_factory=list)
 
     @property
-    def shown(self) -> bool:
+    def shows_progress(self) -> bool:
         """True where progress is shown, by the first rank alone."""
         return not self.quiet and rank() == 0
 
@@ -154,8 +154,8 @@ class StageStore:
         stale = [stage for stage in stages if stage.name not in results]
         if executor is None or self.folder is None or len(stale) == 1:
             return results | {stage.name: self._compute(stage) for stage in stale}
-        stage_of_future = {executor.submit(stage.run, Work()): stage for stage in stale}
-        with progress_reporter(self.shown) as tick:
+        stage_of_future = {executor.submit(stage.run, StageContext()): stage for stage in stale}
+        with progress_reporter(self.shows_progress) as tick:
             for count, future in enumerate(as_completed(stage_of_future), start=1):
                 stage = stage_of_future[future]
                 with self._report_failures(stage):
@@ -168,22 +168,22 @@ class StageStore:
 
     def _read_if_current(self, stage: Stage) -> StageResult | None:
         """The result in the files of a stage; None where these are missing, changed or outdated."""
-        if self.folder is None or self.fresh or stage.name not in self.folder.parts:
+        if self.folder is None or self.fresh or stage.name not in self.folder.stage_files:
             return None
-        part = self.folder.parts[stage.name]
+        part = self.folder.stage_files[stage.name]
         if part.fingerprint != stage.key:
             return None
         if problem := self.folder.problem(stage.name):
             say(f"warning: {problem}; {stage.name} is computed anew")
             return None
-        self.taken.append(stage.name)
+        self.up_to_date.append(stage.name)
         LOG.info("stage %s is taken from its files", stage.name)
         return self._read(stage.name)
 
     def _read(self, name: str) -> StageResult:
         """The result in the files of a stage, NAME.json and perhaps NAME.nc."""
         assert self.folder is not None
-        part = self.folder.parts[name]
+        part = self.folder.stage_files[name]
         document = json.loads(self.folder.content(f"{name}.json"))["result"]
         has_data = f"{name}.nc" in part.files
         data = dataset_of(self.folder.content(f"{name}.nc")) if has_data else None
@@ -193,15 +193,15 @@ class StageStore:
         """Computes the result of a stage, and writes it into its files if there is a folder."""
         LOG.info("stage %s is computed", stage.name)
         if self.folder is None:
-            with progress_reporter(self.shown) as tick:
-                result = stage.run(Work(workers=self.workers, tick=tick))
+            with progress_reporter(self.shows_progress) as tick:
+                result = stage.run(StageContext(workers=self.workers, tick=tick))
             return replace(result, document=json.loads(as_json(result.document)))
         self.folder.require_free(f"{stage.name}.json")
         self.folder.require_free(f"{stage.name}.nc")
         samples = self._sample_store(self.folder) if stage.has_samples else None
         with TemporaryDirectory() as scratch, self._proof_folder(self.folder, stage) as parts:
-            with progress_reporter(self.shown) as tick, self._report_failures(stage):
-                result = stage.run(Work(Path(scratch), samples, self.workers, tick, parts))
+            with progress_reporter(self.shows_progress) as tick, self._report_failures(stage):
+                result = stage.run(StageContext(Path(scratch), samples, self.workers, tick, parts))
             return self._write(stage, result, Path(scratch))
 
     @contextmanager
@@ -232,7 +232,7 @@ class StageStore:
         Raises:
             RefusedError: The run is fresh, and there is a store that no manifest lists.
         """
-        path, is_listed = folder.path / SAMPLES, SAMPLES in folder.parts
+        path, is_listed = folder.path / SAMPLES, SAMPLES in folder.stage_files
         exists = os.path.lexists(path)
         fits, cure = is_listed or not (exists and self.fresh), "move it away, or leave out --fresh"
         require(fits, str(path), value="listed in no manifest", allowed="none", cure=cure)

@@ -38,7 +38,7 @@ QUANTILES = {"mean": None, "median": 0.5, "84 %": 0.84}
 
 
 @dataclass(frozen=True)
-class Nominal:
+class NominalMode:
     """First mode of the structure at its most plausible inputs.
 
     Args:
@@ -71,7 +71,7 @@ class SuiteRecord:
     offset_share: float
 
 
-def nominal_mode(structure: Structure) -> Nominal:
+def nominal_mode(structure: Structure) -> NominalMode:
     """First mode at the most plausible inputs.
 
     Raises:
@@ -81,7 +81,7 @@ def nominal_mode(structure: Structure) -> Nominal:
         what = "with a system that is not linear"
         raise RefusedError("records", what, "linear structures")
     omega, ratios = modal_damping_ratios(structure.linear)
-    return Nominal(2 * pi / float(omega[0]), float(ratios[0]))
+    return NominalMode(2 * pi / float(omega[0]), float(ratios[0]))
 
 
 def suite_records(
@@ -93,7 +93,7 @@ def suite_records(
 
 
 def _suite_record(
-    section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: Nominal
+    section: RecordsSection, envelope: EnvelopeSection, named: NamedRecording, mode: NominalMode
 ) -> SuiteRecord:
     """A recording after correction, trimming and scaling, and the length of the motion under it."""
     ground = named.recording.accelerogram(baseline=section.baseline, trim=section.trim)
@@ -169,7 +169,7 @@ def peaks_by_record(
 
 
 def suite_response(
-    peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal
+    peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: NominalMode
 ) -> SuiteResponse:
     """Motions under all records, to which questions are put."""
     measures = {record.name: record.measures for record in records}
@@ -211,7 +211,9 @@ def with_means(worst: Peaks, peaks: Mapping[str, Peaks]) -> Peaks:
     return joined(worst, mean)
 
 
-def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: Nominal) -> Document:
+def document(
+    peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: NominalMode
+) -> Document:
     """Numbers on a suite: measures and peaks of each record, statistics of peaks, and spectra."""
     first = next(iter(peaks.values()))
     outputs = {
@@ -242,7 +244,7 @@ def document(peaks: Mapping[str, Peaks], records: Sequence[SuiteRecord], mode: N
     }
 
 
-def spectrum(ground: Accelerogram, mode: Nominal) -> Array:
+def spectrum(ground: Accelerogram, mode: NominalMode) -> Array:
     """Pseudo-accelerations at `PERIODS` with the nominal damping, in m/s²."""
     ratio = min(mode.ratio, 0.999)
     return np.array([spectral_acceleration(ground, float(x), ratio) for x in PERIODS])

@@ -46,8 +46,8 @@ def test_sections_hold_objects_in_si(tmp_path):
 
 
 def test_a_cell_is_round_or_an_image(tmp_path):
-    assert read(tmp_path, CELL).round.particles == "cylinders"
-    assert load(ROOT / "cases/composite.toml").content.picture.pairs[0][0] == Triangular(
+    assert read(tmp_path, CELL).particle_cell.particles == "cylinders"
+    assert load(ROOT / "cases/composite.toml").content.image_cell.pairs[0][0] == Triangular(
         19e9, 20e9, 21e9
     )
 
@@ -114,7 +114,7 @@ def test_what_is_wrong_with_a_cell(tmp_path, old, new, key):
 
 def test_spheres_need_a_method_of_spheres(tmp_path):
     text = CELL.replace("[cell]", '[cell]\nparticles = "spheres"')
-    assert read(tmp_path, text).round.particles == "spheres"
+    assert read(tmp_path, text).particle_cell.particles == "spheres"
     (problem,) = problems(tmp_path, text.replace('"series"', '"slices"'))
     assert problem.key == "modulus.method"
 
@@ -142,7 +142,7 @@ def fraction_case(particles, fraction):
     ("particles", "factor", "power"), [("spheres", np.pi / 6, 3), ("cylinders", np.pi / 4, 2)]
 )
 def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, factor, power):
-    radius, _ = read(tmp_path, fraction_case(particles, "[0.2, 0.3, 0.4]")).round_cell
+    radius, _ = read(tmp_path, fraction_case(particles, "[0.2, 0.3, 0.4]")).radius_and_phases
     assert [*radius.numbers] == ["fraction"]
     for fraction in (0.2, 0.3, 0.4):
         radii = radius.at({"fraction": fraction})(np.linspace(-3, 3, 5))
@@ -163,7 +163,7 @@ def test_a_fraction_is_a_map_that_is_crisp_over_theta(tmp_path, particles, facto
 def test_a_fraction_ends_where_particles_touch(tmp_path, particles, fraction, key):
     text = fraction_case(particles, fraction)
     if key is None:
-        assert read(tmp_path, text).round_cell
+        assert read(tmp_path, text).radius_and_phases
     else:
         assert key in [problem.key for problem in problems(tmp_path, text)]
 

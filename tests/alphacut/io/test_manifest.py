@@ -154,9 +154,9 @@ def check_damage(finished, place, seed, kinds, capfd):
     assert strange_state(place) == before, label
     if statuses[1] == 0:
         assert numbers(copy) == numbers(finished[1]), label
-        assert not ResultsFolder.opened(copy).is_lost, label
-        listed = ResultsFolder.opened(copy)
-        stages = listed.parts.keys() - {"report.html", "samples.db"}
+        assert not ResultsFolder.read(copy).is_damaged, label
+        listed = ResultsFolder.read(copy)
+        stages = listed.stage_files.keys() - {"report.html", "samples.db"}
         assert not list(filter(None, map(listed.problem, stages))), label
     return statuses, label
 
@@ -210,7 +210,7 @@ def test_a_manifest_lists_no_file_outside(tmp_path):
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "out").mkdir()
     ResultsFolder(tmp_path / "out").list_files("figures", "1", {"../precious": ""})
-    folder = ResultsFolder.opened(tmp_path / "out")
+    folder = ResultsFolder.read(tmp_path / "out")
     folder.clear()
     assert (tmp_path / "precious").exists()
 

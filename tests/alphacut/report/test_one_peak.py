@@ -18,7 +18,7 @@ from alphacut.report.tables import write_tables
 def told(results, tmp_path_factory):
     """Summary, rows of the table of peaks, and page of a frame with questions on two limits."""
     summary = json.loads((results / "summary.json").read_text(encoding="utf-8"))
-    opened, folder = ResultsFolder.opened(results), tmp_path_factory.mktemp("csv")
+    opened, folder = ResultsFolder.read(results), tmp_path_factory.mktemp("csv")
     write_tables(summary, opened, folder)
     with (folder / "peaks.csv").open(encoding="utf-8") as file:
         return summary, list(csv.DictReader(file)), render_page(opened)

@@ -30,25 +30,25 @@ def changed(results, folder, **keys):
     copy = folder / "copy"
     shutil.copytree(results, copy)
     text = json.dumps({**summary_of(results), **keys})
-    put_text(ResultsFolder.opened(copy), "summary.json", text)
-    return ResultsFolder.opened(copy)
+    put_text(ResultsFolder.read(copy), "summary.json", text)
+    return ResultsFolder.read(copy)
 
 
 def test_the_page_asks_nothing_of_the_network_and_shows_each_figure_once(results):
-    page = render_page(ResultsFolder.opened(results))
+    page = render_page(ResultsFolder.read(results))
     assert not re.search(r'(src|href)="(?!data:)', page)
     drawn = [name for name in summary_of(results)["figures"] if name.endswith(".png")]
     assert page.count("data:image/png;base64,") == len(drawn) > 5
 
 
 def test_texts_of_the_case_are_no_markup(results):
-    page = render_page(ResultsFolder.opened(results))
+    page = render_page(ResultsFolder.read(results))
     assert "<script>alert" not in page
     assert "Two floors &lt;script&gt;" in page
 
 
 def test_every_question_has_its_answer_on_the_page(results):
-    page = render_page(ResultsFolder.opened(results))
+    page = render_page(ResultsFolder.read(results))
     for words in ("Can or must limits be exceeded?", "How far may tolerances go?", "How probable"):
         assert page.count(words) == 1
 
@@ -144,7 +144,7 @@ def tables(results, tmp_path_factory):
     folder = tmp_path_factory.mktemp("csv")
     return {
         file.stem: list(csv.reader(file.open(encoding="utf-8")))
-        for file in write_tables(summary_of(results), ResultsFolder.opened(results), folder)
+        for file in write_tables(summary_of(results), ResultsFolder.read(results), folder)
     }
 
 

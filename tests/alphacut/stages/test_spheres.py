@@ -21,7 +21,7 @@ def case(folder: Path, fraction: float):
 @pytest.mark.parametrize("fraction", [0.1, 0.3, 0.4, 0.5])
 def test_spheres_of_one_size_hold_the_fraction_and_lie_within_its_bounds(tmp_path, fraction):
     content = case(tmp_path, fraction)
-    radius, cell = content.round_cell
+    radius, cell = content.radius_and_phases
     result = solve(radius, cell, model_of(cell, content.mesh, content.modulus))
     bounds = references(radius, cell, content.stated_fraction)
     assert bounds["fraction"] == pytest.approx(fraction, rel=1e-12)
@@ -35,7 +35,7 @@ def test_a_modulus_outside_the_bounds_of_the_stated_fraction_is_refused(
     tmp_path, fraction, low, modulus
 ):
     """Both moduli are those of maps that had lost a fifth of the spheres."""
-    radius, cell = case(tmp_path, 0.3).round_cell
+    radius, cell = case(tmp_path, 0.3).radius_and_phases
     bounds = references(radius, cell, fraction)
     ends = np.array(bounds["hashin_shtrikman_E_GPa"])
     assert ends[0] == pytest.approx(low, rel=1e-7)

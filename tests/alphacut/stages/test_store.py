@@ -44,7 +44,7 @@ def counted():
 
 def store_in(folder, **options):
     """A store as a new process opens it."""
-    return StageStore(ResultsFolder.opened(folder), "the case", quiet=True, **options)
+    return StageStore(ResultsFolder.read(folder), "the case", quiet=True, **options)
 
 
 def test_a_stage_is_computed_once_until_its_inputs_change(tmp_path):
@@ -208,7 +208,7 @@ def test_few_files_import_the_case():
 def test_a_borrowed_folder_is_not_believed(tmp_path):
     folder = tmp_path / "out"
     assert main(["run", str(written(tmp_path, CELL)), "--out", str(folder), "--no-figures"]) == 0
-    results = ResultsFolder.opened(folder)
+    results = ResultsFolder.read(folder)
     summary = read_summary(results)
     require_same_run(summary, results)
     with pytest.raises(RefusedError, match="of another run"):
@@ -216,7 +216,7 @@ def test_a_borrowed_folder_is_not_believed(tmp_path):
     for text in ("", "[]", "{}", "[" * 100_000, '{"case": 1}', "null"):
         (folder / "summary.json").write_text(text)
         with pytest.raises(RefusedError, match="damaged"):
-            read_summary(ResultsFolder.opened(folder))
+            read_summary(ResultsFolder.read(folder))
 
 
 def test_peaks_pass_through_a_document_with_their_infinite_bounds():
