@@ -29,34 +29,34 @@ from alphacut.fuzzy.refused import (
     require_choice,
 )
 
-MOST_NODES = 10_000_000
-"""Steps of a motion at most: bounds of one output at two levels are 320 MB of them."""
+MAX_STEPS = 10_000_000
+"""Most steps of a motion: bounds of one output at two levels are 320 MB of them."""
 
 
 def nodes(duration: float, step: float) -> Array:
-    """Time nodes from 0 to `duration` in s.
+    """Return time nodes 0, step, 2 step … up to `duration`, shape (T,), in s.
 
     Raises:
-        RefusedError: One is no number, the step is not positive, or the duration is not a positive
-            multiple of it, or of too many steps.
+        RefusedError: An argument is not a number, the step is not positive, or the duration is not
+            a whole number of steps from 1 to `MAX_STEPS`.
     """
     checked_number("step", step, positive=True)
     count = round(checked_number("duration", duration) / step)
-    is_multiple = 1 <= count <= MOST_NODES and abs(count * step - duration) <= 1e-9 * duration
+    is_multiple = 1 <= count <= MAX_STEPS and abs(count * step - duration) <= 1e-9 * duration
     require(
         is_multiple,
         "duration",
         value=f"{duration:g} s",
-        allowed=f"1 to {MOST_NODES:,} whole steps of {step:g} s",
+        allowed=f"1 to {MAX_STEPS:,} whole steps of {step:g} s",
     )
     return np.arange(count + 1) * step
 
 
-PARTS, MOST = 4, 64
-"""Parts of a step that are looked at in a linear structure."""
-PHASE = 0.8
+MIN_PARTS, MAX_PARTS = 4, 64
+"""Fewest and most parts of a step in `LinearFlow.finer`."""
+MAX_PHASE = 0.8
 """Most phase in rad that the fastest mode takes in a part, up to the most parts."""
-WITHIN = "keep the parameters where the motion exists, such as positive masses"
+CURE = "keep the parameters where the motion exists, such as positive masses"
 
 
 class StepError(FailedError):
@@ -104,11 +104,11 @@ class Flow(ABC):
 
     @abstractmethod
     def finer(self) -> tuple[Flow, int]:
-        """More accurate trajectories at nodes a part of a step apart, and how many parts."""
+        """Return a more accurate flow with steps divided into parts, and the number of parts."""
 
     @abstractmethod
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """More accurate trajectories at points (S, d), and the errors of these, (S, T, m)."""
+        """Return more accurate trajectories at points (S, d) and this flow's errors, (S, T, m)."""
 
     @cached_property
     def time(self) -> Array:
@@ -130,25 +130,39 @@ class Flow(ABC):
         return self._finite(points, derivatives=True)
 
     def _finite(self, points: Array, *, derivatives: bool) -> Jet:
+        """Return trajectories at points (S, d), V = (S, T, outputs), all of them finite.
+
+        Args:
+            points: Uncertain parameters, in SI units.
+            derivatives: Whether to differentiate by the parameters.
+
+        Raises:
+            RefusedError: A matrix is singular or a value not finite; the message names the point.
+            StepError: A step did not converge; the message names the point.
+        """
         try:
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 motion = self._march(points, derivatives=derivatives)
         except StepError as failure:
-            where = self._named(self._failing(points))
+            where = self._point_words(self._failing_point(points))
             raise StepError(f"{failure}; it failed at {where}") from None
         except np.linalg.LinAlgError:
-            what = f"a singular matrix at {self._named(self._failing(points))}"
-            raise RefusedError("trajectory", what, "motions that exist", WITHIN) from None
+            what = f"a singular matrix at {self._point_words(self._failing_point(points))}"
+            raise RefusedError("trajectory", what, "motions that exist", CURE) from None
         finite = np.isfinite(motion.value).all(-1)
         if not finite.all():
-            bad, node = np.argwhere(~finite)[0]
-            what = f"not finite from t = {self.time[node]:g} s on at {self._named(points[bad])}"
-            cure = f"{WITHIN}, or a smaller step"
+            row, node = np.argwhere(~finite)[0]
+            where = self._point_words(points[row])
+            what = f"not finite from t = {self.time[node]:g} s on at {where}"
+            cure = f"{CURE}, or a smaller step"
             raise RefusedError("trajectory", what, "motions that exist", cure)
         return motion
 
-    def _failing(self, points: Array) -> Array:
-        """One of some points at which a motion fails, found by halving."""
+    def _failing_point(self, points: Array) -> Array:
+        """Return one of the points (S, d) at which the motion fails, shape (d,), by bisection.
+
+        The motion is known to fail at one of them or more.
+        """
         while len(points) > 1:
             half = points[: len(points) // 2]
             try:
@@ -158,7 +172,8 @@ class Flow(ABC):
                 points = half
         return np.asarray(points[0])
 
-    def _named(self, point: Array) -> str:
+    def _point_words(self, point: Array) -> str:
+        """Return a point (d,) as a text with names and values of its parameters."""
         pairs = zip(self.names, point, strict=True)
         return ", ".join(f"{name} = {x:g}" for name, x in pairs) or "the nominal parameters"
 
@@ -190,21 +205,30 @@ class LinearFlow(Flow):
         return self.integrator.name
 
     def finer(self) -> tuple[LinearFlow, int]:
-        """Exact trajectories at nodes a part of a step apart, and how many parts."""
-        turn = float(frequencies(self.system)[-1]) * self.step
-        parts = int(np.clip(np.ceil(turn / PHASE), PARTS, MOST))
+        """Return the exact flow with steps divided into equal parts, and the number of parts.
+
+        There are so many that the fastest mode turns by `MAX_PHASE` at most in each of them.
+        """
+        phase_per_step = float(frequencies(self.system)[-1]) * self.step
+        parts = int(np.clip(np.ceil(phase_per_step / MAX_PHASE), MIN_PARTS, MAX_PARTS))
         return replace(self, step=self.step / parts, integrator=Exact()), parts
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Exact trajectories at points (S, d), and the errors of these, (S, T, m)."""
+        """Return exact trajectories at points (S, d) and this flow's errors, (S, T, m) each."""
         truth = replace(self, integrator=Exact()).values(points)
         return truth, np.abs(self.values(points) - truth)
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Return trajectories x[k+1] = T x[k] + G load[k] of the outputs, V = (S, T, outputs).
+
+        Args:
+            points: Uncertain parameters, shape (S, d), in SI units.
+            derivatives: Whether to differentiate by them.
+        """
         matrices, rows = evaluate(self.system, self.names, points, derivatives=derivatives)
         loads, has_ground = list(histories(self.system).values()), self.system.ground is not None
         h, steps, load = self.step, len(self.time) - 1, None
-        pushes = matrices.pushes(ground=has_ground)
+        pushes = matrices.pushes(ground=has_ground)  # accelerations by a unit of each load
         if self.exact and loads:
             step_map, load = exact_response(matrices, pushes, loads, step=h, steps=steps)
         else:
@@ -215,15 +239,16 @@ class LinearFlow(Flow):
         motion = trajectory(step_map, matrices.start, rows, load=load, count=steps + 1)
         if matrices.feeds is None:
             return motion
+        # accelerations among the outputs also hold the forces themselves, over the masses
         at_nodes = np.stack([x.values(self.time) for x in courses_of_forces(self.system)])
         return motion + (matrices.feeds @ at_nodes).map(lambda x: x.swapaxes(-1, -2))
 
 
 def exact_flow(flow: object) -> LinearFlow:
-    """The flow, if it is the exact motion of a linear structure.
+    """Return a flow unchanged if it is the exact motion of a linear structure.
 
     Raises:
-        UnprovedError: It is none.
+        UnprovedError: The system is not linear, or the integrator is not the exact one.
     """
     if not isinstance(flow, LinearFlow):
         raise UnprovedError("the system is not linear")

@@ -53,17 +53,26 @@ class Midpoint:
     stability_limit: ClassVar[float] = inf
 
     def step_map(self, matrices: Matrices, step: float, pushes: Jet) -> StepMap:
-        """The map of one step; its velocity is M⁻¹ times the discrete momentum."""
+        """Return the map of one step, whose velocities are M⁻¹ times the discrete momenta.
+
+        Args:
+            matrices: M, D and K at S parameter sets.
+            step: Length h of a step, in s.
+            pushes: Accelerations by a unit of each load, V = (S, n, L).
+        """
         m, h = matrices, step
         inertia, spring = m.mass * (1 / h) + m.damping * 0.5, m.stiffness * (h / 4)
-        left = inverse(inertia + spring)
-        forward = left @ (inertia - spring)
-        kick = left @ m.mass
-        push = kick @ (concatenate([pushes, pushes], -1) * (h / 4))  # half a step of the mean load
+        implicit_inverse = inverse(inertia + spring)
+        # q[k+1] = q_by_q q[k] + q_by_v v[k] + q_by_load load[k]
+        # v[k+1] = 2 (q[k+1] − q[k])/h − v[k]
+        q_by_q = implicit_inverse @ (inertia - spring)
+        q_by_v = implicit_inverse @ m.mass
+        q_by_load = q_by_v @ (concatenate([pushes, pushes], -1) * (h / 4))  # the mean load, h/2
         eye = np.eye(m.mass.value.shape[-1])
-        upper = concatenate([forward, kick], -1)
-        lower = concatenate([(forward - eye) * (2 / h), kick * (2 / h) - eye], -1)
-        return StepMap(concatenate([upper, lower], -2), concatenate([push, push * (2 / h)], -2))
+        upper = concatenate([q_by_q, q_by_v], -1)
+        lower = concatenate([(q_by_q - eye) * (2 / h), q_by_v * (2 / h) - eye], -1)
+        load = concatenate([q_by_load, q_by_load * (2 / h)], -2)
+        return StepMap(concatenate([upper, lower], -2), load)
 
 
 @dataclass(frozen=True)
@@ -130,7 +139,10 @@ def exponential(z: Jet) -> Jet:
 
 
 def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
-    """State matrix extended by L loads and their increments, shape (S, 2n + 2L, 2n + 2L).
+    """Return the state matrix extended by L loads and their rises in a step.
+
+    Its exponential over a step maps [q; v; load; rise] to their values one step later, for loads
+    that are linear in the step. Shape (S, 2n + 2L, 2n + 2L).
 
     Args:
         m: The structure.
@@ -140,21 +152,25 @@ def loaded_flow(m: Matrices, step: float, pushes: Jet) -> Jet:
     flow = state_matrix(m)
     n, count = pushes.value.shape[-2:]
     size = 2 * (n + count)
-    out = flow.like(np.zeros((len(flow.value), size, size)))
-    for target, part, push in zip(
-        (out.value, out.first, out.second),
+    extended = flow.like(np.zeros((len(flow.value), size, size)))
+    for target, state_part, load_part in zip(  # values, first and second derivatives
+        (extended.value, extended.first, extended.second),
         (flow.value, flow.first, flow.second),
         (pushes.value, pushes.first, pushes.second),
         strict=True,
     ):
-        target[..., : 2 * n, : 2 * n] = part
-        target[..., n : 2 * n, 2 * n : 2 * n + count] = push
-    out.value[:, 2 * n : 2 * n + count, 2 * n + count :] = np.eye(count) / step
-    return out
+        target[..., : 2 * n, : 2 * n] = state_part
+        target[..., n : 2 * n, 2 * n : 2 * n + count] = load_part
+    # the rate of each load is its rise over the step
+    extended.value[:, 2 * n : 2 * n + count, 2 * n + count :] = np.eye(count) / step
+    return extended
 
 
 def split(extended: Jet, count: int) -> StepMap:
-    """Separates state and L loads; their columns become f(t_k) and then f(t_{k+1})."""
+    """Return the step map of a propagator of states, `count` loads and their rises in a step.
+
+    Columns of loads and rises become columns of the loads at the beginning and the end of a step.
+    """
     n = extended.value.shape[-1] - 2 * count
     old, rise = extended[..., :n, n : n + count], extended[..., :n, n + count :]
     return StepMap(extended[..., :n, :n], concatenate([old - rise, rise], -1))

@@ -1,9 +1,8 @@
 """Time steps of general systems with derivatives by the inputs, compiled by Numba.
 
 A state is (q, π), 2n numbers, with first derivatives (d, 2n) and second ones (d, d, 2n) by the
-inputs. The equations come as tapes (`calculus/tape.py`), so that
-one compilation serves all systems. Loops are written out: they compile in a fraction of the time
-that array expressions take.
+inputs. The equations come as tapes (`calculus/tape.py`), so that one compilation serves all
+systems. Loops are written out: they compile in a fraction of the time that array expressions take.
 """
 
 from __future__ import annotations
@@ -49,7 +48,11 @@ def operation(number: int, x: float, y: float) -> float:
 
 @compiled
 def evaluate(tape: Tape, arguments: Array, out: Array) -> None:
-    """Fills `out` (m,) with the expressions of a tape at arguments (K,)."""
+    """Write the values of a tape's m expressions at arguments (K,) to `out`.
+
+    A tape is code (L, 3) of operations and their two operands, the m places of the results, and
+    the places themselves: arguments, then one for the result of each operation.
+    """
     code, results, slots = tape
     for k in range(len(arguments)):
         slots[k] = arguments[k]
@@ -60,8 +63,16 @@ def evaluate(tape: Tape, arguments: Array, out: Array) -> None:
 
 
 @compiled
-def slopes(flat: Array, m: int, a: int, inner1: Array, out1: Array) -> None:
-    """First derivatives (d, m) of f along those of its variables (d, a), from f, f', f'' flat."""
+def chain_rule_first(flat: Array, m: int, a: int, inner1: Array, out1: Array) -> None:
+    """Write first derivatives of m functions f by d inputs to `out1` (d, m), by the chain rule.
+
+    Args:
+        flat: Values (m,) and derivatives (m, a) of f by its a variables, one after the other.
+        m: Number of functions.
+        a: Number of variables.
+        inner1: First derivatives of the variables by the inputs, shape (d, a).
+        out1: Written.
+    """
     for i in range(len(inner1)):
         for c in range(m):
             total = 0.0
@@ -71,38 +82,51 @@ def slopes(flat: Array, m: int, a: int, inner1: Array, out1: Array) -> None:
 
 
 @compiled
-def chain(
+def chain_rule_second(
     flat: Array, m: int, a: int, inner1: Array, inner2: Array, out1: Array, out2: Array
 ) -> None:
-    """The same with second derivatives (d, d, m) along those of the variables (d, d, a)."""
-    slopes(flat, m, a, inner1, out1)
-    d, half, bent = len(inner1), np.empty(a), m + m * a
+    """Write derivatives of m functions f by d inputs to `out1` (d, m) and `out2` (d, d, m).
+
+    Args:
+        flat: f (m,) and derivatives (m, a), (m, a, a) by its variables, one after the other.
+        m: Number of functions.
+        a: Number of variables.
+        inner1: First derivatives of the variables by the inputs, shape (d, a).
+        inner2: Their second derivatives, shape (d, d, a).
+        out1: Written: first derivatives of the functions.
+        out2: Written: second ones.
+    """
+    chain_rule_first(flat, m, a, inner1, out1)
+    d, hessian_row, hessian_at = len(inner1), np.empty(a), m + m * a
     for c in range(m):
         for i in range(d):
-            for y in range(a):
-                half[y] = 0.0
+            for y in range(a):  # the Hessian of f_c times the derivatives by input i
+                hessian_row[y] = 0.0
                 for x in range(a):
-                    half[y] += flat[bent + (c * a + x) * a + y] * inner1[i, x]
+                    hessian_row[y] += flat[hessian_at + (c * a + x) * a + y] * inner1[i, x]
             for j in range(i, d):
                 total = 0.0
                 for x in range(a):
-                    total += flat[m + c * a + x] * inner2[i, j, x] + half[x] * inner1[j, x]
+                    total += flat[m + c * a + x] * inner2[i, j, x] + hessian_row[x] * inner1[j, x]
                 out2[i, j, c] = out2[j, i, c] = total
 
 
 @compiled
 def solve(matrix: Array, b: Array) -> None:
-    """A⁻¹ b in place of b (n, k) by elimination with row exchanges, A (n, n) unchanged."""
+    """Overwrite right-hand sides b (n, m) with the solutions of A x = b, A (n, n) unchanged.
+
+    Gaussian elimination with row exchanges.
+    """
     n, m, A = len(matrix), b.shape[1], matrix.copy()
     for k in range(n):
-        p = k
+        pivot = k
         for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[p, k]):
-                p = i
+            if abs(A[i, k]) > abs(A[pivot, k]):
+                pivot = i
         for j in range(n):
-            A[k, j], A[p, j] = A[p, j], A[k, j]
+            A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
         for j in range(m):
-            b[k, j], b[p, j] = b[p, j], b[k, j]
+            b[k, j], b[pivot, j] = b[pivot, j], b[k, j]
         for i in range(k + 1, n):
             factor = A[i, k] / A[k, k]
             for j in range(k, n):
@@ -117,8 +141,18 @@ def solve(matrix: Array, b: Array) -> None:
 
 
 @compiled
-def converged(newton: Tape, n: int, arguments: Array, pi: Array, flat: Array) -> bool:
-    """Newton's method for the new q, the first n arguments, whose momentum before is π."""
+def solve_step(newton: Tape, n: int, arguments: Array, pi: Array, flat: Array) -> bool:
+    """Solve for the coordinates after a step by Newton's method; return False if it fails.
+
+    Args:
+        newton: Tape of the momenta before the step (n) and their derivatives by the coordinates
+            after it (n, n).
+        n: Number of coordinates.
+        arguments: Arguments of the tape; the first n, the coordinates after the step, are a guess
+            that is overwritten with the solution.
+        pi: Momenta before the step, shape (n,).
+        flat: Work space, shape (n + n²,).
+    """
     residual, jacobian = np.empty((n, 1)), np.empty((n, n))
     for _ in range(ITERATIONS):
         evaluate(newton, arguments, flat)
@@ -139,42 +173,61 @@ def converged(newton: Tape, n: int, arguments: Array, pi: Array, flat: Array) ->
 
 
 @compiled
-def variational(
+def midpoint_step(
     newton: Tape, step: Tape, n: int, p: Array, h: float, x: Array, x1: Array, x2: Array
 ) -> bool:
-    """One midpoint step in place: π[k] and π[k+1] as functions of q[k+1], q[k] and p, inverted."""
-    d, m, inputs = len(x1), 2 * n, len(p)
+    """Advance a state by one step of the midpoint rule, in place; return False if it fails.
+
+    Args:
+        newton: Tape of the momenta before the step and their derivatives, as of `solve_step`.
+        step: Tape of the momenta before and after the step, with derivatives where d > 0.
+        n: Number of coordinates.
+        p: Parameters, the d inputs first.
+        h: Length of the step, in s.
+        x: Coordinates and momenta, shape (2n,).
+        x1: First derivatives by the inputs, shape (d, 2n).
+        x2: Second ones, shape (d, d, 2n).
+    """
+    d, m, n_parameters = len(x1), 2 * n, len(p)
     a = m + d
-    arguments, before = np.empty(m + inputs + 1), x[n:].copy()
+    arguments, momenta_before = np.empty(m + n_parameters + 1), x[n:].copy()
     for i in range(n):
-        arguments[i] = arguments[n + i] = x[i]
-    for i in range(inputs):
+        arguments[i] = arguments[n + i] = x[i]  # new coordinates, guessed, and old ones
+    for i in range(n_parameters):
         arguments[m + i] = p[i]
-    arguments[m + inputs] = h
-    if not converged(newton, n, arguments, before, np.empty(n + n * n)):
+    arguments[m + n_parameters] = h
+    if not solve_step(newton, n, arguments, momenta_before, np.empty(n + n * n)):
         return False
     flat = np.empty(m + (m * a + m * a * a if d else 0))
     evaluate(step, arguments, flat)
     for i in range(n):
         x[i], x[n + i] = arguments[i], flat[n + i]
     if d:
-        differentiated(flat, n, x1, x2)
+        step_derivatives(flat, n, x1, x2)
     return True
 
 
 @compiled
-def differentiated(flat: Array, n: int, x1: Array, x2: Array) -> None:
-    """Derivatives of a midpoint step in place.
+def step_derivatives(flat: Array, n: int, x1: Array, x2: Array) -> None:
+    """Advance the derivatives of a state by the inputs by one midpoint step, in place.
 
-    With the converged Jacobian J, first derivatives follow from one Newton step on jets, second
-    ones from another.
+    The new coordinates are given implicitly by the momenta before the step, of Jacobian J by them:
+    one linear system with J gives their first derivatives, another one the second derivatives.
+
+    Args:
+        flat: Momenta before and after the step, 2n values, with first and second derivatives by new
+            and old coordinates and the inputs, one after the other.
+        n: Number of coordinates.
+        x1: First derivatives of the state (coordinates, momenta), shape (d, 2n).
+        x2: Second ones, shape (d, d, 2n).
     """
     d, m = len(x1), 2 * n
     a = m + d
     J = np.empty((n, n))
+    # derivatives of the variables (new coordinates, old coordinates, inputs) by the inputs
     inner1, inner2 = np.zeros((d, a)), np.zeros((d, d, a))
     out1, out2 = np.empty((d, m)), np.empty((d, d, m))
-    right, bent = np.empty((n, d)), np.empty((n, d * d))
+    new_first, new_second = np.empty((n, d)), np.empty((n, d * d))
     for i in range(n):
         for j in range(n):
             J[i, j] = flat[m + i * a + j]
@@ -184,28 +237,29 @@ def differentiated(flat: Array, n: int, x1: Array, x2: Array) -> None:
             inner1[i, n + c] = x1[i, c]
             for j in range(d):
                 inner2[i, j, n + c] = x2[i, j, c]
-    slopes(flat, m, a, inner1, out1)  # of what is known, with q[k+1] held
+    # of both momenta while the new coordinates are held
+    chain_rule_first(flat, m, a, inner1, out1)
     for c in range(n):
         for i in range(d):
-            right[c, i] = x1[i, n + c] - out1[i, c]
-    solve(J, right)
+            new_first[c, i] = x1[i, n + c] - out1[i, c]
+    solve(J, new_first)
     for c in range(n):
         for i in range(d):
-            inner1[i, c] = right[c, i]
-    chain(flat, m, a, inner1, inner2, out1, out2)
+            inner1[i, c] = new_first[c, i]
+    chain_rule_second(flat, m, a, inner1, inner2, out1, out2)
     for c in range(n):
         for i in range(d):
             for j in range(d):
-                bent[c, i * d + j] = x2[i, j, n + c] - out2[i, j, c]
-    solve(J, bent)
-    for i in range(d):
+                new_second[c, i * d + j] = x2[i, j, n + c] - out2[i, j, c]
+    solve(J, new_second)
+    for i in range(d):  # coordinates and momenta after the step
         for c in range(n):
             x1[i, c], x1[i, n + c] = inner1[i, c], out1[i, n + c]
             for j in range(d):
-                x2[i, j, c] = bent[c, i * d + j]
+                x2[i, j, c] = new_second[c, i * d + j]
                 total = out2[i, j, n + c]
                 for k in range(n):
-                    total += flat[m + (n + c) * a + k] * bent[k, i * d + j]
+                    total += flat[m + (n + c) * a + k] * new_second[k, i * d + j]
                 x2[i, j, n + c] = total
 
 
@@ -231,20 +285,20 @@ def march(
     out1: Array,
     out2: Array,
 ) -> bool:
-    """Outputs of S motions at T nodes, with derivatives; False where a step does not converge.
+    """Write outputs of S motions at T nodes, with derivatives; return False if a step fails.
 
     Args:
-        newton: Equations of a Newton step.
-        step: A step's values, with derivatives where d > 0.
-        observe: Outputs, likewise.
+        newton: Tape of the momenta before a step and their derivatives, as of `solve_step`.
+        step: Tape of the momenta before and after a step, with derivatives where d > 0.
+        observe: Tape of the outputs of a state, likewise.
         inputs: Inputs and then other parameters, shape (S, K).
         h: Length of a step, in s.
-        state: Initial states (S, 2n), which are advanced, as are their derivatives.
-        first: Shape (S, d, 2n).
-        second: Shape (S, d, d, 2n).
-        out: Filled with outputs, shape (S, T, m).
-        out1: With first derivatives, shape (S, T, d, m).
-        out2: With second ones, shape (S, T, d, d, m).
+        state: Initial coordinates and momenta, shape (S, 2n), overwritten with the last ones.
+        first: Their first derivatives by the d inputs, shape (S, d, 2n), overwritten likewise.
+        second: Their second ones, shape (S, d, d, 2n), overwritten likewise.
+        out: Written: outputs, shape (S, T, m).
+        out1: Written: their first derivatives, shape (S, T, d, m).
+        out2: Written: their second ones, shape (S, T, d, d, m).
     """
     size, d, m = state.shape[1], first.shape[1], out.shape[2]
     n, a = size // 2, size + d
@@ -257,7 +311,7 @@ def march(
         for i in range(len(p)):
             arguments[size + i] = p[i]
         for t in range(out.shape[1]):
-            if t and not variational(newton, step, n, p, h, x, x1, x2):
+            if t and not midpoint_step(newton, step, n, p, h, x, x1, x2):
                 return False
             for c in range(size):
                 arguments[c] = x[c]
@@ -270,12 +324,12 @@ def march(
                         inner1[i, c] = x1[i, c]
                         for j in range(d):
                             inner2[i, j, c] = x2[i, j, c]
-                chain(flat, m, a, inner1, inner2, out1[s, t], out2[s, t])
+                chain_rule_second(flat, m, a, inner1, inner2, out1[s, t], out2[s, t])
     return True
 
 
 @njit(types.void(TAPE, types.f8[:, ::1], types.f8[:, ::1]), error_model="numpy", cache=True)
-def evaluated(tape: Tape, arguments: Array, out: Array) -> None:
-    """Fills `out` (S, m) with the expressions of a tape at arguments (S, K)."""
+def evaluate_all(tape: Tape, arguments: Array, out: Array) -> None:
+    """Write the values of a tape's m expressions at S sets of arguments (S, K) to `out` (S, m)."""
     for s in range(len(arguments)):
         evaluate(tape, arguments[s], out[s])

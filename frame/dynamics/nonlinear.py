@@ -40,26 +40,31 @@ class LagrangianFlow(Flow):
         return "midpoint"
 
     def finer(self) -> tuple[LagrangianFlow, int]:
-        """The same with half the step, which is 2 parts; what is compiled is shared."""
+        """Return the flow with half the step, and 2, the parts of a step; tapes are shared."""
         fine = replace(self, step=self.step / 2)
         shared = ("_expressions", "_newton", "_plain")
         fine.__dict__.update({name: getattr(self, name) for name in shared})
         return fine, 2
 
     def deviations(self, points: Array) -> tuple[Array, Array]:
-        """Trajectories of half the step at points (S, d), and the errors of these, (S, T, m).
+        """Return trajectories of half the step at points (S, d) and this flow's errors, (S, T, m).
 
-        The distance from half the step is extrapolated by the order, 2.
+        The error is 4/3 of the distance between both, by extrapolation of a method of order 2.
         """
         fine = self.finer()[0].values(points)[:, ::2]
         return fine, np.abs(self.values(points) - fine) * 4 / 3
 
     @cached_property
     def _expressions(self) -> tuple[Expressions, Expressions, Expressions]:
-        """Momenta at both ends of a step, outputs of a state (eq. 18), and the initial state.
+        """SymPy expressions of a step, of the outputs and of the start, each with its symbols.
 
-        With q̄ = (q[k] + q[k+1])/2 and v̄ = (q[k+1] − q[k])/h: π[k] = L_v − h/2 (L_q + F), π[k+1] =
-        L_v + h/2 (L_q + F), functions of q[k+1], q[k], parameters and h.
+        Symbols are those to differentiate by, and others.
+
+        1. Momenta π at both ends of a midpoint step: with L_q, L_v and F at the mean of both
+           coordinates and at the velocity (q[k+1] − q[k])/h, they are π[k] = L_v − h/2 (L_q + F)
+           and π[k+1] = L_v + h/2 (L_q + F), functions of q[k+1], q[k], parameters and h.
+        2. Outputs of a state (q, π) (eq. 18).
+        3. The initial state (q, π).
         """
         import sympy
 
@@ -71,19 +76,20 @@ class LagrangianFlow(Flow):
         )
         h = sympy.Symbol("h", positive=True)
         middle = dict(zip([*eq.q, *eq.v], [*((old + new) / 2), *((new - old) / h)], strict=True))
-        momentum, push = eq.momentum.subs(middle), h / 2 * eq.push.subs(middle)
+        momentum, impulse = eq.momentum.subs(middle), h / 2 * eq.push.subs(middle)
         velocity, (q0, v0) = eq.velocity(momenta), self.system.start()
         start = dict(zip([*eq.q, *eq.v], [*q0, *v0], strict=True))
-        seen = [self.system.output(name, velocity) for name in self.outputs]
+        both_momenta = [*(momentum - impulse), *(momentum + impulse)]
+        outputs = [self.system.output(name, velocity) for name in self.outputs]
         return (
-            ([*(momentum - push), *(momentum + push)], [*new, *old, *fuzzy], [*constants, h]),
-            (seen, [*eq.q, *momenta, *fuzzy], constants),
+            (both_momenta, [*new, *old, *fuzzy], [*constants, h]),
+            (outputs, [*eq.q, *momenta, *fuzzy], constants),
             ([*q0, *eq.momentum.subs(start)], fuzzy, constants),
         )
 
     @cached_property
     def _newton(self) -> Tape:
-        """Momenta before a step and their slopes by the coordinates behind it."""
+        """Tape of the momenta before a step and their derivatives by the coordinates after it."""
         components, active, constants = self._expressions[0]
         n = self.system.coordinates
         slopes = [e.diff(x) for e in components[:n] for x in active[:n]]
@@ -100,8 +106,13 @@ class LagrangianFlow(Flow):
         return [with_derivatives(*expression) for expression in self._expressions]
 
     def _march(self, points: Array, *, derivatives: bool) -> Jet:
+        """Return trajectories at points (S, d) by the midpoint rule, V = (S, T, outputs).
+
+        Raises:
+            StepError: A step did not converge.
+        """
         # Numba compiles these when they are imported
-        from alphacut.frame.dynamics.lagrangian_march import evaluated, march
+        from alphacut.frame.dynamics.lagrangian_march import evaluate_all, march
 
         d, m = len(self.names) if derivatives else 0, 2 * self.system.coordinates
         step, observation, initial = self._deep if d else self._plain
@@ -109,18 +120,19 @@ class LagrangianFlow(Flow):
         inputs = np.hstack([points, np.tile(constants, (len(points), 1))])
         inputs = np.ascontiguousarray(inputs, float)
         flat = np.empty((len(inputs), m + m * d + m * d * d))
-        evaluated(initial, inputs, flat)
+        evaluate_all(initial, inputs, flat)
         state, first, second = np.split(flat, [m, m + m * d], axis=1)
-        moving = (
+        state_jet = (  # advanced in place by the march
             np.ascontiguousarray(state),
             np.ascontiguousarray(np.moveaxis(first.reshape(len(inputs), m, d), 1, 2)),
             np.ascontiguousarray(np.moveaxis(second.reshape(len(inputs), m, d, d), 1, 3)),
         )
         nodes = (len(points), len(self.time))
         out = [np.empty((*nodes, *(d,) * order, len(self.outputs))) for order in range(3)]
-        if not march(self._newton, step, observation, inputs, self.step, *moving, *out):
+        if not march(self._newton, step, observation, inputs, self.step, *state_jet, *out):
             what = f"a step of {self.step:g} s did not converge, or leaves the numbers"
             raise StepError(what, "take a smaller step, or parameters where the motion exists")
+        # jets have the axes of the derivatives first
         return Jet(out[0], np.moveaxis(out[1], 2, 0), np.moveaxis(out[2], (2, 3), (0, 1)))
 
 
@@ -131,7 +143,14 @@ def flow_of(
     step: float,
     integrator: str | Integrator = "midpoint",
 ) -> Flow:
-    """Trajectories of any structure.
+    """Return the flow that computes trajectories of a linear structure or a Lagrangian system.
+
+    Args:
+        model: The structure.
+        names: Its uncertain parameters.
+        duration: Length of the motion, in s.
+        step: Distance of nodes and length of a step, in s.
+        integrator: Time stepping or its name; Lagrangian systems take "midpoint" alone.
 
     Raises:
         RefusedError: The structure has no such parameter or integrator.

@@ -9,7 +9,7 @@ import numpy as np
 
 from alphacut.frame.calculus.jet import Array, Jet, concatenate
 from alphacut.frame.dynamics.integrators import StepMap, exponential
-from alphacut.frame.dynamics.record_load import load_rule, parts_of
+from alphacut.frame.dynamics.record_load import load_rule, parts_per_step
 from alphacut.frame.structures.assembly import Matrices
 from alphacut.frame.structures.loads import History
 from alphacut.frame.structures.modes import state_matrix
@@ -21,26 +21,37 @@ TERMS = 28
 def exact_response(
     matrices: Matrices, pushes: Jet, loads: Sequence[History], *, step: float, steps: int
 ) -> tuple[StepMap, Array]:
-    """The exact step under loads that push as `pushes`, V = (S, n, L), and their rule's weights.
+    """Return the exact map of one step x[k+1] = T x[k] + G load[k], and load[k] of all steps.
+
+    Duhamel's integral over a step is a rule with Q points for each load: G holds exp(A τ) b at the
+    points τ, and load[k] the rule's weights.
+
+    Args:
+        matrices: The structure at S parameter sets, of state matrix A.
+        pushes: Accelerations by a unit of each load, V = (S, n, L).
+        loads: The L loads.
+        step: Length of a step, in s.
+        steps: Number of steps.
 
     Returns:
-        The step, and what its load acts on, shape (steps, L Q).
+        T and G, V = (S, 2n, 2n) and (S, 2n, L Q), and the loads, shape (steps, L Q).
     """
     flow = state_matrix(matrices)
     fastest = float(np.abs(np.linalg.eigvals(flow.value)).max())
-    parts = parts_of(max(fastest, *(load.frequency for load in loads)), step)
+    parts = parts_per_step(max(fastest, *(load.frequency for load in loads)), step)
     rules = [load_rule(load, step, steps, parts) for load in loads]
-    tau, short = rules[0].tau[: len(rules[0].tau) // parts], step / parts
+    substep = step / parts
+    tau = rules[0].tau[: len(rules[0].tau) // parts]  # points in the last substep
     term = concatenate([pushes * 0.0, pushes], -2)
-    series = [term]
+    series = [term]  # exp(A τ) b = Σ_k series[k] (τ / substep)^k
     for k in range(1, TERMS):
-        term = flow @ term * (short / k)
+        term = flow @ term * (substep / k)
         series.append(term)
-    powers = (tau / short) ** np.arange(TERMS)[:, None]
+    powers = (tau / substep) ** np.arange(TERMS)[:, None]
     count = len(loads)
     columns = [concatenate([x[..., i : i + 1] for x in series], -1) @ powers for i in range(count)]
-    transfer = exponential(flow * short)  # columns are exp(A τ) B of each load
-    for _ in range(parts.bit_length() - 1):
+    transfer = exponential(flow * substep)
+    for _ in range(parts.bit_length() - 1):  # doubles the time until it is a step
         columns = [concatenate([x, transfer @ x], -1) for x in columns]
         transfer = transfer @ transfer
     weights = np.concatenate([rule.weight for rule in rules], -1)
@@ -48,7 +59,9 @@ def exact_response(
 
 
 def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, count: int) -> Jet:
-    """Outputs at `count` nodes, in blocks of √count steps.
+    """Return outputs C x[k] at `count` nodes, computed in blocks of √count steps.
+
+    States at the first node of each block come from one another, those in a block from powers of T.
 
     Args:
         step_map: One step, x[k+1] = T x[k] + G load[k].
@@ -60,20 +73,20 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, 
     Returns:
         Outputs, V = (S, count, m).
     """
-    size = isqrt(count - 1) + 1
+    size = isqrt(count - 1) + 1  # of a block
     blocks = -(-count // size)
     powers = _powers(step_map.transfer, size)
-    jump = step_map.transfer @ powers[:, -1]
+    block_transfer = step_map.transfer @ powers[:, -1]
     observed = rows[:, None] @ powers  # C T^j, V = (S, size, m, N)
     samples, m, n = len(start.value), rows.value.shape[-2], start.value.shape[-2]
     flat = observed.map(lambda x: x.reshape((*x.shape[:-3], size * m, n)))
     if load is None:
-        out = flat @ _starts(jump, start, None, blocks)
+        out = flat @ _block_starts(block_transfer, start, None, blocks)
     else:
-        forced, ends = _forced(step_map, rows, load, size, blocks)
-        out = flat @ _starts(jump, start, ends, blocks) + forced
+        forced, ends = _responses_from_rest(step_map, rows, load, size, blocks)
+        out = flat @ _block_starts(block_transfer, start, ends, blocks) + forced
 
-    def in_time(x: Array) -> Array:
+    def in_time(x: Array) -> Array:  # from (…, S, size m, blocks) to (…, S, count, m)
         lead = x.shape[:-3]
         ordered = np.moveaxis(x.reshape((*lead, samples, size, m, blocks)), -1, -3)
         return ordered.reshape((*lead, samples, blocks * size, m))[..., :count, :]
@@ -81,34 +94,44 @@ def trajectory(step_map: StepMap, start: Jet, rows: Jet, *, load: Array | None, 
     return out.map(in_time)
 
 
-def _forced(step_map: StepMap, rows: Jet, load: Array, size: int, blocks: int) -> tuple[Jet, Jet]:
-    """Outputs of blocks from rest, V = (S, size m, blocks), and last states, V = (S, N, blocks)."""
+def _responses_from_rest(
+    step_map: StepMap, rows: Jet, load: Array, size: int, blocks: int
+) -> tuple[Jet, Jet]:
+    """Return the motion in blocks of `size` steps that each start at rest under the load.
+
+    Returns:
+        Outputs, V = (S, size m, blocks), and states after a block, V = (S, N, blocks).
+    """
     padded = np.zeros((blocks * size, load.shape[1]))
     padded[: len(load)] = load
     columns = padded.reshape(blocks, size, -1)
     state = step_map.load @ np.zeros((load.shape[1], blocks))
-    seen = []
-    for k in range(size):
-        seen.append(rows @ state)  # eq. 18, of a linear structure
+    outputs = []
+    for k in range(size):  # all blocks at once
+        outputs.append(rows @ state)  # eq. 18, of a linear structure
         state = step_map.transfer @ state + step_map.load @ columns[:, k].T
-    return concatenate(seen, -2), state
+    return concatenate(outputs, -2), state
 
 
 def _powers(transfer: Jet, count: int) -> Jet:
-    """T^0 … T^(count − 1) by doubling, V = (S, count, N, N)."""
+    """Return the powers T^0 … T^(count − 1) of a matrix by doubling, V = (S, count, N, N)."""
     eye = np.broadcast_to(np.eye(transfer.value.shape[-1]), transfer.value.shape)
     powers = Jet.constant(eye, transfer.directions)[:, None]
-    top = transfer
+    next_power = transfer
     while powers.value.shape[1] < count:
-        powers = concatenate([powers, powers @ top[:, None]], -3)
-        top = top @ top
+        powers = concatenate([powers, powers @ next_power[:, None]], -3)
+        next_power = next_power @ next_power
     return powers[:, :count]
 
 
-def _starts(jump: Jet, start: Jet, forced: Jet | None, blocks: int) -> Jet:
-    """States at the first node of every block, V = (S, N, blocks)."""
+def _block_starts(block_transfer: Jet, start: Jet, forced: Jet | None, blocks: int) -> Jet:
+    """Return the states at the first node of each block, V = (S, N, blocks).
+
+    `block_transfer` is the free motion over a block, `forced` the state after each block that
+    starts at rest under the load, V = (S, N, blocks), or None without a load.
+    """
     states = [start]
     for b in range(blocks - 1):
-        following = jump @ states[-1]
+        following = block_transfer @ states[-1]
         states.append(following if forced is None else following + forced[..., b : b + 1])
     return concatenate(states, -1)
