@@ -299,14 +299,16 @@ class Frame(Section):
         Raises:
             RefusedError: Its values make no frame.
         """
-        number = self.modulus if self.stiffness else modulus or self.modulus or STAND_IN
+        young = modulus or self.modulus or STAND_IN
+        if self.stiffness:  # which needs no modulus
+            young = self.modulus
         ratios = ratios_of(self.damping_ratio, loss)
         try:
-            model = self._model(number, [x.modal for x in ratios.values()])
+            model = self._model(young, [x.modal for x in ratios.values()])
         except RefusedError as error:
             key = f"frame.{NAMES.get(error.key, error.key)}"
             raise RefusedError(key, error.value, error.allowed, error.cure) from None
-        numbers = self._numbers(number) | ratios
+        numbers = self._numbers(young) | ratios
         heights = {
             f"drift{storey}": height
             for storey, height in enumerate(self.per_floor(self.lengths), start=1)

@@ -15,6 +15,8 @@ from alphacut.rve.mesh.file import write
 from alphacut.rve.mesh.wedge_orders import MESHIO_ORDER
 
 if TYPE_CHECKING:
+    import meshio
+
     from alphacut.rve.prism.fields import CellFields
 
 FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf", ".inp": "abaqus"}
@@ -24,9 +26,9 @@ FORMATS = {".msh": "gmsh", ".vtu": "vtu", ".xdmf": "xdmf", ".inp": "abaqus"}
 def write_cell(fields: CellFields, path: Path) -> int:
     """Writes mesh, phases, displacements and stresses; returns the number of nodes written.
 
-    The ending of the file's name chooses the format.
-    Gmsh's file holds the mesh once, with fields as values at the nodes of its elements; in VTK's
-    and XDMF nodes of the interface stand twice, since stresses jump there. Abaqus's has no fields.
+    The ending of the file's name chooses the format. Gmsh's file holds the mesh once, with fields
+    as values at the nodes of its elements; in VTK's and XDMF nodes of the interface stand twice,
+    since stresses jump there. Abaqus's has no fields.
 
     Raises:
         RefusedError: The name ends otherwise.
@@ -39,10 +41,11 @@ def write_cell(fields: CellFields, path: Path) -> int:
         return _write_gmsh(fields, path)
     import meshio
 
-    mesh = wedge_mesh(fields.points, fields.cells, fields.phase, _point_fields(fields))
     if kind == "abaqus":
         say(f"{path} holds mesh and phases; displacements and stresses go to .msh, .vtu or .xdmf")
         mesh = _abaqus_mesh(fields)
+    else:
+        mesh = wedge_mesh(fields.points, fields.cells, fields.phase, _point_fields(fields))
     if kind == "xdmf":
         meshio.write(path, mesh, file_format=kind, data_format="XML")
         return len(fields.points)
@@ -73,7 +76,7 @@ def _point_fields(fields: CellFields) -> dict[str, Array]:
     return data
 
 
-def _abaqus_mesh(fields: CellFields) -> object:
+def _abaqus_mesh(fields: CellFields) -> meshio.Mesh:
     """Mesh of meshio for Abaqus: interface nodes once, a set of elements for each phase."""
     import meshio
 

@@ -99,7 +99,7 @@ class TolerancesQuestion(Question):
     @staticmethod
     def rows(document: Document) -> list[Row]:
         """Table of the report: the scale of all supports, then the tolerance of each input."""
-        largest, passed = document["kept"], document["passed"]
+        largest, passed = document["kept"], document["passed"]  # without and with an exceedance
         scale = "none"
         if largest is not None:
             scale = f"up to {rounded(largest, 'upper', Nature.ATTAINED):.4g}"

@@ -103,9 +103,9 @@ def _model_of_particle(
         accuracy = max(TOLERANCE_PART * (tolerance or SPHERE_TOLERANCE), 1e-11)
         return SphereSeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve
     if cell.has_series and method in ("auto", "series"):
-        accuracy = (
-            SeriesModel.accuracy if tolerance is None else max(TOLERANCE_PART * tolerance, 1e-12)
-        )
+        accuracy = SeriesModel.accuracy
+        if tolerance is not None:
+            accuracy = max(TOLERANCE_PART * tolerance, 1e-12)
         return SeriesModel(accuracy=accuracy, energies=bool(cell.losses)).solve
     outline = cell.outline or circle
     if method in ("auto", "slices"):

@@ -191,7 +191,10 @@ class Pipeline:
         return FuzzyResponse(structure, task.fuzzy, alpha, task.duration, step, peaks)
 
     def _limited_peaks(self, task: EnvelopeTask, structure: Structure) -> Peaks | None:
-        """Peaks for questions, from the study with [envelope]'s motion or else computed alone."""
+        """Peaks for questions, from the study with [envelope]'s motion or else computed alone.
+
+        None where no study has it and no question needs them.
+        """
         alpha = task.section.alpha
         for study in self.results.tasks:
             if study.has_motion_of(task.section):

@@ -70,8 +70,10 @@ def _by_input(shares: Shares, values: Array) -> dict[str, float]:
 
 
 def cell_shares(campaign: CellCampaign) -> Shares:
-    """Shares of the cell's inputs in the widths of E and ν, shape (inputs, levels, 2)."""
-    # the series is cheap where it has a formula
+    """Fractions of the widths of E and ν that are lost if an input of the cell is modal.
+
+    They have shape (inputs, levels, 2), and come from the series where it has a formula.
+    """
     modulus = campaign.modulus.model_copy(update={"method": "auto"})
     propagation = replace(campaign, modulus=modulus).propagation
 
@@ -85,7 +87,10 @@ def cell_shares(campaign: CellCampaign) -> Shares:
 
 
 def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTask) -> Shares:
-    """Shares of a study's inputs in the width of each output's peak, shape (inputs, outputs)."""
+    """Fractions of the width of each output's peak that are lost if an input is modal.
+
+    They have shape (inputs, outputs), by the inputs of a study.
+    """
     groups, step = {name: structure.members(name) for name in task.fuzzy}, task.section.step
     if model.ground is not None:
         step = coarser_step(task.duration, step)
@@ -94,13 +99,11 @@ def peak_shares(model: frame.StoreyFrame, structure: Structure, task: EnvelopeTa
         """Least and greatest peak of each output on the lowest level, shape (outputs,) each."""
         fuzzy = {name: x for name, x in numbers.items() if not isinstance(x, Crisp)}
         method = frame.Auto(ACCURACY, peaks=True)
-        motion: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}
-        motion["interruptible"] = False
+        options: dict[str, Any] = {"alpha": task.section.alpha[:1], "duration": task.duration}
+        options |= {"step": step, "method": method, "interruptible": False, "progress": False}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
-            peak_bounds = peaks(
-                frame.envelope(model, fuzzy, step=step, method=method, progress=False, **motion)
-            )
+            peak_bounds = peaks(frame.envelope(model, fuzzy, **options))
         # what is reached is nearer the truth than a proved bound with a gap
         proved = np.array([nature is Nature.GUARANTEED for nature in peak_bounds.natures])
         return peak_bounds.lower[0], np.where(proved, peak_bounds.reached[0], peak_bounds.upper[0])
